@@ -1,0 +1,7 @@
+"""Feedback laws, one information structure a file."""
+
+from gne_mj.controllers.full_information import FullInformation
+from gne_mj.controllers.fully_distributed import FullyDistributed
+from gne_mj.controllers.law import Law
+
+__all__ = ["FullInformation", "FullyDistributed", "Law"]

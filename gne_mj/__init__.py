@@ -1,0 +1,29 @@
+"""Robots that seek a generalized Nash equilibrium and never leave their shared constraint set."""
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gne_mj.scenario import Scenario, load_scenario
+    from gne_mj.simulation import Simulation
+    from gne_mj.trajectory import Trajectory
+
+__version__ = version("gne-mj")
+
+# Imported at first use, so that the command line answers at once.
+_LAZY = {
+    "Scenario": "gne_mj.scenario",
+    "Simulation": "gne_mj.simulation",
+    "Trajectory": "gne_mj.trajectory",
+    "load_scenario": "gne_mj.scenario",
+    "run": "gne_mj.scenario",
+}
+
+__all__ = ["Scenario", "Simulation", "Trajectory", "__version__", "load_scenario", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module 'gne_mj' has no attribute {name!r}")

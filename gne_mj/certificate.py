@@ -1,0 +1,268 @@
+"""What one system's run showed, measured at every integration step: status and certificate."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
+from gne_mj.errors import SolverError
+from gne_mj.games import velocity_synchronization as velocity
+from gne_mj.loops import monitor as watch
+from gne_mj.system import System
+
+SUCCESSES = ("converged", "completed")
+SETTLED = 0.02  # of the initial distance
+TAIL = 0.05  # of the run, over which "converged" must hold
+# Best responses cost a Newton solve for each agent: beyond this many they are left out.
+EPSILON_AGENTS = 50
+# V may rise by this much of its start through rounding alone.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What is claimed of a run and what was measured; times in s, None where not applicable.
+
+    Attributes:
+        status: one of the statuses of the README, with its sentence in ``message``.
+        worst_constraint: the least margin -g over all constraints and integration steps.
+        worst_gap: for velocity games, the gap that used most of its bound.
+        equilibrium: penalised and variational, and how far from them the run ended.
+        epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
+        settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
+        lyapunov: V^{x*} over the run, and whether the theory claims that it never rises.
+        actuators: peak, RMS and energy of the inputs, and where a limit was met.
+        steps, end_time, wall_time: integration steps taken, simulated and real time.
+    """
+
+    status: str
+    message: str
+    worst_constraint: dict[str, Any]
+    worst_gap: dict[str, Any] | None
+    equilibrium: dict[str, Any]
+    epsilon: dict[str, Any]
+    settling_time: float | None
+    lyapunov: dict[str, Any]
+    actuators: dict[str, Any]
+    steps: int
+    end_time: float
+    wall_time: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the run ended well: inside the set at every step, to its end."""
+        return self.status in SUCCESSES
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings and lists, for JSON."""
+        return asdict(self)
+
+
+def certify_run(
+    system: System,
+    time: NDArray[np.float64],
+    action: NDArray[np.float64],
+    monitor: NDArray[np.float64],
+    *,
+    tolerance: float,
+    duration: float,
+    wall_time: float,
+    interrupted: bool = False,
+) -> Certificate:
+    """Put together what a run of ``system`` showed.
+
+    Args:
+        system: what was run.
+        time: sample times (samples,).
+        action: y at the sample times (samples, m).
+        monitor: the loop's flat array of what was seen at every step.
+        tolerance: for the status ``converged``.
+        duration: how long the run was meant to last.
+        wall_time: real time that it took.
+        interrupted: the user stopped it.
+    """
+    distance = np.max(np.abs(action - system.equilibrium.action), axis=1)
+    status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
+    return Certificate(
+        status=status,
+        message=message,
+        worst_constraint=_worst_constraint(system, monitor),
+        worst_gap=_worst_gap(system, monitor),
+        equilibrium=_equilibrium(system, action[-1]),
+        epsilon=_epsilon(system, system.equilibrium),
+        settling_time=_settling_time(time, distance),
+        lyapunov=_lyapunov(system, monitor),
+        actuators=_actuators(system, monitor),
+        steps=int(monitor[watch.STEPS]),
+        end_time=float(time[-1]),
+        wall_time=wall_time,
+    )
+
+
+def _status(
+    system: System,
+    time: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    monitor: NDArray[np.float64],
+    tolerance: float,
+    duration: float,
+    interrupted: bool,
+) -> tuple[str, str]:
+    if monitor[watch.EXIT] != watch.INSIDE:
+        return _exit(system, monitor)
+    end = float(time[-1])
+    if interrupted:
+        return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
+    late = distance[time >= end - TAIL * duration - 1e-9]
+    if np.max(late) <= tolerance:
+        return (
+            "converged",
+            f"within {np.max(late):.2g} of the penalised equilibrium over the last"
+            f" {TAIL * duration:g} s (tolerance {tolerance:g})",
+        )
+    return (
+        "completed",
+        f"ran its {duration:g} s inside the set; {distance[-1]:.3g} from the penalised"
+        f" equilibrium at the end (tolerance {tolerance:g})",
+    )
+
+
+def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
+    game = system.game
+    at = f"at {monitor[watch.EXIT_TIME]:.6g} s"
+    if monitor[watch.EXIT_STAGE] > 0:
+        at += f" (stage {int(monitor[watch.EXIT_STAGE]) + 1} of the integration step)"
+    value = float(monitor[watch.EXIT_VALUE])
+    code = int(monitor[watch.EXIT])
+    if code == watch.DIVERGED:
+        return "diverged", f"an output or input is no longer a usable number ({value:g}) {at}"
+    constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
+    if code == watch.LEFT_SET:
+        return (
+            "left_feasible_set",
+            f"constraint '{constraint}' was violated {at}: g = {value:.6g}, not negative",
+        )
+    agent = int(monitor[watch.EXIT_AGENT]) + 1
+    return (
+        "estimate_left_feasible_set",
+        f"agent {agent}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g}, not"
+        " negative, so its law has no action there (a smaller epsilon keeps estimates closer)",
+    )
+
+
+def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+    p = system.game.constraints_count
+    at = int(watch.worst_at(p))
+    worst, when = monitor[at : at + p], monitor[at + p : at + 2 * p]
+    index = int(np.argmax(worst))
+    return {
+        "name": system.game.constraint_names[index],
+        "index": index + 1,
+        "margin": float(-worst[index]),
+        "time": float(when[index]),
+    }
+
+
+def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+    if system.game.kernels is not velocity:
+        return None
+    p = system.game.constraints_count
+    at = int(watch.worst_at(p))
+    bounds = system.game.parameters[1:]
+    gaps = np.sqrt(np.maximum(monitor[at : at + p] + bounds**2, 0.0))
+    index = int(np.argmax(gaps / bounds))
+    return {
+        "agent": index + 1,
+        "gap": float(gaps[index]),
+        "bound": float(bounds[index]),
+        "time": float(monitor[at + p + index]),
+    }
+
+
+def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
+    penalised = system.equilibrium
+    result: dict[str, Any] = {
+        "penalised": penalised.action.tolist(),
+        "multipliers": penalised.multipliers.tolist(),
+        "residual": penalised.residual,
+        "final_distance": float(np.max(np.abs(last - penalised.action))),
+    }
+    try:
+        variational = variational_equilibrium(system.game, penalised.action)
+        result["variational"] = variational.action.tolist()
+        result["final_distance_to_variational"] = float(
+            np.max(np.abs(last - variational.action))
+        )
+    except SolverError:
+        result["variational"] = result["final_distance_to_variational"] = None
+    return result
+
+
+def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
+    game = system.game
+    measured = None
+    if game.agents <= EPSILON_AGENTS:
+        try:
+            measured = float(np.max(measured_epsilon(game, equilibrium.action)))
+        except SolverError:
+            measured = None
+    return {
+        "measured": measured,
+        "p_rho": game.constraints_count * system.rho,
+        "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
+    }
+
+
+def _settling_time(
+    time: NDArray[np.float64], distance: NDArray[np.float64]
+) -> float | None:
+    outside = np.flatnonzero(~(distance <= SETTLED * distance[0]))
+    if len(outside) == 0:
+        return float(time[0])
+    if outside[-1] == len(time) - 1:
+        return None
+    return float(time[outside[-1] + 1])
+
+
+def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+    start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
+    claimed = system.mode == "continuous" and system.law.information == "full"
+    return {
+        "claimed": claimed,
+        "start": start,
+        "final": float(monitor[watch.STORAGE]),
+        "largest_rise": rise,
+        "largest_rise_time": float(monitor[watch.STORAGE_RISE_TIME]) if rise > 0 else None,
+        "monotone": rise <= ROUNDING * max(start, 1.0),
+    }
+
+
+def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+    m, p = system.game.actions, system.game.constraints_count
+    at = int(watch.inputs_at(p))
+    peak, when, square, energy = monitor[at : at + 4 * m].reshape(4, m)
+    duration = float(monitor[watch.TIME])
+    agent = system.game.agent_of_action
+    largest = int(np.argmax(peak))
+    limits = system.agents.input_limit
+    result: dict[str, Any] = {
+        "peak": float(peak[largest]),
+        "peak_agent": int(agent[largest]) + 1,
+        "peak_time": float(when[largest]),
+        "peaks": peak.tolist(),
+        "rms": np.sqrt(square / duration).tolist() if duration > 0 else [0.0] * m,
+        "energy": energy.tolist(),
+        "limits": None if np.all(np.isinf(limits)) else limits.tolist(),
+        "saturated": None,
+    }
+    if monitor[watch.SATURATED] > 0:
+        index = int(monitor[watch.SATURATED_ACTION])
+        result["saturated"] = {
+            "agent": int(agent[index]) + 1,
+            "time": float(monitor[watch.SATURATED_TIME]),
+            "demand": float(monitor[watch.SATURATED_DEMAND]),
+            "limit": float(limits[index]),
+        }
+    return result

@@ -1,0 +1,289 @@
+"""The command line. Heavy modules are imported where they are needed, so that --help is quick."""
+
+import json
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from gne_mj.trajectory import Trajectory
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Robots that seek a generalized Nash equilibrium and never leave their constraint set.",
+)
+
+_SCENARIO = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario (see `scenarios`), or a .toml file.")
+]
+_SET = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be repeated."),
+]
+_OUT = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder to write; must not exist.")
+]
+_JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
+
+
+@app.command()
+def run(scenario: _SCENARIO, set_: _SET = None, out: _OUT = None, as_json: _JSON = False) -> None:
+    """Run a scenario; keep the trajectory and a JSON report in --out."""
+    trajectory = _simulate(scenario, set_, out, quiet=as_json)
+    _tell(trajectory, as_json)
+    if out is not None and not as_json:
+        print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
+    raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def paper(
+    set_: _SET = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")
+    ] = Path("results/paper"),
+    as_json: _JSON = False,
+) -> None:
+    """Run the paper's two experiments beside each other and draw its four figures.
+
+    Results of an earlier `paper` in the same folder are replaced.
+    """
+    trajectory = _simulate("paper", set_, out, quiet=as_json, replace=True, figures=("png",))
+    _tell(trajectory, as_json)
+    if not as_json:
+        print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
+        for figure in sorted(out.glob("*.png")):
+            print(f"figure      {figure}")
+    raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def plot(
+    run_folder: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder that `run --out` or `paper` wrote.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Where to; RUN if left out.")
+    ] = None,
+    format_: Annotated[
+        list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
+    ] = None,
+) -> None:
+    """Draw the figures of a stored run."""
+    from gne_mj import plots
+    from gne_mj.errors import InvalidInput
+    from gne_mj.trajectory import Trajectory
+
+    store = run_folder / "trajectory.zarr"
+    if not store.is_dir():
+        raise InvalidInput("RUN", str(run_folder), "it must be a folder with a trajectory.zarr")
+    formats = tuple(format_ or ("png",))
+    for name in formats:
+        if name not in plots.FORMATS:
+            raise InvalidInput("--format", name, f"choose from {', '.join(plots.FORMATS)}")
+    target = out or run_folder
+    target.mkdir(parents=True, exist_ok=True)
+    for path in plots.save(Trajectory.load(store), target, formats):
+        print(path)
+
+
+@app.command()
+def scenarios(
+    name: Annotated[
+        str | None, typer.Argument(help="Print this scenario's file, to start one of your own.")
+    ] = None,
+) -> None:
+    """List the shipped scenarios, or print one."""
+    import tomllib
+
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import nearest, shipped
+
+    files = shipped()
+    if name is None:
+        width = max(map(len, files))
+        for key, text in files.items():
+            print(f"{key:{width}}  {tomllib.loads(text)['description']}")
+    elif name in files:
+        print(files[name], end="")
+    else:
+        raise InvalidInput("scenario", name, nearest(name, files))
+
+
+def _version(value: bool) -> None:
+    if value:
+        from gne_mj import __version__
+
+        print(f"gne-mj {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point: an error meant for the user is one sentence on stderr, and exit status 2."""
+    try:
+        app()
+    except BrokenPipeError:
+        sys.exit(1)
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except Exception as error:
+        from gne_mj.errors import GneError
+
+        if not isinstance(error, GneError):
+            raise
+        _fail(str(error), getattr(error, "status", None))
+
+
+def _fail(message: str, status: str | None = None) -> None:
+    if "--json" in sys.argv:
+        print(json.dumps({"status": status or "invalid_input", "message": message}))
+    print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _simulate(
+    scenario: str,
+    changes: list[str] | None,
+    out: Path | None,
+    *,
+    quiet: bool,
+    replace: bool = False,
+    figures: tuple[str, ...] = (),
+) -> "Trajectory":
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import load_scenario, parse_value
+
+    settings: dict[str, Any] = {}
+    for change in changes or []:
+        key, equals, value = change.partition("=")
+        if not (key and equals):
+            raise InvalidInput("--set", change, "it must read KEY=VALUE")
+        settings[key.strip()] = parse_value(value.strip())
+    simulation = load_scenario(scenario, settings).simulation_object()
+    with _results(out, replace) as folder, _progress(simulation.clock.duration, quiet) as show:
+        trajectory = simulation.run(show)
+        if folder is not None:
+            trajectory.save(folder / "trajectory.zarr")
+            report = json.dumps(trajectory.report(), indent=2)
+            (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+            if figures:
+                from gne_mj import plots
+
+                plots.save(trajectory, folder, figures)
+    return trajectory
+
+
+@contextmanager
+def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
+    """A folder that becomes ``out`` when all is written, and vanishes if something fails."""
+    import tempfile
+
+    from gne_mj.errors import InvalidInput
+
+    if out is None:
+        yield None
+        return
+    # Only what an earlier run wrote is ever replaced.
+    if out.exists() and not (replace and (out / "report.json").is_file()):
+        raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    except OSError as error:
+        raise InvalidInput("--out", str(out), f"it cannot be written: {error.strerror}") from None
+    try:
+        yield folder
+        folder.chmod(0o755)
+        if out.exists():
+            shutil.rmtree(out)
+        folder.rename(out)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+@contextmanager
+def _progress(duration: float, quiet: bool) -> Iterator[Any]:
+    """A progress bar on a terminal's stderr, else nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn("{task.completed:.1f} of {task.total:g} s"),
+        BarColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task("run", total=duration)
+        yield lambda now: bar.update(task, completed=now)
+
+
+def _tell(trajectory: "Trajectory", as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(trajectory.report(), indent=2))
+        return
+    for name, report in trajectory.reports.items():
+        print("\n".join(_summary(name, report)))
+        _warn(name, report)
+
+
+def _summary(name: str, report: dict[str, Any]) -> list[str]:
+    worst, gap = report["worst_constraint"], report["worst_gap"]
+    settling, actuators = report["settling_time"], report["actuators"]
+    lyapunov, epsilon = report["lyapunov"], report["epsilon"]
+    distances = report["equilibrium"]
+    unknown = distances["final_distance_to_variational"] is None
+    rows = {
+        "status": f"{report['status']}: {report['message']}",
+        "least margin": f"{worst['margin']:.6g} of '{worst['name']}' at {worst['time']:.4g} s",
+        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
+        "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
+        + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
+        "Lyapunov function": ("never rose" if lyapunov["monotone"] else "rose")
+        + f" (largest rise {lyapunov['largest_rise']:.2g}; "
+        + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
+        "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
+        f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
+    }
+    if gap is not None:
+        rows["widest gap"] = (
+            f"{gap['gap']:.6g} of {gap['bound']:g} m/s, agent {gap['agent']} at {gap['time']:.4g} s"
+        )
+    if epsilon["measured"] is not None:
+        rows["epsilon"] = (
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
+            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
+        )
+    return [f"\n{name}", *(f"  {key:20} {value}" for key, value in rows.items())]
+
+
+def _warn(name: str, report: dict[str, Any]) -> None:
+    saturated = report["actuators"]["saturated"]
+    if saturated is not None:
+        print(
+            f"gne-mj: warning: systems.{name}: the law asked agent {saturated['agent']} for"
+            f" {saturated['demand']:.4g} at {saturated['time']:.4g} s, beyond its input limit"
+            f" {saturated['limit']:g}; from then on nothing is guaranteed",
+            file=sys.stderr,
+        )

@@ -1,0 +1,49 @@
+"""Errors that the package raises on purpose; each message is one sentence a user can act on."""
+
+
+class GneError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class InvalidInput(GneError, ValueError):
+    """A value that cannot be used: names the key, the value and what would be right.
+
+    Attributes:
+        key: dotted name of the offending entry.
+        value: what was given.
+        expected: what would be right.
+    """
+
+    def __init__(self, key: str, value: object, expected: str) -> None:
+        self.key, self.value, self.expected = key, value, expected
+        super().__init__(f"{key}: got {value!r}, but {expected}")
+
+
+class InfeasibleStart(GneError, ValueError):
+    """An initial action (or estimate) on or outside the boundary of the shared constraint set.
+
+    Attributes:
+        constraint: name of the constraint that is not strictly satisfied.
+        value: its value g_l(y(0)), which would have to be negative.
+    """
+
+    status = "infeasible_start"
+
+    def __init__(self, system: str, what: str, constraint: str, value: float) -> None:
+        self.system, self.constraint, self.value = system, constraint, value
+        super().__init__(
+            f"{system}: the {what} must lie strictly inside the constraint set, but constraint"
+            f" '{constraint}' has g = {value:.6g} (margin {-value:.6g}); it must be negative"
+        )
+
+
+class EngineError(GneError, RuntimeError):
+    """MuJoCo cannot be driven natively here (unknown version, or callbacks already in use)."""
+
+
+class SolverError(GneError, RuntimeError):
+    """An iteration ended without reaching its tolerance; the numbers are attributes."""
+
+    def __init__(self, message: str, residual: float, iterations: int) -> None:
+        self.residual, self.iterations = residual, iterations
+        super().__init__(f"{message} (residual {residual:.3g} after {iterations} iterations)")

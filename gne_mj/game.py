@@ -1,0 +1,239 @@
+"""A generalized game: costs J_i(y), shared constraints g(y) <= 0 and their exact derivatives.
+
+The mathematics of one game is a module of kernels (see :mod:`gne_mj.native`). With q the game's
+flat parameter vector, y the profile of all actions (shape (m,)), i and j agents, l a constraint,
+all numbered from 0, such a module defines
+
+==================================================  ===============================================
+``cost(q, i, y)``                                    J_i(y)
+``add_cost_gradient(q, i, y, scale, out)``           out += scale * dJ_i/dy_i, shape (m_i,)
+``add_cost_hessian(q, i, j, y, scale, out)``         out += scale * d2J_i/dy_i dy_j, (m_i, m_j)
+``constraint(q, l, y)``                              g_l(y), negative inside
+``add_constraint_gradient(q, l, i, y, scale, out)``  out += scale * dg_l/dy_i, (m_i,)
+``add_constraint_hessian(q, l, i, j, y, scale, out)``  out += scale * d2g_l/dy_i dy_j, (m_i, m_j)
+==================================================  ===============================================
+
+:class:`Game` joins such a module with its parameters and with who appears where.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from types import ModuleType, SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.native import compiled, source_key
+
+
+class GameData(NamedTuple):
+    """What kernels read of a game, as arrays for native code.
+
+    Index lists are in compressed rows: those of row r are ``index[pointer[r]:pointer[r + 1]]``.
+    """
+
+    parameters: np.ndarray  # q, the game's own numbers
+    offsets: np.ndarray  # (N + 1,) where each agent's action starts in a profile
+    cost_pointer: np.ndarray  # agent i -> the agents that appear in J_i (i itself first)
+    cost_index: np.ndarray
+    member_pointer: np.ndarray  # constraint l -> the agents that appear in g_l
+    member_index: np.ndarray
+    own_pointer: np.ndarray  # agent i -> the constraints that contain y_i
+    own_index: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Game:
+    """A generalized game [eq:GNE].
+
+    Args:
+        name: what the game is called in messages and files.
+        kernels: module of kernels, as in this module's table.
+        parameters: q, flat.
+        sizes: m_i of each agent.
+        in_cost: for each agent the agents that appear in its cost.
+        in_constraint: for each constraint the agents that appear in it.
+        constraint_names: one name for each constraint, used in messages and files.
+        action_name: what an action is, e.g. "velocity".
+        action_unit: its unit.
+    """
+
+    name: str
+    kernels: ModuleType
+    parameters: NDArray[np.float64]
+    sizes: tuple[int, ...]
+    in_cost: Sequence[Sequence[int]]
+    in_constraint: Sequence[Sequence[int]]
+    constraint_names: tuple[str, ...]
+    action_name: str = "action"
+    action_unit: str = ""
+
+    @property
+    def agents(self) -> int:
+        """N."""
+        return len(self.sizes)
+
+    @cached_property
+    def actions(self) -> int:
+        """m, the length of a profile."""
+        return sum(self.sizes)
+
+    @property
+    def constraints_count(self) -> int:
+        """p."""
+        return len(self.in_constraint)
+
+    @cached_property
+    def data(self) -> GameData:
+        """The same, for native code (read-only arrays)."""
+        own: list[list[int]] = [[] for _ in self.sizes]
+        for constraint, members in enumerate(self.in_constraint):
+            for agent in members:
+                own[agent].append(constraint)
+        ordered = [[i, *(j for j in members if j != i)] for i, members in enumerate(self.in_cost)]
+        arrays = (
+            np.array(self.parameters, dtype=np.float64),
+            np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64),
+            *_compress(ordered),
+            *_compress(self.in_constraint),
+            *_compress(own),
+        )
+        for array in arrays:
+            array.flags.writeable = False
+        return GameData(*arrays)
+
+    @cached_property
+    def own_constraints(self) -> NDArray[np.int64]:
+        """p_i, the number of constraints that contain y_i, shape (N,)."""
+        return np.diff(self.data.own_pointer)
+
+    @cached_property
+    def agent_of_action(self) -> NDArray[np.int64]:
+        """Which agent each entry of a profile belongs to, shape (m,)."""
+        return np.repeat(np.arange(self.agents), self.sizes)
+
+    def costs(self, y: ArrayLike) -> NDArray[np.float64]:
+        """J_i(y) of each agent; y of shape (..., m), result (..., N)."""
+        return self._rows(y, self.agents, _native(self.kernels).costs)
+
+    def pseudo_gradient(self, y: ArrayLike) -> NDArray[np.float64]:
+        """F(y) = col(dJ_i/dy_i); y and the result of shape (..., m)."""
+        return self._rows(y, self.actions, _native(self.kernels).pseudo_gradient)
+
+    def constraints(self, y: ArrayLike) -> NDArray[np.float64]:
+        """g(y), negative inside; y of shape (..., m), result (..., p)."""
+        return self._rows(y, self.constraints_count, _native(self.kernels).constraints)
+
+    def pseudo_gradient_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
+        """dF/dy, shape (m, m), at one profile y of shape (m,)."""
+        out = np.zeros((self.actions, self.actions))
+        _native(self.kernels).pseudo_gradient_jacobian(self.data, self._profile(y), out)
+        return out
+
+    def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
+        """dg/dy, shape (p, m), at one profile y of shape (m,)."""
+        out = np.zeros((self.constraints_count, self.actions))
+        _native(self.kernels).constraint_jacobian(self.data, self._profile(y), out)
+        return out
+
+    def weighted_constraint_hessian(self, y: ArrayLike, weights: ArrayLike) -> NDArray[np.float64]:
+        """sum_l w_l d2g_l/dy2, shape (m, m), at one profile y (m,) with weights w (p,)."""
+        out = np.zeros((self.actions, self.actions))
+        weights = np.ascontiguousarray(weights, dtype=np.float64)
+        _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
+        return out
+
+    def tightest(self, y: ArrayLike) -> tuple[int, float]:
+        """The constraint with the greatest g_l(y) and that value (negative inside)."""
+        values = self.constraints(y)
+        worst = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+        return worst, float(values[worst])
+
+    def _profile(self, y: ArrayLike) -> NDArray[np.float64]:
+        profile = np.ascontiguousarray(y, dtype=np.float64)
+        if profile.shape[-1:] != (self.actions,):
+            raise ValueError(f"y must end in {self.actions} actions, got shape {profile.shape}")
+        return profile
+
+    def _rows(self, y: ArrayLike, width: int, native: object) -> NDArray[np.float64]:
+        profile = self._profile(y)
+        out = np.zeros((*profile.shape[:-1], width))
+        native(self.data, profile.reshape(-1, self.actions), out.reshape(-1, width))  # type: ignore[operator]
+        return out
+
+
+def _compress(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    pointer = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
+    return pointer, np.array([entry for row in rows for entry in row], dtype=np.int64)
+
+
+@cache
+def _native(kernels: ModuleType) -> SimpleNamespace:
+    """The array functions of a game's kernels, compiled at their first call."""
+    source = source_key(kernels)
+
+    @compiled
+    def costs(data, profiles, out):
+        _ = source
+        for row in range(len(profiles)):
+            for i in range(len(data.offsets) - 1):
+                out[row, i] = kernels.cost(data.parameters, i, profiles[row])
+
+    @compiled
+    def pseudo_gradient(data, profiles, out):
+        _ = source
+        at = data.offsets
+        for row in range(len(profiles)):
+            for i in range(len(at) - 1):
+                block = out[row, at[i] : at[i + 1]]
+                kernels.add_cost_gradient(data.parameters, i, profiles[row], 1.0, block)
+
+    @compiled
+    def constraints(data, profiles, out):
+        _ = source
+        for row in range(len(profiles)):
+            for k in range(out.shape[1]):
+                out[row, k] = kernels.constraint(data.parameters, k, profiles[row])
+
+    @compiled
+    def pseudo_gradient_jacobian(data, y, out):
+        _ = source
+        at = data.offsets
+        for i in range(len(at) - 1):
+            for entry in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+                j = data.cost_index[entry]
+                block = out[at[i] : at[i + 1], at[j] : at[j + 1]]
+                kernels.add_cost_hessian(data.parameters, i, j, y, 1.0, block)
+
+    @compiled
+    def constraint_jacobian(data, y, out):
+        _ = source
+        at = data.offsets
+        for k in range(len(out)):
+            for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
+                j = data.member_index[entry]
+                block = out[k, at[j] : at[j + 1]]
+                kernels.add_constraint_gradient(data.parameters, k, j, y, 1.0, block)
+
+    @compiled
+    def weighted_hessian(data, y, weights, out):
+        _ = source
+        at = data.offsets
+        for k in range(len(weights)):
+            first, last = data.member_pointer[k], data.member_pointer[k + 1]
+            for row in range(first, last):
+                for column in range(first, last):
+                    i, j = data.member_index[row], data.member_index[column]
+                    block = out[at[i] : at[i + 1], at[j] : at[j + 1]]
+                    kernels.add_constraint_hessian(data.parameters, k, i, j, y, weights[k], block)
+
+    return SimpleNamespace(
+        costs=costs,
+        pseudo_gradient=pseudo_gradient,
+        constraints=constraints,
+        pseudo_gradient_jacobian=pseudo_gradient_jacobian,
+        constraint_jacobian=constraint_jacobian,
+        weighted_hessian=weighted_hessian,
+    )

@@ -1,0 +1,147 @@
+"""Optical signal-to-noise ratio: power control of channels that share a link [eq:osnrGNE].
+
+J_i = a_i y_i - b_i ln(1 + c_i y_i / (n0_i + sum_{j != i} Gamma_ij y_j)) with powers y in mW and
+the shared constraints y_i >= 0 (i = 1..N) and sum y <= P_0, in this order.
+
+Parameters q = [N, P_0, a (N), b (N), c (N), n0 (N), Gamma (N x N, by rows, diagonal unused)].
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.native import kernel
+
+
+def osnr_game(
+    price: Sequence[float],
+    utility_weight: Sequence[float],
+    gain: Sequence[float],
+    noise_power: Sequence[float],
+    system_matrix: ArrayLike,
+    total_power_limit: float,
+) -> Game:
+    """The OSNR game of N channels.
+
+    Args:
+        price: a_i > 0, per mW.
+        utility_weight: b_i > 0.
+        gain: c_i > 0.
+        noise_power: n0_i > 0 in mW.
+        system_matrix: Gamma >= 0, shape (N, N); its diagonal is not used.
+        total_power_limit: P_0 > 0 in mW.
+    """
+    agents = len(price)
+    columns = {
+        "price": price,
+        "utility_weight": utility_weight,
+        "gain": gain,
+        "noise_power": noise_power,
+    }
+    for key, values in columns.items():
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != (agents,):
+            raise InvalidInput(f"game.{key}", values, f"it must list {agents} numbers")
+        if not np.all(np.isfinite(array)) or not np.all(array > 0):
+            raise InvalidInput(f"game.{key}", values, "every entry must be positive and finite")
+    matrix = np.array(system_matrix, dtype=np.float64)
+    if matrix.shape != (agents, agents):
+        raise InvalidInput(
+            "game.system_matrix", matrix.shape, f"its shape must be ({agents}, {agents})"
+        )
+    np.fill_diagonal(matrix, 0.0)
+    if not np.all(np.isfinite(matrix)) or np.any(matrix < 0):
+        raise InvalidInput("game.system_matrix", "...", "no entry may be negative or not finite")
+    if not (np.isfinite(total_power_limit) and total_power_limit > 0):
+        raise InvalidInput("game.total_power_limit", total_power_limit, "it must be positive")
+    everyone = list(range(agents))
+    return Game(
+        name="OSNR",
+        kernels=sys.modules[__name__],
+        parameters=np.concatenate(
+            [[agents, total_power_limit], *columns.values(), matrix.ravel()], dtype=np.float64
+        ),
+        sizes=(1,) * agents,
+        in_cost=[everyone] * agents,
+        in_constraint=[*([i] for i in everyone), everyone],
+        constraint_names=(*(f"power of channel {i + 1} >= 0" for i in everyone), "total power"),
+        action_name="power",
+        action_unit="mW",
+    )
+
+
+def ten_channels() -> dict[str, Any]:
+    """Parameters of a ten-channel link, a stand-in for the paper's (which cites them elsewhere)."""
+    text = files("gne_mj.games").joinpath("osnr_10_channels.json").read_text(encoding="utf-8")
+    parameters: dict[str, Any] = json.loads(text)
+    del parameters["note"]
+    return parameters
+
+
+@kernel
+def disturbance(q, i, y):
+    """n0_i + sum_{j != i} Gamma_ij y_j: noise and crosstalk on channel i."""
+    n = int(q[0])
+    row = 2 + 4 * n + i * n
+    total = q[2 + 3 * n + i]
+    for j in range(n):
+        if j != i:
+            total += q[row + j] * y[j]
+    return total
+
+
+@kernel
+def cost(q, i, y):
+    """J_i = a_i y_i - b_i ln(1 + c_i y_i / disturbance_i)."""
+    n = int(q[0])
+    ratio = q[2 + 2 * n + i] * y[i] / disturbance(q, i, y)
+    return q[2 + i] * y[i] - q[2 + n + i] * np.log1p(ratio)
+
+
+@kernel
+def add_cost_gradient(q, i, y, scale, out):
+    """dJ_i/dy_i = a_i - b_i c_i / (disturbance_i + c_i y_i)."""
+    n = int(q[0])
+    b, c = q[2 + n + i], q[2 + 2 * n + i]
+    out[0] += scale * (q[2 + i] - b * c / (disturbance(q, i, y) + c * y[i]))
+
+
+@kernel
+def add_cost_hessian(q, i, j, y, scale, out):
+    """b_i c_i / (disturbance_i + c_i y_i)^2 times c_i (j = i) or Gamma_ij."""
+    n = int(q[0])
+    b, c = q[2 + n + i], q[2 + 2 * n + i]
+    received = disturbance(q, i, y) + c * y[i]
+    slope = c if j == i else q[2 + 4 * n + i * n + j]
+    out[0, 0] += scale * b * c * slope / (received * received)
+
+
+@kernel
+def constraint(q, l, y):
+    """-y_l for l < N, the total power's excess over P_0 for l = N."""
+    n = int(q[0])
+    if l < n:
+        return -y[l]
+    total = -q[1]
+    for j in range(n):
+        total += y[j]
+    return total
+
+
+@kernel
+def add_constraint_gradient(q, l, i, y, scale, out):
+    """-1 for a channel's own sign constraint, 1 for the total power."""
+    out[0] += -scale if l < int(q[0]) else scale
+
+
+@kernel
+def add_constraint_hessian(q, l, i, j, y, scale, out):
+    """All constraints are affine."""
+    out[0, 0] += 0.0

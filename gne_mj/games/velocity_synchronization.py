@@ -1,0 +1,86 @@
+"""Velocity synchronisation with bounded gaps along a line of robots [eq:sensorNetGNE].
+
+J_i = (y_i - y_{i-1})^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2 with y_0 := v_0, velocities in m/s.
+The constraints are shared: g_{i+1} contains y_i too, so agent i feels its follower.
+
+Parameters q = [v_0, delta_1, ..., delta_N].
+"""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.native import kernel
+
+
+def velocity_game(
+    agents: int, reference_velocity: float, gap_bound: float | Sequence[float]
+) -> Game:
+    """The game of N robots that follow each other, the first one a reference velocity.
+
+    Args:
+        agents: N.
+        reference_velocity: v_0 in m/s.
+        gap_bound: delta_i > 0 in m/s, one for all or one each.
+    """
+    bounds = np.broadcast_to(np.asarray(gap_bound, dtype=np.float64), (agents,))
+    if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
+        raise InvalidInput("game.gap_bound", gap_bound, "every bound must be positive and finite")
+    predecessors = [[] if i == 0 else [i - 1] for i in range(agents)]
+    return Game(
+        name="velocity synchronisation",
+        kernels=sys.modules[__name__],
+        parameters=np.concatenate([[reference_velocity], bounds]),
+        sizes=(1,) * agents,
+        in_cost=[[i, *before] for i, before in enumerate(predecessors)],
+        in_constraint=[[*before, i] for i, before in enumerate(predecessors)],
+        constraint_names=tuple(f"gap of agent {i + 1}" for i in range(agents)),
+        action_name="velocity",
+        action_unit="m/s",
+    )
+
+
+@kernel
+def gap(q, i, y):
+    """y_i - y_{i-1}, of the first agent y_1 - v_0."""
+    return y[i] - (q[0] if i == 0 else y[i - 1])
+
+
+@kernel
+def cost(q, i, y):
+    """J_i = gap_i^2."""
+    return gap(q, i, y) ** 2
+
+
+@kernel
+def add_cost_gradient(q, i, y, scale, out):
+    """dJ_i/dy_i = 2 gap_i."""
+    out[0] += scale * 2.0 * gap(q, i, y)
+
+
+@kernel
+def add_cost_hessian(q, i, j, y, scale, out):
+    """2 for the agent itself, -2 for its predecessor."""
+    out[0, 0] += scale * (2.0 if j == i else -2.0)
+
+
+@kernel
+def constraint(q, l, y):
+    """g_l = gap_l^2 - delta_l^2, as a product so that little is lost close to the bound."""
+    difference = gap(q, l, y)
+    return (difference - q[1 + l]) * (difference + q[1 + l])
+
+
+@kernel
+def add_constraint_gradient(q, l, i, y, scale, out):
+    """2 gap_l for the agent itself, -2 gap_l for its predecessor."""
+    out[0] += (scale if i == l else -scale) * 2.0 * gap(q, l, y)
+
+
+@kernel
+def add_constraint_hessian(q, l, i, j, y, scale, out):
+    """2 on the diagonal of the two agents' block, -2 off it."""
+    out[0, 0] += scale * (2.0 if i == j else -2.0)

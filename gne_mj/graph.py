@@ -1,0 +1,141 @@
+"""Who hears whom: undirected communication graphs (paper, section II-C)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from gne_mj.errors import InvalidInput
+
+
+class GraphData(NamedTuple):
+    """Neighbour lists for native code: agent i hears ``index[pointer[i]:pointer[i + 1]]``."""
+
+    pointer: np.ndarray
+    index: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """An undirected, connected graph on N agents (Assumption [asmp:graph]).
+
+    Args:
+        agents: N.
+        edges: pairs of agents, numbered from 0; order and repetition do not matter.
+
+    Raises:
+        InvalidInput: an agent that does not exist, a loop, or a graph that is not connected.
+    """
+
+    agents: int
+    edges: tuple[tuple[int, int], ...]
+
+    def __post_init__(self) -> None:
+        unique = set()
+        for i, j in self.edges:
+            if not (0 <= i < self.agents and 0 <= j < self.agents):
+                raise InvalidInput(
+                    "graph.edges", [i + 1, j + 1], f"agents are numbered 1 to {self.agents}"
+                )
+            if i == j:
+                raise InvalidInput("graph.edges", [i + 1, j + 1], "an edge joins two agents")
+            unique.add((min(i, j), max(i, j)))
+        object.__setattr__(self, "edges", tuple(sorted(unique)))
+        parts, label = connected_components(self.adjacency, directed=False)
+        if parts > 1:
+            apart = [int(i) + 1 for i in np.flatnonzero(label != label[0])]
+            shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
+            raise InvalidInput(
+                "graph.edges",
+                f"{len(self.edges)} edges in {parts} parts",
+                f"the graph must be connected; agent 1 cannot reach agent {shown}",
+            )
+
+    @cached_property
+    def adjacency(self) -> csr_array:
+        """Adjacency matrix, shape (N, N), sparse."""
+        if not self.edges:
+            return csr_array((self.agents, self.agents), dtype=float)
+        i, j = np.array(self.edges, dtype=np.int64).T
+        ones = np.ones(2 * len(i))
+        pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
+        matrix = csr_array((ones, pairs), shape=(self.agents, self.agents))
+        matrix.sort_indices()
+        return matrix
+
+    @cached_property
+    def laplacian(self) -> np.ndarray:
+        """L = D - A, shape (N, N), dense and read-only."""
+        adjacency = self.adjacency.toarray()
+        matrix = np.diag(adjacency.sum(axis=1)) - adjacency
+        matrix.flags.writeable = False
+        return matrix
+
+    @cached_property
+    def algebraic_connectivity(self) -> float:
+        """lambda_2 of the Laplacian (0 for a single agent)."""
+        if self.agents == 1:
+            return 0.0
+        return float(np.linalg.eigvalsh(self.laplacian)[1])
+
+    @cached_property
+    def data(self) -> GraphData:
+        """Neighbour lists for native code."""
+        adjacency = self.adjacency
+        return GraphData(adjacency.indptr.astype(np.int64), adjacency.indices.astype(np.int64))
+
+
+def line(agents: int) -> Graph:
+    """Agent i hears i - 1 and i + 1."""
+    return Graph(agents, tuple((i, i + 1) for i in range(agents - 1)))
+
+
+def ring(agents: int) -> Graph:
+    """A line whose ends hear each other."""
+    closing = ((0, agents - 1),) if agents > 2 else ()
+    return Graph(agents, line(agents).edges + closing)
+
+
+def complete(agents: int) -> Graph:
+    """Everyone hears everyone."""
+    return Graph(agents, tuple((i, j) for i in range(agents) for j in range(i + 1, agents)))
+
+
+# The 23 edges that the paper's figure [fig:GraphOSNR] draws, channels numbered from 1. Their
+# Laplacian has lambda_2 = 2.38907, not the 2.6158 that the caption states.
+_PRINTED = (
+    (1, 8), (1, 5), (1, 4), (1, 9), (1, 10), (2, 4), (2, 5), (2, 6), (2, 9), (2, 10), (3, 5),
+    (3, 6), (3, 7), (3, 9), (3, 10), (4, 5), (4, 7), (4, 9), (5, 7), (5, 8), (6, 8), (6, 9),
+    (8, 10),
+)  # fmt: skip
+# The only one or two added edges that give the caption's value (2.61583).
+_CAPTION = (*_PRINTED, (4, 6), (4, 8))
+
+
+def printed(agents: int = 10) -> Graph:
+    """The ten-channel graph as drawn in the paper (lambda_2 = 2.38907)."""
+    return _ten_channels("printed", _PRINTED, agents)
+
+
+def caption(agents: int = 10) -> Graph:
+    """The ten-channel graph completed so that lambda_2 matches the paper's caption (2.61583)."""
+    return _ten_channels("caption", _CAPTION, agents)
+
+
+def _ten_channels(name: str, edges: Sequence[tuple[int, int]], agents: int) -> Graph:
+    if agents != 10:
+        raise InvalidInput("graph", name, f"this graph has 10 agents, not {agents}")
+    return Graph(10, tuple((i - 1, j - 1) for i, j in edges))
+
+
+NAMED = {
+    "line": line,
+    "ring": ring,
+    "complete": complete,
+    "printed": printed,
+    "caption": caption,
+}

@@ -1,0 +1,81 @@
+"""From measured outputs to delivered inputs: the one feedback step that every loop uses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gne_mj.barrier import evaluate_constraints
+from gne_mj.controllers.settings import RHO
+from gne_mj.game import GameData
+from gne_mj.graph import GraphData
+from gne_mj.loops import monitor as watch
+from gne_mj.native import kernel
+
+# MuJoCo silently applies no force at all beyond this magnitude (its mjMAXVAL).
+LARGEST_INPUT = 1e10
+
+
+class Problem(NamedTuple):
+    """What a law reads, besides measurements; read-only."""
+
+    data: GameData
+    graph: GraphData
+    settings: np.ndarray  # the law's numbers, see gne_mj.controllers.settings
+    limit: np.ndarray  # (m,) greatest |u| that the actuators deliver
+    propagators: np.ndarray  # exact maps of the law's memory over a control period
+
+
+class Work(NamedTuple):
+    """Scratch arrays of one loop, so that a step allocates nothing."""
+
+    g: np.ndarray  # (p,) constraint values at the last evaluation
+    weights: np.ndarray  # (p,) rho / -g
+    demand: np.ndarray  # (m,) what the law asks for
+    profile: np.ndarray  # (m,) an agent's own profile
+    y: np.ndarray  # (m,) outputs
+    u: np.ndarray  # (m,) inputs at a stage
+
+
+def work(actions: int, constraints: int) -> Work:
+    """Fresh scratch arrays."""
+    return Work(*(np.zeros(size) for size in (constraints, constraints, *(actions,) * 4)))
+
+
+@kernel
+def inside(game, problem, time, stage, y, work, monitor):
+    """Fill work.g at outputs y; latch an exit and return False if y is not strictly inside."""
+    outside = evaluate_constraints(game, problem.data, y, work.g)
+    if outside < 0:
+        return True
+    value = work.g[outside]
+    code = watch.LEFT_SET if np.isfinite(value) else watch.DIVERGED
+    watch.leave(monitor, code, time, -1, outside, value, stage)
+    return False
+
+
+@kernel
+def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
+    """Fill u (m,) with the input that the actuators deliver at outputs y (m,).
+
+    work.g, work.weights and work.demand are filled on the way. Returns True if there is an input.
+    If not (y or an estimate is not strictly inside, or the demand is not finite), the exit is
+    latched in the monitor with the given time and stage, and u is left unfinished.
+    """
+    if not inside(game, problem, time, stage, y, work, monitor):
+        return False
+    for k in range(len(work.g)):
+        work.weights[k] = problem.settings[RHO] / -work.g[k]
+    left = law.action(game, problem, y, work.weights, memory, work.profile, work.demand)
+    if left >= 0:
+        agent, constraint = left // len(work.g), left % len(work.g)
+        value = game.constraint(problem.data.parameters, constraint, work.profile)
+        code = watch.ESTIMATE_LEFT if np.isfinite(value) else watch.DIVERGED
+        watch.leave(monitor, code, time, agent, constraint, value, stage)
+        return False
+    for r in range(len(u)):
+        demand = work.demand[r]
+        if not abs(demand) < LARGEST_INPUT:
+            watch.leave(monitor, watch.DIVERGED, time, -1, -1, demand, stage)
+            return False
+        u[r] = min(max(demand, -problem.limit[r]), problem.limit[r])
+    return True

@@ -1,0 +1,44 @@
+"""Integrator agent [eq:int]: y' = u, one state a channel; V = y^2 / 2.
+
+Every agent module describes one channel, that is one scalar output with its input; an agent with
+an action of m_i entries is m_i such channels. It defines STATES (their names and units), OUTPUT
+(which of them is y), INPUT (how u enters x'), and the kernels below.
+"""
+
+from gne_mj.native import kernel
+
+NAME = "integrator"
+PARAMETERS: tuple[str, ...] = ()
+STATES = (("action", ""),)
+OUTPUT = 0
+INPUT = (1.0,)
+
+
+@kernel
+def rate(q, x, u, out):
+    """Fill out with x'."""
+    out[0] = u
+
+
+@kernel
+def euler_step(q, x, u, h, out):
+    """One Euler step."""
+    out[0] = x[0] + h * u
+
+
+@kernel
+def jacobian(q, x, out):
+    """Fill out with df/dx."""
+    out[0, 0] = 0.0
+
+
+@kernel
+def equilibrium(q, y, out):
+    """The state pi(y) that rests at the output y with u = 0."""
+    out[0] = y
+
+
+@kernel
+def storage(q, x, rest):
+    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
+    return 0.5 * (x[0] - rest[0]) ** 2

@@ -1,0 +1,229 @@
+"""MuJoCo's C side, for compiled code: struct fields, mj_step, and callbacks.
+
+MuJoCo calls plain C functions ``(const mjModel*, mjData*)`` where it evaluates control and passive
+forces. What such a callback needs is reached through two pointers: a field's offset inside mjData
+is found at start-up by looking for its array's address in the struct's memory and is checked by
+writing and reading back; everything else lies in a table of arrays whose address is kept in
+``userdata[0]``. No address there means that the simulation is not one of ours.
+"""
+
+import ctypes
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numba import carray, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from gne_mj.errors import EngineError
+from gne_mj.native import address_as_pointer, callback, compiled, view
+
+CALLBACK = types.void(types.voidptr, types.voidptr)
+_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+_WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+
+
+class Offsets(NamedTuple):
+    """Where fields lie in MuJoCo's structs, in 8-byte words from the struct's start."""
+
+    qpos: int
+    qvel: int
+    ctrl: int
+    qfrc_passive: int
+    userdata: int
+    nuserdata: int  # in mjModel
+
+
+@cache
+def offsets() -> Offsets:
+    """Find and check the offsets in the MuJoCo that is loaded.
+
+    Raises:
+        EngineError: a field is not where its address says, so this MuJoCo cannot be driven.
+    """
+    size = 7919  # a number that no other size of the probe model has
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><size nuserdata="{size}"/><worldbody><body><joint name="j" type="slide"/>
+        <geom size="1"/></body></worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    names = ("qpos", "qvel", "ctrl", "qfrc_passive", "userdata")
+    found = {name: _find(data._address, getattr(data, name).ctypes.data) for name in names}
+    result = Offsets(**found, nuserdata=_find(model._address, size))
+    read_back = _read_back()
+    for mark, name in enumerate(names, start=1):
+        array = getattr(data, name)
+        array[0] = mark
+        if read_back(data._address, getattr(result, name)) != mark or array[0] != -mark:
+            raise EngineError(
+                f"MuJoCo {mujoco.__version__} keeps mjData.{name} elsewhere than expected,"
+                " so its simulations cannot be driven natively"
+            )
+    return result
+
+
+def _find(struct: int, word: int) -> int:
+    """Index of the first 8-byte word with this content; the struct is known to contain it."""
+    block = 64  # read little past a match: pointers are followed by hundreds of other fields
+    for start in range(0, 2**17, block):
+        words = (ctypes.c_int64 * block).from_address(struct + 8 * start)
+        for index, content in enumerate(words):
+            if content == word:
+                return start + index
+    raise EngineError(
+        f"MuJoCo {mujoco.__version__} has an unknown struct layout, so its simulations cannot be"
+        " driven natively"
+    )
+
+
+@cache
+def _read_back() -> Any:
+    def read_back(struct, offset):
+        array = field(struct, offset, 1)
+        mark = array[0]
+        array[0] = -mark
+        return mark
+
+    return compiled(read_back, views=True)
+
+
+@view
+def field(struct, offset, length):
+    """The double array of ``length`` that a struct's pointer field points to."""
+    words = carray(address_as_pointer(struct), (offset + 1,), np.int64)
+    return carray(address_as_pointer(words[offset]), (length,), np.float64)
+
+
+@intrinsic
+def pointer_as_address(typingctx: Any, pointer: Any) -> Any:
+    """Turn a ``void *`` into an integer address."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.ptrtoint(arguments[0], cgutils.intp_t)
+
+    return types.int64(types.voidptr), codegen
+
+
+@intrinsic
+def call(typingctx: Any, function: Any, model: Any, data: Any) -> Any:
+    """Call the C function at an address with two struct addresses."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from llvmlite import ir
+
+        pointer = cgutils.voidptr_t
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer])
+        target = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(target, [builder.inttoptr(a, pointer) for a in arguments[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), codegen
+
+
+@cache
+def step_address() -> int:
+    """Address of mj_step in the library that the mujoco package has loaded."""
+    folder = Path(mujoco.__file__).parent
+    for path in sorted([*folder.glob("libmujoco.*"), *folder.glob("mujoco.dll")]):
+        library = ctypes.CDLL(str(path))
+        return ctypes.cast(library.mj_step, ctypes.c_void_p).value or 0
+    raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
+
+
+class Table:
+    """Arrays that callbacks read, as one block of (address, length) pairs.
+
+    The arrays are kept alive as long as the table is. Native code gets them back by
+    :func:`floats` and :func:`integers` with the index they were given here.
+    """
+
+    def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
+        for array in arrays:
+            assert array.dtype in (np.float64, np.int64), array.dtype
+            assert array.flags.c_contiguous
+        self._arrays = tuple(arrays)
+        pairs = [(array.ctypes.data, array.size) for array in arrays]
+        self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
+
+    @property
+    def address(self) -> float:
+        """Where the pairs lie; a double holds a user-space address exactly."""
+        address = self._pairs.ctypes.data
+        assert int(float(address)) == address
+        return float(address)
+
+
+@view
+def floats(table, index):
+    """The float array at this index of a table's pairs."""
+    return carray(address_as_pointer(table[2 * index]), (table[2 * index + 1],), np.float64)
+
+
+@view
+def integers(table, index):
+    """The integer array at this index of a table's pairs."""
+    return carray(address_as_pointer(table[2 * index]), (table[2 * index + 1],), np.int64)
+
+
+@view
+def table_of(at, model, data, size):
+    """A simulation's table of ``size`` arrays, given both structs' addresses; empty if none."""
+    header = carray(address_as_pointer(model), (at.nuserdata + 1,), np.int64)
+    if header[at.nuserdata] == 0:
+        return carray(address_as_pointer(model), (0,), np.int64)
+    address = np.int64(field(data, at.userdata, 1)[0])
+    if address == 0:
+        return carray(address_as_pointer(model), (0,), np.int64)
+    return carray(address_as_pointer(address), (2 * size,), np.int64)
+
+
+@cache
+def _silence() -> Any:
+    def ignore(message):
+        pass
+
+    return callback(types.void(types.voidptr), ignore)
+
+
+_installed = threading.Lock()
+
+
+@contextmanager
+def callbacks(*, control: Any = None, passive: Any = None) -> Iterator[None]:
+    """Install C callbacks (numba ``cfunc`` objects) for a while; always restores what was there.
+
+    MuJoCo's warnings are silenced meanwhile: they would be written to a log file in the working
+    folder, and what they warn of is in the monitor.
+
+    Raises:
+        EngineError: callbacks are global to the process, and ours are installed already.
+    """
+    if not _installed.acquire(blocking=False):
+        raise EngineError(
+            "MuJoCo's callbacks are global to the process and already in use by another"
+            " simulation that is stepping right now: step one at a time"
+        )
+    try:
+        before = (
+            mujoco.get_mjcb_control(),
+            mujoco.get_mjcb_passive(),
+            mujoco.get_mju_user_warning(),
+        )
+        try:
+            mujoco.set_mjcb_control(control and _FUNCTION(control.address))
+            mujoco.set_mjcb_passive(passive and _FUNCTION(passive.address))
+            mujoco.set_mju_user_warning(_WARNING(_silence().address))
+            yield
+        finally:
+            mujoco.set_mjcb_control(before[0])
+            mujoco.set_mjcb_passive(before[1])
+            mujoco.set_mju_user_warning(before[2])
+    finally:
+        _installed.release()

@@ -1,0 +1,55 @@
+"""PI controller in cascade with a stable first-order system [eq:cascadePI].
+
+x = (y, s) with y' = -v y + k s + u and s' = u, 0 < k < v. The storage V = x'Px/2 needs
+P G = (1, 0)' and PA + A'P <= 0, which leaves one choice: P = [[1 + r, -r], [-r, r]] with
+r = k / (v - k); for v = 1, k = 1/2 it is [[2, -1], [-1, 1]].
+
+Channel parameters q = [v, k], both in 1/s.
+"""
+
+from gne_mj.native import kernel
+
+NAME = "PI cascade"
+PARAMETERS = ("decay_rate", "integral_gain")
+STATES = (("action", ""), ("integral", ""))
+OUTPUT = 0
+INPUT = (1.0, 1.0)
+
+
+@kernel
+def rate(q, x, u, out):
+    """Fill out with x'."""
+    out[0] = -q[0] * x[0] + q[1] * x[1] + u
+    out[1] = u
+
+
+@kernel
+def euler_step(q, x, u, h, out):
+    """One Euler step."""
+    output = x[0] + h * (-q[0] * x[0] + q[1] * x[1] + u)
+    out[1] = x[1] + h * u
+    out[0] = output
+
+
+@kernel
+def jacobian(q, x, out):
+    """Fill out with df/dx."""
+    out[0, 0] = -q[0]
+    out[0, 1] = q[1]
+    out[1, 0] = 0.0
+    out[1, 1] = 0.0
+
+
+@kernel
+def equilibrium(q, y, out):
+    """The state pi(y) that rests at the output y with u = 0."""
+    out[0] = y
+    out[1] = q[0] * y / q[1]
+
+
+@kernel
+def storage(q, x, rest):
+    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
+    r = q[1] / (q[0] - q[1])
+    output, integral = x[0] - rest[0], x[1] - rest[1]
+    return 0.5 * (output * output + r * (output - integral) ** 2)

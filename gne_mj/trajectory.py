@@ -1,0 +1,205 @@
+"""The result of a run: labelled arrays, status and certificate.
+
+Kept as an xarray DataTree with one group for each system, stored as Zarr without pickle, so that
+xarray alone can read it: ``xarray.open_datatree(folder, engine="zarr")``.
+"""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.certificate import SUCCESSES, Certificate
+from gne_mj.games import velocity_synchronization as velocity
+from gne_mj.loops.base import Samples
+from gne_mj.plants import flexible_robot
+from gne_mj.system import System
+
+if TYPE_CHECKING:
+    import xarray
+
+# From bad to good: a run's status is the worst of its systems'.
+_ORDER = (
+    "diverged",
+    "left_feasible_set",
+    "estimate_left_feasible_set",
+    "interrupted",
+    "completed",
+    "converged",
+)
+
+
+class Trajectory:
+    """What a run recorded and showed.
+
+    Attributes:
+        tree: the DataTree; ``tree["robots"].dataset`` is one system's dataset on dimensions
+            time, agent or action, constraint and component (of the state).
+        reports: for each system its certificate as plain data.
+    """
+
+    def __init__(self, tree: "xarray.DataTree") -> None:
+        self.tree = tree
+        self.reports: dict[str, dict[str, Any]] = {
+            str(name): json.loads(group.attrs["certificate"])
+            for name, group in tree.children.items()
+        }
+
+    @classmethod
+    def from_parts(
+        cls,
+        parts: dict[str, tuple[System, NDArray[np.float64], Samples, Certificate]],
+        *,
+        seed: int,
+        source: str,
+        wall_time: float,
+    ) -> "Trajectory":
+        """Label what the systems of one run recorded."""
+        import xarray
+
+        groups: dict[str, xarray.Dataset] = {
+            "/": xarray.Dataset(
+                attrs={
+                    "scenario": source,
+                    "seed": seed,
+                    "versions": json.dumps(_versions()),
+                    "wall_time": wall_time,
+                }
+            )
+        }
+        for name, part in parts.items():
+            groups[f"/{name}"] = _dataset(*part)
+        return cls(xarray.DataTree.from_dict(groups))
+
+    @property
+    def status(self) -> str:
+        """The worst of the systems' statuses."""
+        return min((report["status"] for report in self.reports.values()), key=_ORDER.index)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every system ran to its end inside its set."""
+        return self.status in SUCCESSES
+
+    def __getitem__(self, system: str) -> "xarray.Dataset":
+        """One system's dataset."""
+        group: xarray.Dataset = self.tree[system].to_dataset()
+        return group
+
+    def report(self) -> dict[str, Any]:
+        """The whole report as plain data, for JSON."""
+        attributes = self.tree.attrs
+        return {
+            "status": self.status,
+            "systems": self.reports,
+            "seed": int(attributes["seed"]),
+            "versions": json.loads(attributes["versions"]),
+            "wall_time": float(attributes["wall_time"]),
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the tree as a Zarr folder that must not exist yet; returns its path."""
+        path = Path(folder)
+        if path.exists():
+            raise FileExistsError(f"{path} exists already")
+        # The second Zarr format: the third has no settled way to store names yet.
+        self.tree.to_zarr(path, mode="w-", zarr_format=2)
+        return path
+
+    @classmethod
+    def load(cls, folder: str | Path) -> "Trajectory":
+        """Read a saved trajectory into memory."""
+        import xarray
+
+        with xarray.open_datatree(Path(folder), engine="zarr") as tree:
+            return cls(tree.load())
+
+
+def _dataset(
+    system: System, time: NDArray[np.float64], samples: Samples, certificate: Certificate
+) -> "xarray.Dataset":
+    import xarray
+
+    game, kind = system.game, system.agents.kind
+    y = samples.state[:, :, kind.OUTPUT]
+    robots = kind is flexible_robot
+    unit = {"units": game.action_unit}
+    # Where every action is a number of its own, agents and actions are the same axis.
+    axis = "agent" if game.actions == game.agents else "action"
+    variables: dict[str, Any] = {
+        "action": (("time", axis), y, {**unit, "long_name": game.action_name}),
+        "input": (
+            ("time", axis),
+            samples.input,
+            {"units": "N" if robots else "", "long_name": "delivered input u"},
+        ),
+        "state": (("time", axis, "component"), samples.state),
+        "constraint": (
+            ("time", "constraint"),
+            game.constraints(y),
+            {"long_name": "g(y), negative inside the set"},
+        ),
+        "equilibrium": ((axis,), system.equilibrium.action, {**unit, "long_name": "y*"}),
+    }
+    if robots:
+        states = dict(enumerate(kind.STATES))
+        for index, name in ((3, "position"), (0, "extension")):
+            variables[name] = (
+                ("time", axis),
+                samples.state[:, :, index],
+                {"units": states[index][1]},
+            )
+    if game.kernels is velocity:
+        ahead = np.concatenate([np.full((len(y), 1), game.parameters[0]), y[:, :-1]], axis=1)
+        variables["gap"] = (("time", axis), y - ahead, {**unit, "long_name": "velocity gap"})
+        variables["gap_bound"] = ((axis,), game.parameters[1:].copy(), unit)
+    if samples.memory.shape[1]:
+        m = game.actions
+        estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
+        owner = game.agent_of_action
+        for r in range(m):  # an agent's own block is its action, not an estimate
+            estimates[:, owner[r], r] = y[:, r]
+        variables["estimate"] = (
+            ("time", "estimating_agent", axis),
+            estimates,
+            {**unit, "long_name": "what each agent takes the actions to be"},
+        )
+        variables["filtered_action"] = (
+            ("time", axis),
+            samples.memory[:, game.agents * m :],
+            {**unit, "long_name": "z"},
+        )
+    numbers = np.arange(1, game.agents + 1)
+    coordinates: dict[str, Any] = {
+        "time": ("time", time, {"units": "s"}),
+        "agent": ("agent", numbers),
+        "constraint_name": ("constraint", np.array(game.constraint_names)),
+        "component": ("component", np.array([name for name, _ in kind.STATES])),
+    }
+    if axis == "action":
+        coordinates["owner"] = ("action", game.agent_of_action + 1)
+    report = certificate.to_dict()
+    return xarray.Dataset(
+        variables,
+        coordinates,
+        attrs={
+            "game": game.name,
+            "information": system.law.information,
+            "mode": system.mode,
+            "engine": system.engine,
+            "integrator": system.integrator,
+            "rho": system.rho,
+            "status": certificate.status,
+            "message": certificate.message,
+            "certificate": json.dumps(report),
+        },
+    )
+
+
+def _versions() -> dict[str, str]:
+    names = ("gne-mj", "mujoco", "numba", "numpy", "scipy")
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}
