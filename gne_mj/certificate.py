@@ -178,6 +178,7 @@ def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] |
         "gap": float(gaps[index]),
         "bound": float(bounds[index]),
         "time": float(monitor[at + p + index]),
+        "each": gaps.tolist(),
     }
 
 

@@ -39,10 +39,10 @@ class Graph:
         for i, j in self.edges:
             if not (0 <= i < self.agents and 0 <= j < self.agents):
                 raise InvalidInput(
-                    "graph.edges", [i + 1, j + 1], f"agents are numbered 1 to {self.agents}"
+                    "controller.graph", [i + 1, j + 1], f"agents are numbered 1 to {self.agents}"
                 )
             if i == j:
-                raise InvalidInput("graph.edges", [i + 1, j + 1], "an edge joins two agents")
+                raise InvalidInput("controller.graph", [i + 1, j + 1], "an edge joins two agents")
             unique.add((min(i, j), max(i, j)))
         object.__setattr__(self, "edges", tuple(sorted(unique)))
         parts, label = connected_components(self.adjacency, directed=False)
@@ -50,7 +50,7 @@ class Graph:
             apart = [int(i) + 1 for i in np.flatnonzero(label != label[0])]
             shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
             raise InvalidInput(
-                "graph.edges",
+                "controller.graph",
                 f"{len(self.edges)} edges in {parts} parts",
                 f"the graph must be connected; agent 1 cannot reach agent {shown}",
             )
@@ -128,7 +128,7 @@ def caption(agents: int = 10) -> Graph:
 
 def _ten_channels(name: str, edges: Sequence[tuple[int, int]], agents: int) -> Graph:
     if agents != 10:
-        raise InvalidInput("graph", name, f"this graph has 10 agents, not {agents}")
+        raise InvalidInput("controller.graph", name, f"this graph has 10 agents, not {agents}")
     return Graph(10, tuple((i - 1, j - 1) for i, j in edges))
 
 

@@ -476,10 +476,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def _first(error: ValidationError) -> InvalidInput:
     """The first of pydantic's complaints as one sentence."""
-    detail = error.errors()[0]
+    details = error.errors()
+    detail = details[0]
+    if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
+        # of "one number or a list of them" the user meant the list
+        detail = details[1]
     tags = {"velocity-synchronization", "osnr", "flexible-robot", "integrator", "pi-cascade",
-            "full", "distributed", "float", "list[float]"}  # fmt: skip
-    where = [str(part) for part in detail["loc"] if str(part) not in tags]
+            "full", "distributed", "float", "list", "literal"}  # fmt: skip
+    where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})
     kind = detail["type"]
