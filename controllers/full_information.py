@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar
 
-from gne_mj.barrier import add_weighted_gradient
+from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
 from gne_mj.native import kernel
 
@@ -26,18 +26,14 @@ class FullInformation(Law):
 
 
 @kernel
-def action(game, problem, y, weights, memory, scratch, u):
+def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) from the true profile y (m,) and the barrier's weights (p,) there."""
     data = problem.data
     at = data.offsets
     for i in range(len(at) - 1):
-        block = u[at[i] : at[i + 1]]
-        for r in range(len(block)):
-            block[r] = 0.0
-        game.add_cost_gradient(data.parameters, i, y, 1.0, block)
-        add_weighted_gradient(game, data, i, y, weights, block)
-        for r in range(len(block)):
-            block[r] = -block[r]
+        for a in range(at[i], at[i + 1]):
+            gradient = game.cost_gradient(data.parameters, i, a, y)
+            u[a] = -gradient - weighted_gradient(game, data, i, a, y, weights)
     return -1
 
 

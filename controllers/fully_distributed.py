@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.barrier import add_own_gradient
+from gne_mj.barrier import own_weights, weighted_gradient
 from gne_mj.controllers.estimates import (
     add_disagreement,
     estimate_propagators,
@@ -25,7 +25,7 @@ from gne_mj.controllers.law import Law
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
-from gne_mj.native import kernel
+from gne_mj.native import copy, kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,52 +74,47 @@ class FullyDistributed(Law):
 
 
 @kernel
-def action(game, problem, y, weights, memory, scratch, u):
-    """Fill u (m,); return -1, or agent * p + constraint of the first estimate outside."""
+def action(game, problem, y, weights, memory, work, u):
+    """Fill u (m,); return -1, or agent * p + constraint of the first estimate outside.
+
+    The true profile's weights are not read: in their place agents use those of their estimates.
+    """
     data, settings = problem.data, problem.settings
     at = data.offsets
     agents = len(at) - 1
     m = at[agents]
     z = memory[agents * m :]
     for i in range(agents):
-        block = u[at[i] : at[i + 1]]
+        first, last = at[i], at[i + 1]
         outside = agent_action(
-            game,
-            data,
-            settings,
-            i,
-            y[at[i] : at[i + 1]],
-            z[at[i] : at[i + 1]],
-            memory[i * m : (i + 1) * m],
-            scratch,
-            block,
-        )
+            game, data, settings, i, y[first:last], z[first:last], memory[i * m : (i + 1) * m],
+            work, u[first:last],
+        )  # fmt: skip
         if outside >= 0:
-            return i * (len(data.member_pointer) - 1) + outside
+            return i * len(weights) + outside
     return -1
 
 
 @kernel
-def agent_action(game, data, settings, i, own_action, own_filter, estimates, scratch, u):
+def agent_action(game, data, settings, i, own_action, own_filter, estimates, work, u):
     """Action of agent i from what it has: y_i, z_i (m_i,) and its estimates (m,).
 
-    scratch (m,) is overwritten. Returns -1, or the constraint on or outside whose boundary the
-    agent's filtered profile (z_i, **y**^i_-i) lies.
+    work.profile and work.own_weights are overwritten. Returns -1, or the constraint on or outside
+    whose boundary the agent's filtered profile (z_i, **y**^i_-i) lies.
     """
-    first, last = data.offsets[i], data.offsets[i + 1]
-    for r in range(len(estimates)):
-        scratch[r] = estimates[r]
-    for r in range(last - first):
-        scratch[first + r] = own_action[r]
-        u[r] = 0.0
-    game.add_cost_gradient(data.parameters, i, scratch, 1.0, u)
-    for r in range(last - first):
-        scratch[first + r] = own_filter[r]
-    outside = add_own_gradient(game, data, settings[RHO], i, scratch, u)
+    first = data.offsets[i]
+    profile, weights = work.profile, work.own_weights
+    copy(estimates, profile)
+    copy(own_action, profile[first : first + len(u)])
+    for r in range(len(u)):
+        u[r] = game.cost_gradient(data.parameters, i, first + r, profile)
+    copy(own_filter, profile[first : first + len(u)])
+    outside = own_weights(game, data, settings[RHO], i, profile, weights)
     if outside >= 0:
         return outside
-    for r in range(last - first):
-        u[r] = -settings[GAIN] * u[r]
+    for r in range(len(u)):
+        barrier = weighted_gradient(game, data, i, first + r, profile, weights)
+        u[r] = -settings[GAIN] * (u[r] + barrier)
     return -1
 
 

@@ -71,38 +71,41 @@ class LogBarrier:
 
 
 @kernel
-def evaluate_constraints(game, data, y, g):
-    """Fill g with g(y); return the first constraint that is not strictly negative, or -1.
+def evaluate_constraints(game, data, rho, y, g, weights):
+    """Fill g with g(y) and weights with rho / (-g); return -1, or the first g_l not negative.
 
     A value that is not a number counts as not negative.
     """
     outside = -1
     for k in range(len(g)):
-        g[k] = game.constraint(data.parameters, k, y)
-        if not g[k] < 0.0 and outside < 0:
+        value = game.constraint(data.parameters, k, y)
+        g[k] = value
+        weights[k] = rho / -value
+        if not value < 0.0 and outside < 0:
             outside = k
     return outside
 
 
 @kernel
-def add_weighted_gradient(game, data, i, y, weights, out):
-    """out += sum over the constraints l that contain y_i of weights[l] * dg_l/dy_i(y)."""
+def weighted_gradient(game, data, i, a, y, weights):
+    """Sum over the constraints l that contain y_i of weights[l] * dg_l/dy_a(y)."""
+    total = 0.0
     for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
         k = data.own_index[entry]
-        game.add_constraint_gradient(data.parameters, k, i, y, weights[k], out)
+        total += weights[k] * game.constraint_gradient(data.parameters, k, a, y)
+    return total
 
 
 @kernel
-def add_own_gradient(game, data, rho, i, profile, out):
-    """out += dphi/dy_i at a profile that agent i holds itself; return -1.
+def own_weights(game, data, rho, i, profile, weights):
+    """Fill weights[l] = rho / (-g_l) at a profile that agent i holds, for its own constraints.
 
-    If one of its constraints is not strictly negative there, out is left unfinished and that
-    constraint's number is returned.
+    Returns -1, or the first of them that is not strictly negative there.
     """
     for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
         k = data.own_index[entry]
         value = game.constraint(data.parameters, k, profile)
         if not value < 0.0:
             return k
-        game.add_constraint_gradient(data.parameters, k, i, profile, rho / -value, out)
+        weights[k] = rho / -value
     return -1

@@ -1,17 +1,19 @@
 """A generalized game: costs J_i(y), shared constraints g(y) <= 0 and their exact derivatives.
 
-The mathematics of one game is a module of kernels (see :mod:`gne_mj.native`). With q the game's
-flat parameter vector, y the profile of all actions (shape (m,)), i and j agents, l a constraint,
-all numbered from 0, such a module defines
+The mathematics of one game is a module of kernels (see :mod:`gne_mj.native`), plain functions of
+numbers. With q the game's flat parameter vector, y the profile of all actions (shape (m,)), i the
+agent, a and b entries of a profile (a belonging to agent i) and l a constraint, all numbered from
+0, such a module defines
 
-==================================================  ===============================================
-``cost(q, i, y)``                                    J_i(y)
-``add_cost_gradient(q, i, y, scale, out)``           out += scale * dJ_i/dy_i, shape (m_i,)
-``add_cost_hessian(q, i, j, y, scale, out)``         out += scale * d2J_i/dy_i dy_j, (m_i, m_j)
-``constraint(q, l, y)``                              g_l(y), negative inside
-``add_constraint_gradient(q, l, i, y, scale, out)``  out += scale * dg_l/dy_i, (m_i,)
-``add_constraint_hessian(q, l, i, j, y, scale, out)``  out += scale * d2g_l/dy_i dy_j, (m_i, m_j)
-==================================================  ===============================================
+==============================================  ==============================================
+``cost(q, i, y)``                               J_i(y)
+``cost_gradient(q, i, a, y)``                   dJ_i/dy_a
+``add_cost_hessian(q, i, a, y, scale, out)``    out[b] += scale * d2J_i/dy_a dy_b, out of (m,);
+                                                touches only entries of agents that J_i depends on
+``constraint(q, l, y)``                         g_l(y), negative inside
+``constraint_gradient(q, l, a, y)``             dg_l/dy_a, for a in the constraint
+``constraint_hessian(q, l, a, b, y)``           d2g_l/dy_a dy_b, for a and b in the constraint
+==============================================  ==============================================
 
 :class:`Game` joins such a module with its parameters and with who appears where.
 """
@@ -187,8 +189,8 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         at = data.offsets
         for row in range(len(profiles)):
             for i in range(len(at) - 1):
-                block = out[row, at[i] : at[i + 1]]
-                kernels.add_cost_gradient(data.parameters, i, profiles[row], 1.0, block)
+                for a in range(at[i], at[i + 1]):
+                    out[row, a] = kernels.cost_gradient(data.parameters, i, a, profiles[row])
 
     @compiled
     def constraints(data, profiles, out):
@@ -202,10 +204,8 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         _ = source
         at = data.offsets
         for i in range(len(at) - 1):
-            for entry in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
-                j = data.cost_index[entry]
-                block = out[at[i] : at[i + 1], at[j] : at[j + 1]]
-                kernels.add_cost_hessian(data.parameters, i, j, y, 1.0, block)
+            for a in range(at[i], at[i + 1]):
+                kernels.add_cost_hessian(data.parameters, i, a, y, 1.0, out[a])
 
     @compiled
     def constraint_jacobian(data, y, out):
@@ -213,9 +213,9 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         at = data.offsets
         for k in range(len(out)):
             for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
-                j = data.member_index[entry]
-                block = out[k, at[j] : at[j + 1]]
-                kernels.add_constraint_gradient(data.parameters, k, j, y, 1.0, block)
+                i = data.member_index[entry]
+                for a in range(at[i], at[i + 1]):
+                    out[k, a] = kernels.constraint_gradient(data.parameters, k, a, y)
 
     @compiled
     def weighted_hessian(data, y, weights, out):
@@ -226,8 +226,10 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
             for row in range(first, last):
                 for column in range(first, last):
                     i, j = data.member_index[row], data.member_index[column]
-                    block = out[at[i] : at[i + 1], at[j] : at[j + 1]]
-                    kernels.add_constraint_hessian(data.parameters, k, i, j, y, weights[k], block)
+                    for a in range(at[i], at[i + 1]):
+                        for b in range(at[j], at[j + 1]):
+                            second = kernels.constraint_hessian(data.parameters, k, a, b, y)
+                            out[a, b] += weights[k] * second
 
     return SimpleNamespace(
         costs=costs,

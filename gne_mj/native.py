@@ -19,7 +19,8 @@ from typing import Any, TypeVar
 import numba
 from numba import njit, types
 from numba.core import cgutils
-from numba.extending import intrinsic, register_jitable
+from numba.extending import register_jitable
+from numba.np.arrayobj import make_array, populate_array
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -35,28 +36,18 @@ def kernel(function: F) -> F:
     return register_jitable(**_KERNEL)(function)
 
 
-def view(function: F) -> F:
-    """Mark a kernel that returns views of memory, which numba's run time must be there for.
-
-    Only functions compiled with ``views=True`` and callbacks can use it; they should make their
-    views first and leave the work to kernels.
-    """
-    return register_jitable(error_model="numpy")(function)
-
-
-def compiled(function: Callable[..., Any], *, views: bool = False) -> Any:
+def compiled(function: Callable[..., Any]) -> Any:
     """Compile a native loop; machine code is kept on disk between processes.
 
     A function that calls kernels of other files must hold :func:`source_key` of them in its
     closure, since numba notices a changed closure but not a changed callee.
     """
-    options = {**_LOOP, "_nrt": views}
-    return njit(cache=True, **options)(function)
+    return njit(cache=True, **_LOOP)(function)
 
 
 def callback(signature: types.Type, function: Callable[..., Any]) -> Any:
     """Compile a C callback (numba's ``cfunc``), kept on disk as :func:`compiled` does."""
-    return numba.cfunc(signature, cache=True, error_model="numpy")(function)
+    return numba.cfunc(signature, cache=True, error_model="numpy", _nrt=False)(function)
 
 
 @cache
@@ -84,11 +75,24 @@ def copy(source, target):
         target[r] = source[r]
 
 
-@intrinsic
-def address_as_pointer(typingctx: Any, address: Any) -> Any:
-    """Turn an integer address into the ``void *`` that ``numba.carray`` takes."""
+def load_word(builder: Any, address: Any) -> Any:
+    """For intrinsics: LLVM code that reads the 8-byte integer at an address."""
+    return builder.load(builder.inttoptr(address, cgutils.intp_t.as_pointer()))
 
-    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
 
-    return types.voidptr(types.int64), codegen
+def array_at(context: Any, builder: Any, kind: types.Array, address: Any, length: Any) -> Any:
+    """For intrinsics: LLVM code that takes the memory at an address as a contiguous array.
+
+    ``numba.carray`` does the same, but not without numba's run time. The items have 8 bytes.
+    """
+    array = make_array(kind)(context, builder)
+    size = context.get_constant(types.intp, 8)
+    populate_array(
+        array,
+        data=builder.inttoptr(address, array.data.type),
+        shape=[length],
+        strides=[size],
+        itemsize=size,
+        meminfo=None,
+    )
+    return array._getvalue()

@@ -7,13 +7,9 @@ __all__ = ["action", "propagate", "rate"]
 
 
 @kernel
-def action(game, problem, y, weights, memory, scratch, u):
-    data = problem.data
-    at = data.offsets
-    for i in range(len(at) - 1):
-        block = u[at[i] : at[i + 1]]
-        block[0] = 0.0
-        game.add_cost_gradient(data.parameters, i, y, 1.0, block)
-        game.add_constraint_gradient(data.parameters, i, i, y, weights[i], block)
-        block[0] = -block[0]
+def action(game, problem, y, weights, memory, work, u):
+    q = problem.data.parameters
+    for i in range(len(u)):
+        own = weights[i] * game.constraint_gradient(q, i, i, y)
+        u[i] = -game.cost_gradient(q, i, i, y) - own
     return -1

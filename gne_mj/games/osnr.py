@@ -106,21 +106,23 @@ def cost(q, i, y):
 
 
 @kernel
-def add_cost_gradient(q, i, y, scale, out):
+def cost_gradient(q, i, a, y):
     """dJ_i/dy_i = a_i - b_i c_i / (disturbance_i + c_i y_i)."""
     n = int(q[0])
     b, c = q[2 + n + i], q[2 + 2 * n + i]
-    out[0] += scale * (q[2 + i] - b * c / (disturbance(q, i, y) + c * y[i]))
+    return q[2 + i] - b * c / (disturbance(q, i, y) + c * y[i])
 
 
 @kernel
-def add_cost_hessian(q, i, j, y, scale, out):
-    """b_i c_i / (disturbance_i + c_i y_i)^2 times c_i (j = i) or Gamma_ij."""
+def add_cost_hessian(q, i, a, y, scale, out):
+    """b_i c_i / (disturbance_i + c_i y_i)^2 times c_i (for y_i) or Gamma_ij (for y_j)."""
     n = int(q[0])
     b, c = q[2 + n + i], q[2 + 2 * n + i]
     received = disturbance(q, i, y) + c * y[i]
-    slope = c if j == i else q[2 + 4 * n + i * n + j]
-    out[0, 0] += scale * b * c * slope / (received * received)
+    factor = scale * b * c / (received * received)
+    row = 2 + 4 * n + i * n
+    for j in range(n):
+        out[j] += factor * (c if j == i else q[row + j])
 
 
 @kernel
@@ -136,12 +138,12 @@ def constraint(q, l, y):
 
 
 @kernel
-def add_constraint_gradient(q, l, i, y, scale, out):
+def constraint_gradient(q, l, a, y):
     """-1 for a channel's own sign constraint, 1 for the total power."""
-    out[0] += -scale if l < int(q[0]) else scale
+    return -1.0 if l < int(q[0]) else 1.0
 
 
 @kernel
-def add_constraint_hessian(q, l, i, j, y, scale, out):
+def constraint_hessian(q, l, a, b, y):
     """All constraints are affine."""
-    out[0, 0] += 0.0
+    return 0.0

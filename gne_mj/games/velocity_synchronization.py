@@ -56,15 +56,17 @@ def cost(q, i, y):
 
 
 @kernel
-def add_cost_gradient(q, i, y, scale, out):
+def cost_gradient(q, i, a, y):
     """dJ_i/dy_i = 2 gap_i."""
-    out[0] += scale * 2.0 * gap(q, i, y)
+    return 2.0 * gap(q, i, y)
 
 
 @kernel
-def add_cost_hessian(q, i, j, y, scale, out):
+def add_cost_hessian(q, i, a, y, scale, out):
     """2 for the agent itself, -2 for its predecessor."""
-    out[0, 0] += scale * (2.0 if j == i else -2.0)
+    out[i] += 2.0 * scale
+    if i > 0:
+        out[i - 1] -= 2.0 * scale
 
 
 @kernel
@@ -75,12 +77,12 @@ def constraint(q, l, y):
 
 
 @kernel
-def add_constraint_gradient(q, l, i, y, scale, out):
+def constraint_gradient(q, l, a, y):
     """2 gap_l for the agent itself, -2 gap_l for its predecessor."""
-    out[0] += (scale if i == l else -scale) * 2.0 * gap(q, l, y)
+    return (2.0 if a == l else -2.0) * gap(q, l, y)
 
 
 @kernel
-def add_constraint_hessian(q, l, i, j, y, scale, out):
+def constraint_hessian(q, l, a, b, y):
     """2 on the diagonal of the two agents' block, -2 off it."""
-    out[0, 0] += scale * (2.0 if i == j else -2.0)
+    return 2.0 if a == b else -2.0

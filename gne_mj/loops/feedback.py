@@ -30,6 +30,7 @@ class Work(NamedTuple):
 
     g: np.ndarray  # (p,) constraint values at the last evaluation
     weights: np.ndarray  # (p,) rho / -g
+    own_weights: np.ndarray  # (p,) the same at an agent's own profile
     demand: np.ndarray  # (m,) what the law asks for
     profile: np.ndarray  # (m,) an agent's own profile
     y: np.ndarray  # (m,) outputs
@@ -38,13 +39,15 @@ class Work(NamedTuple):
 
 def work(actions: int, constraints: int) -> Work:
     """Fresh scratch arrays."""
-    return Work(*(np.zeros(size) for size in (constraints, constraints, *(actions,) * 4)))
+    return Work(*(np.zeros(size) for size in (*(constraints,) * 3, *(actions,) * 4)))
 
 
 @kernel
 def inside(game, problem, time, stage, y, work, monitor):
-    """Fill work.g at outputs y; latch an exit and return False if y is not strictly inside."""
-    outside = evaluate_constraints(game, problem.data, y, work.g)
+    """Fill work.g and work.weights; latch an exit and return False if y is not strictly inside."""
+    outside = evaluate_constraints(
+        game, problem.data, problem.settings[RHO], y, work.g, work.weights
+    )
     if outside < 0:
         return True
     value = work.g[outside]
@@ -63,9 +66,7 @@ def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
     """
     if not inside(game, problem, time, stage, y, work, monitor):
         return False
-    for k in range(len(work.g)):
-        work.weights[k] = problem.settings[RHO] / -work.g[k]
-    left = law.action(game, problem, y, work.weights, memory, work.profile, work.demand)
+    left = law.action(game, problem, y, work.weights, memory, work, work.demand)
     if left >= 0:
         agent, constraint = left // len(work.g), left % len(work.g)
         value = game.constraint(problem.data.parameters, constraint, work.profile)

@@ -77,43 +77,40 @@ def observe(monitor, time, y, g, demand, before, u, storage):
     """
     p, m = len(g), len(y)
     first = monitor[STARTED] == 0.0
-    worst, when = monitor[HEADER : HEADER + p], monitor[HEADER + p : HEADER + 2 * p]
-    base = HEADER + 2 * p
-    peak, peak_time = monitor[base : base + m], monitor[base + m : base + 2 * m]
-    square, energy = monitor[base + 2 * m : base + 3 * m], monitor[base + 3 * m : base + 4 * m]
-    last_y, last_u = monitor[base + 4 * m : base + 5 * m], monitor[base + 5 * m : base + 6 * m]
+    elapsed = 0.0 if first else time - monitor[TIME]
     if first:
         monitor[STARTED] = 1.0
         monitor[STORAGE_START] = storage
         for k in range(p):
-            worst[k] = -np.inf
+            monitor[HEADER + k] = -np.inf
     else:
-        elapsed = time - monitor[TIME]
         if elapsed > 0.0:  # the end of a run may be observed again when it goes on
             monitor[STEPS] += 1.0
         rise = storage - monitor[STORAGE]
         if rise > monitor[STORAGE_RISE]:
             monitor[STORAGE_RISE] = rise
             monitor[STORAGE_RISE_TIME] = time
-        for r in range(m):
-            square[r] += 0.5 * elapsed * (last_u[r] * last_u[r] + before[r] * before[r])
-            energy[r] += 0.25 * elapsed * (last_u[r] + before[r]) * (last_y[r] + y[r])
     monitor[TIME] = time
     monitor[STORAGE] = storage
-    for k in range(p):
-        if g[k] > worst[k]:
-            worst[k] = g[k]
-            when[k] = time
+    for k in range(HEADER, HEADER + p):
+        value = g[k - HEADER]
+        if value > monitor[k]:
+            monitor[k] = value
+            monitor[k + p] = time
+    base = HEADER + 2 * p
     for r in range(m):
+        at = base + r  # of the peak; m further on its time, and so on
+        last_y, last_u = monitor[at + 4 * m], monitor[at + 5 * m]
+        monitor[at + 2 * m] += 0.5 * elapsed * (last_u * last_u + before[r] * before[r])
+        monitor[at + 3 * m] += 0.25 * elapsed * (last_u + before[r]) * (last_y + y[r])
+        monitor[at + 4 * m] = y[r]
+        monitor[at + 5 * m] = u[r]
         magnitude = abs(demand[r])
-        if magnitude > peak[r]:
-            peak[r] = magnitude
-            peak_time[r] = time
-        if u[r] != demand[r]:
-            if monitor[SATURATED] == 0.0:
-                monitor[SATURATED_TIME] = time
-                monitor[SATURATED_ACTION] = r
-                monitor[SATURATED_DEMAND] = demand[r]
+        if magnitude > monitor[at]:
+            monitor[at] = magnitude
+            monitor[at + m] = time
+        if u[r] != demand[r] and monitor[SATURATED] == 0.0:
             monitor[SATURATED] = 1.0
-        last_y[r] = y[r]
-        last_u[r] = u[r]
+            monitor[SATURATED_TIME] = time
+            monitor[SATURATED_ACTION] = r
+            monitor[SATURATED_DEMAND] = demand[r]

@@ -4,7 +4,7 @@ MuJoCo evaluates control at every stage of its integrator. The callback counts t
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
 (:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. What it keeps
 from call to call lies in mjData's ``userdata``, which is part of MuJoCo's state:
-[address of the table, calls so far, monitor, input held, scratch].
+[address of the table, arctangents of the springs, step, stage, monitor, input held, scratch].
 """
 
 from functools import cache
@@ -12,19 +12,22 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from gne_mj.game import Game, GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import Problem, Work, feedback
-from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, measure
-from gne_mj.native import address_as_pointer, callback, compiled, copy, kernel, source_key, view
+from gne_mj.loops.feedback import Problem, Work
+from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, look, stored
+from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.mujoco import (
     ACTUATOR,
+    ARCTANGENTS,
+    ATAN,
+    PLACES,
+    PLACES_COUNT,
     PLANT_TABLE,
     SIZES,
     STAGES,
@@ -36,13 +39,13 @@ from gne_mj.plants.native_mujoco import (
     CALLBACK,
     Offsets,
     Table,
+    address_of,
     call,
     callbacks,
     field,
     floats,
     integers,
     offsets,
-    pointer_as_address,
     step_address,
     table_of,
 )
@@ -51,19 +54,19 @@ from gne_mj.plants.ode import Channels
 # Behind the plant's arrays: the game's (as in GameData), the graph's, then these
 GAME = PLANT_TABLE
 GRAPH = GAME + len(GameData._fields)
-SETTINGS, LIMIT, PARAMETERS, REST, STEP, CLOCK = range(GRAPH + 2, GRAPH + 8)
-TABLE = GRAPH + 8
+SETTINGS, LIMIT, PROPAGATORS, PARAMETERS, REST, STEP, CLOCK = range(GRAPH + 2, GRAPH + 9)
 
-CALLS, MONITOR = 1, 2  # entries of userdata
+# Entries of userdata behind the plant's m arctangents
+STEP_NOW, STAGE_NOW, MONITOR = range(ARCTANGENTS, ARCTANGENTS + 3)
 
 
 @kernel
 def userdata_length(m, p, states):
     """Entries of userdata that the callback needs: the list at the top of this module."""
-    return MONITOR + watch.length(m, p) + m + 2 * p + 4 * m + m * states
+    return 2 + watch.length(m, p) + m + 3 * p + 4 * m + m * states
 
 
-@view
+@kernel
 def problem_in(table):
     """What the law reads, from a simulation's table."""
     data = GameData(
@@ -77,11 +80,11 @@ def problem_in(table):
         integers(table, GAME + 7),
     )
     graph = GraphData(integers(table, GRAPH), integers(table, GRAPH + 1))
-    nothing = carray(address_as_pointer(0), (0, 0, 0), np.float64)
+    nothing = floats(table, PROPAGATORS).reshape((0, 0, 0))
     return Problem(data, graph, floats(table, SETTINGS), floats(table, LIMIT), nothing)
 
 
-@view
+@kernel
 def channels_in(table, m, states):
     """The agents' channels, from a simulation's table."""
     parameters = floats(table, PARAMETERS)
@@ -89,18 +92,20 @@ def channels_in(table, m, states):
     return Channels(parameters.reshape((m, len(parameters) // m)), rest.reshape((m, states)))
 
 
-@view
+@kernel
 def parts_of(userdata, m, p, states):
     """The views into userdata: monitor, input held, scratch, flat state."""
-    at = MONITOR + watch.length(m, p)
-    monitor = userdata[MONITOR:at]
+    at = MONITOR + m + watch.length(m, p)
+    monitor = userdata[MONITOR + m : at]
     u = userdata[at : at + m]
     at += m
-    g, weights = userdata[at : at + p], userdata[at + p : at + 2 * p]
-    at += 2 * p
+    g = userdata[at : at + p]
+    weights, own = userdata[at + p : at + 2 * p], userdata[at + 2 * p : at + 3 * p]
+    at += 3 * p
     work = Work(
         g,
         weights,
+        own,
         userdata[at : at + m],
         userdata[at + m : at + 2 * m],
         userdata[at + 2 * m : at + 3 * m],
@@ -108,6 +113,18 @@ def parts_of(userdata, m, p, states):
     )
     at += 4 * m
     return monitor, u, work, userdata[at : at + m * states]
+
+
+@kernel
+def stored_given(channels, state, userdata):
+    """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
+    total = 0.0
+    for r in range(len(channels.rest)):
+        x = state[4 * r : 4 * r + 4]
+        total += flexible_robot.storage_given(
+            channels.parameters[r], x, channels.rest[r], userdata[ARCTANGENTS + r]
+        )
+    return total
 
 
 @cache
@@ -118,41 +135,36 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
 
     def control(model, data):
         _ = source
-        struct = pointer_as_address(data)
-        table = table_of(at, pointer_as_address(model), struct, TABLE)
-        if len(table) == 0:
+        struct = address_of(data)
+        table = table_of(at, address_of(model), struct)
+        if table == 0:
             return
         sizes, steps = integers(table, SIZES), integers(table, STEP)
         ctrl = field(struct, at.ctrl, sizes[2])
         userdata = field(struct, at.userdata, sizes[3])
-        actuator = integers(table, ACTUATOR)
-        m, p, states = len(actuator), steps[0], len(agent.STATES)
+        places = integers(table, PLACES)
+        m, p, states = len(places) // PLACES_COUNT, steps[0], len(agent.STATES)
         stages, period, mode = steps[1], steps[2], steps[3]
         monitor, u, work, state = parts_of(userdata, m, p, states)
-        evaluation = np.int64(userdata[CALLS])
-        userdata[CALLS] += 1.0
-        step, stage = evaluation // stages, evaluation % stages
+        step, stage = np.int64(userdata[STEP_NOW + m]), np.int64(userdata[STAGE_NOW + m])
+        last = stage + 1 == stages
+        userdata[STEP_NOW + m] = step + 1 if last else step
+        userdata[STAGE_NOW + m] = 0 if last else stage + 1
         if stage > 0 and mode != CONTINUOUS:
             return
         h = floats(table, CLOCK)[0]
-        problem = problem_in(table)
+        time = step * h
+        if stage > 0:
+            time += h if stage == 3 else 0.5 * h
         gather(at, struct, table, state)
-        acts = monitor[watch.EXIT] == watch.INSIDE
-        if acts and stage == 0:
-            acts = begin_step(
-                agent, law, game, problem, channels_in(table, m, states),
-                Clock(h, period, mode, 0), step, state, u, monitor, work,
-            )  # fmt: skip
-            for r in range(m):
-                ctrl[actuator[r]] = u[r] if acts else 0.0
-        elif acts:
-            measure(agent, state, states, work.y)
-            time = (step + (1.0 if stage == 3 else 0.5)) * h
-            acts = feedback(
-                law, game, problem, time, stage, work.y, state[m * states :], work, monitor, work.u
-            )
-            for r in range(m):
-                ctrl[actuator[r]] = work.u[r] if acts else 0.0
+        channels = channels_in(table, m, states)
+        storage = stored_given(channels, state, userdata) if stage == 0 else 0.0
+        acts = monitor[watch.EXIT] == watch.INSIDE and look(
+            agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
+            stage, storage, state, u, monitor, work,
+        )  # fmt: skip
+        for r in range(m):
+            ctrl[places[r * PLACES_COUNT + ACTUATOR]] = work.u[r] if acts else 0.0
 
     def advance(mj_step, model, data, qpos, qvel, userdata, m, p, every, before, states, inputs):
         _ = source
@@ -166,7 +178,13 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
                 if monitor[watch.EXIT] != watch.INSIDE:
                     copy(before[0], qpos)
                     copy(before[1], qvel)
-                    return sample, done
+                    # a step that began inside has its row, even if a later stage left
+                    if substep == 0 and monitor[watch.EXIT_STAGE] > 0:
+                        copy(u, inputs[sample])
+                        copy(before[0], states[sample, 0])
+                        copy(before[1], states[sample, 1])
+                        return sample + 1, done
+                    return sample + (substep > 0), done
                 if substep == 0:
                     copy(u, inputs[sample])
                     copy(before[0], states[sample, 0])
@@ -176,21 +194,23 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
 
     def finish(model, data, step):
         _ = source
-        table = table_of(at, model, data, TABLE)
+        table = table_of(at, model, data)
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m, p, states = len(integers(table, ACTUATOR)), steps[0], len(agent.STATES)
+        m, p, states = len(floats(table, ATAN)), steps[0], len(agent.STATES)
         userdata = field(data, at.userdata, sizes[3])
         monitor, u, work, state = parts_of(userdata, m, p, states)
         gather(at, data, table, state)
+        channels = channels_in(table, m, states)
         return begin_step(
-            agent, law, game, problem_in(table), channels_in(table, m, states),
-            Clock(floats(table, CLOCK)[0], steps[2], steps[3], 0), step, state, u, monitor, work,
+            agent, law, game, problem_in(table), channels,
+            Clock(floats(table, CLOCK)[0], steps[2], steps[3], 0), step,
+            stored(agent, channels, state), state, u, monitor, work,
         )  # fmt: skip
 
     return (
         callback(CALLBACK, control),
-        compiled(advance, views=True),
-        compiled(finish, views=True),
+        compiled(advance),
+        compiled(finish),
     )
 
 
@@ -235,6 +255,7 @@ class MujocoLoop(ClosedLoop):
                 *problem.graph,
                 problem.settings,
                 problem.limit,
+                np.zeros(0),
                 np.ascontiguousarray(plant.agents.parameters),
                 np.ascontiguousarray(rest),
                 np.array([self._p, stages, period, mode], dtype=np.int64),
@@ -246,10 +267,10 @@ class MujocoLoop(ClosedLoop):
         data.userdata[0] = self._table.address
         self._step = 0
         length = int(watch.length(self._m, self._p))
-        self.monitor = data.userdata[MONITOR : MONITOR + length]
-        self._u = data.userdata[MONITOR + length : MONITOR + length + self._m]
+        start = MONITOR + self._m
+        self.monitor = data.userdata[start : start + length]
+        self._u = data.userdata[start + length : start + length + self._m]
         self._before = np.zeros((2, plant.model.nq))
-        self._stages = stages
 
     @property
     def time(self) -> float:
@@ -260,8 +281,9 @@ class MujocoLoop(ClosedLoop):
         """See the base class."""
         data = self.plant.data
         rows, inputs = np.empty((samples, *self._before.shape)), np.empty((samples, self._m))
-        # The callback counts evaluations; a step that ended in an exit is not one of them.
-        data.userdata[CALLS] = self._step * self._stages
+        # The callback counts steps and stages; a step that ended in an exit is not one of them.
+        data.userdata[STEP_NOW + self._m] = self._step
+        data.userdata[STAGE_NOW + self._m] = 0.0
         with callbacks(control=self._control, passive=self._passive):
             done, steps = self._advance(
                 step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
@@ -279,13 +301,6 @@ class MujocoLoop(ClosedLoop):
         return self._samples(np.stack([data.qpos, data.qvel])[None], u[None].copy())
 
     def _samples(self, rows: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
-        main_q, appendage_q, main_v, appendage_v = self.plant.table_arrays[:4]
-        qpos, qvel = rows[:, 0], rows[:, 1]
-        columns = (
-            qpos[:, main_q] - qpos[:, appendage_q],
-            qvel[:, main_v],
-            qvel[:, appendage_v],
-            qpos[:, main_q],
-        )
+        state = self.plant.states_of(rows[:, 0], rows[:, 1])
         memory = np.empty((len(rows), 0))
-        return Samples(state=np.stack(columns, axis=2), input=inputs, memory=memory)
+        return Samples(state=state, input=inputs, memory=memory)

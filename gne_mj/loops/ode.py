@@ -50,25 +50,42 @@ def stored(agent, channels, state):
 
 
 @kernel
-def begin_step(agent, law, game, problem, channels, clock, step, state, u, monitor, work):
-    """Measure, act and observe at the start of a step; u is changed. False if the run must end."""
+def begin_step(
+    agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work
+):
+    """Measure, act and observe at the start of a step; u is changed. False if the run must end.
+
+    storage is V^{x*} now (see :func:`stored`).
+    """
+    return look(
+        agent, law, game, problem, channels, clock, step * clock.h, step, 0, storage, state, u,
+        monitor, work,
+    )  # fmt: skip
+
+
+@kernel
+def look(
+    agent, law, game, problem, channels, clock, time, step, stage, storage, state, u, monitor, work
+):
+    """The same at any stage of a step: at a later one (mode continuous) only work.u is filled.
+
+    One kernel for both keeps MuJoCo's callback small, which is most of its speed.
+    """
     m, states = channels.rest.shape
-    time = step * clock.h
-    memory = state[m * states :]
     y = work.y
     measure(agent, state, states, y)
-    storage = stored(agent, channels, state)
-    acts = clock.mode == CONTINUOUS or step % clock.period == 0
-    if acts:
-        if not feedback(law, game, problem, time, 0, y, memory, work, monitor, work.u):
+    if clock.mode == CONTINUOUS or step % clock.period == 0:
+        memory = state[m * states :]
+        if not feedback(law, game, problem, time, stage, y, memory, work, monitor, work.u):
             return False
+    else:
+        if not inside(game, problem, time, stage, y, work, monitor):
+            return False
+        copy(u, work.u)
+    if stage == 0:
         before = work.u if clock.mode == CONTINUOUS else u
         watch.observe(monitor, time, y, work.g, work.demand, before, work.u, storage)
         copy(work.u, u)
-    else:
-        if not inside(game, problem, time, 0, y, work, monitor):
-            return False
-        watch.observe(monitor, time, y, work.g, work.demand, u, u, storage)
     return True
 
 
@@ -140,10 +157,12 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
         held_y = scratch[5]
         for sample in range(len(samples_u)):
             for substep in range(every):
+                storage = stored(agent, channels, state)
                 if not begin_step(
-                    agent, law, game, problem, channels, clock, step, state, u, monitor, work
-                ):
-                    return sample, step
+                    agent, law, game, problem, channels, clock, step, storage, state, u, monitor,
+                    work,
+                ):  # fmt: skip
+                    return sample + (substep > 0), step
                 if substep == 0:
                     copy(state, samples_state[sample])
                     copy(u, samples_u[sample])
@@ -152,7 +171,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
                         agent, law, game, problem, channels, step * clock.h, clock.h, state, u,
                         monitor, work, scratch,
                     ):  # fmt: skip
-                        return sample, step
+                        return sample + 1, step
                     step += 1
                     continue
                 memory = state[m * states :]
@@ -175,8 +194,9 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
     @compiled
     def finish(problem, channels, clock, step, state, u, monitor, work):
         _ = source
+        storage = stored(agent, channels, state)
         return begin_step(
-            agent, law, game, problem, channels, clock, step, state, u, monitor, work
+            agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work
         )
 
     return advance, finish

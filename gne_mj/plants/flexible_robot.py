@@ -85,9 +85,15 @@ def equilibrium(q, y, out):
 @kernel
 def storage(q, x, rest):
     """V^{x*}(x): since psi(0) = 0 at rest, the energy of the deviation."""
+    return storage_given(q, x, rest, np.arctan(x[0]))
+
+
+@kernel
+def storage_given(q, x, rest, arctangent):
+    """The same where the extension's arctangent is at hand."""
     extension = x[0]
     spring = 0.5 * q[2] * extension * extension + q[3] * (
-        extension * np.arctan(extension) - 0.5 * np.log(1.0 + extension * extension)
+        extension * arctangent - 0.5 * np.log(1.0 + extension * extension)
     )
     main, appendage = x[1] - rest[1], x[2] - rest[2]
     return spring + 0.5 * q[0] * main * main + 0.5 * q[1] * appendage * appendage

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.native import callback, compiled, source_key, view
+from gne_mj.native import callback, compiled, kernel, source_key
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
@@ -17,13 +17,13 @@ from gne_mj.plants.native_mujoco import (
     CALLBACK,
     Offsets,
     Table,
+    address_of,
     call,
     callbacks,
     field,
     floats,
     integers,
     offsets,
-    pointer_as_address,
     step_address,
     table_of,
 )
@@ -32,22 +32,29 @@ INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
 STAGES = {"euler": 1, "rk4": 4}  # evaluations of the dynamics in one step
 
 # A fleet's arrays at the start of every table
-MAIN_QPOS, APPENDAGE_QPOS, MAIN_DOF, APPENDAGE_DOF, ACTUATOR, ATAN, SIZES = range(7)
-PLANT_TABLE = 7
+PLACES, ATAN, SIZES = range(3)
+PLANT_TABLE = 3
+
+# A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
+MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
+
+# A fleet's userdata: the table's address, then the springs' arctangents at the last evaluation
+ARCTANGENTS = 1
 
 
-@view
+@kernel
 def gather(at, data, table, state):
     """Fill the flat state (m channels of flexible_robot.STATES) from mjData."""
     sizes = integers(table, SIZES)
     qpos, qvel = field(data, at.qpos, sizes[0]), field(data, at.qvel, sizes[1])
-    main, appendage = integers(table, MAIN_QPOS), integers(table, APPENDAGE_QPOS)
-    main_dof, appendage_dof = integers(table, MAIN_DOF), integers(table, APPENDAGE_DOF)
-    for r in range(len(main)):
-        state[4 * r] = qpos[main[r]] - qpos[appendage[r]]
-        state[4 * r + 1] = qvel[main_dof[r]]
-        state[4 * r + 2] = qvel[appendage_dof[r]]
-        state[4 * r + 3] = qpos[main[r]]
+    places = integers(table, PLACES)
+    for r in range(len(places) // PLACES_COUNT):
+        row = r * PLACES_COUNT
+        position = qpos[places[row + MAIN_Q]]
+        state[4 * r] = position - qpos[places[row + APPENDAGE_Q]]
+        state[4 * r + 1] = qvel[places[row + MAIN_V]]
+        state[4 * r + 2] = qvel[places[row + APPENDAGE_V]]
+        state[4 * r + 3] = position
 
 
 @cache
@@ -57,20 +64,23 @@ def passive_callback(at: Offsets) -> Any:
 
     def passive(model, data):
         _ = source
-        struct = pointer_as_address(data)
-        table = table_of(at, pointer_as_address(model), struct, PLANT_TABLE)
-        if len(table) == 0:
+        struct = address_of(data)
+        table = table_of(at, address_of(model), struct)
+        if table == 0:
             return
         sizes = integers(table, SIZES)
         qpos = field(struct, at.qpos, sizes[0])
         force = field(struct, at.qfrc_passive, sizes[1])
-        main, appendage = integers(table, MAIN_QPOS), integers(table, APPENDAGE_QPOS)
-        main_dof, appendage_dof = integers(table, MAIN_DOF), integers(table, APPENDAGE_DOF)
-        coefficient = floats(table, ATAN)
-        for r in range(len(main)):
-            pull = coefficient[r] * np.arctan(qpos[main[r]] - qpos[appendage[r]])
-            force[main_dof[r]] -= pull
-            force[appendage_dof[r]] += pull
+        places, coefficient = integers(table, PLACES), floats(table, ATAN)
+        kept = field(struct, at.userdata, ARCTANGENTS + len(coefficient))
+        for r in range(len(coefficient)):
+            row = r * PLACES_COUNT
+            extension = qpos[places[row + MAIN_Q]] - qpos[places[row + APPENDAGE_Q]]
+            arctangent = np.arctan(extension)
+            kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
+            pull = coefficient[r] * arctangent
+            force[places[row + MAIN_V]] -= pull
+            force[places[row + APPENDAGE_V]] += pull
 
     return callback(CALLBACK, passive)
 
@@ -93,7 +103,7 @@ class MujocoPlant(Plant):
         timestep: in s.
         integrator: "rk4" or "euler". MuJoCo's implicit integrators drop the damping of a tendon
             between sibling bodies, and are not offered.
-        userdata: room to leave in ``userdata`` behind the entry that this plant needs.
+        userdata: room to leave in ``userdata`` behind what this plant needs itself.
         decorated: keep what is for the eye only.
 
     Attributes:
@@ -119,7 +129,7 @@ class MujocoPlant(Plant):
             compose(agents.parameters, decorated=decorated),
             timestep=timestep,
             integrator=INTEGRATORS[integrator],
-            userdata=1 + userdata,
+            userdata=ARCTANGENTS + agents.channels + userdata,
         )
         self.data = mujoco.MjData(self.model)
         self.table_arrays = self._table_arrays()
@@ -129,42 +139,50 @@ class MujocoPlant(Plant):
         def joints(name: str) -> list[Any]:
             return [self.model.joint(f"robot_{i + 1}/{name}") for i in range(self.agents.channels)]
 
-        def each(values: list[Any]) -> NDArray[np.int64]:
-            return np.array(values, dtype=np.int64)
-
         main, appendage = joints("position"), joints("appendage_position")
-        actuators = [f"robot_{i + 1}/force" for i in range(self.agents.channels)]
-        return [
-            each([joint.qposadr[0] for joint in main]),
-            each([joint.qposadr[0] for joint in appendage]),
-            each([joint.dofadr[0] for joint in main]),
-            each([joint.dofadr[0] for joint in appendage]),
-            each([self.model.actuator(name).id for name in actuators]),
-            np.ascontiguousarray(self.agents.parameters[:, 3]),
-            each([self.model.nq, self.model.nv, self.model.nu, self.model.nuserdata]),
+        self.places = np.empty((self.agents.channels, PLACES_COUNT), dtype=np.int64)
+        self.places[:, MAIN_Q] = [joint.qposadr[0] for joint in main]
+        self.places[:, APPENDAGE_Q] = [joint.qposadr[0] for joint in appendage]
+        self.places[:, MAIN_V] = [joint.dofadr[0] for joint in main]
+        self.places[:, APPENDAGE_V] = [joint.dofadr[0] for joint in appendage]
+        self.places[:, ACTUATOR] = [
+            self.model.actuator(f"robot_{i + 1}/force").id for i in range(self.agents.channels)
         ]
+        sizes = (self.model.nq, self.model.nv, self.model.nu, self.model.nuserdata)
+        return [
+            self.places,
+            np.ascontiguousarray(self.agents.parameters[:, 3]),
+            np.array(sizes, dtype=np.int64),
+        ]
+
+    def states_of(
+        self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(..., m, states) from MuJoCo's positions (..., nq) and velocities (..., nv)."""
+        at = self.places.T
+        position = qpos[..., at[MAIN_Q]]
+        extension = position - qpos[..., at[APPENDAGE_Q]]
+        columns = (extension, qvel[..., at[MAIN_V]], qvel[..., at[APPENDAGE_V]], position)
+        return np.stack(columns, axis=-1)
 
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, states), a copy."""
-        main_q, appendage_q, main_v, appendage_v = self.table_arrays[:4]
-        qpos, qvel = self.data.qpos, self.data.qvel
-        columns = (qpos[main_q] - qpos[appendage_q], qvel[main_v], qvel[appendage_v], qpos[main_q])
-        return np.stack(columns, axis=1)
+        return self.states_of(self.data.qpos, self.data.qvel)
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        main_q, appendage_q, main_v, appendage_v = self.table_arrays[:4]
-        self.data.qpos[main_q] = state[:, 3]
-        self.data.qpos[appendage_q] = state[:, 3] - state[:, 0]
-        self.data.qvel[main_v] = state[:, 1]
-        self.data.qvel[appendage_v] = state[:, 2]
+        at = self.places.T
+        self.data.qpos[at[MAIN_Q]] = state[:, 3]
+        self.data.qpos[at[APPENDAGE_Q]] = state[:, 3] - state[:, 0]
+        self.data.qvel[at[MAIN_V]] = state[:, 1]
+        self.data.qvel[at[APPENDAGE_V]] = state[:, 2]
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
         self.data.userdata[0] = self._table.address
-        self.data.ctrl[self.table_arrays[ACTUATOR]] = u
+        self.data.ctrl[self.places[:, ACTUATOR]] = u
         with callbacks(passive=passive_callback(offsets())):
             _native()(step_address(), self.model._address, self.data._address, steps)

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import carray, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
-from gne_mj.native import address_as_pointer, callback, compiled, view
+from gne_mj.native import array_at, callback, compiled, kernel, load_word
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
@@ -85,25 +85,45 @@ def _find(struct: int, word: int) -> int:
 
 @cache
 def _read_back() -> Any:
+    @compiled
     def read_back(struct, offset):
         array = field(struct, offset, 1)
         mark = array[0]
         array[0] = -mark
         return mark
 
-    return compiled(read_back, views=True)
-
-
-@view
-def field(struct, offset, length):
-    """The double array of ``length`` that a struct's pointer field points to."""
-    words = carray(address_as_pointer(struct), (offset + 1,), np.int64)
-    return carray(address_as_pointer(words[offset]), (length,), np.float64)
+    return read_back
 
 
 @intrinsic
-def pointer_as_address(typingctx: Any, pointer: Any) -> Any:
-    """Turn a ``void *`` into an integer address."""
+def word(typingctx: Any, struct: Any, offset: Any) -> Any:
+    """The 8-byte integer at an offset in the struct at an address."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return load_word(builder, _at_word(context, builder, *arguments))
+
+    return types.int64(types.int64, types.int64), codegen
+
+
+@intrinsic
+def field(typingctx: Any, struct: Any, offset: Any, length: Any) -> Any:
+    """The double array of a length that a pointer field of the struct at an address points to."""
+    kind = types.Array(types.float64, 1, "C")
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = load_word(builder, _at_word(context, builder, *arguments[:2]))
+        return array_at(context, builder, kind, pointer, arguments[2])
+
+    return kind(types.int64, types.int64, types.int64), codegen
+
+
+def _at_word(context: Any, builder: Any, struct: Any, offset: Any) -> Any:
+    return builder.add(struct, builder.mul(offset, context.get_constant(types.intp, 8)))
+
+
+@intrinsic
+def address_of(typingctx: Any, pointer: Any) -> Any:
+    """A ``void *`` as an integer address."""
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.ptrtoint(arguments[0], cgutils.intp_t)
@@ -140,8 +160,7 @@ def step_address() -> int:
 class Table:
     """Arrays that callbacks read, as one block of (address, length) pairs.
 
-    The arrays are kept alive as long as the table is. Native code gets them back by
-    :func:`floats` and :func:`integers` with the index they were given here.
+    The arrays are kept alive as long as the table is.
     """
 
     def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
@@ -160,28 +179,38 @@ class Table:
         return float(address)
 
 
-@view
-def floats(table, index):
-    """The float array at this index of a table's pairs."""
-    return carray(address_as_pointer(table[2 * index]), (table[2 * index + 1],), np.float64)
+@intrinsic
+def floats(typingctx: Any, table: Any, index: Any) -> Any:
+    """The float array at this index of the table at an address."""
+    return _entry(types.float64)
 
 
-@view
-def integers(table, index):
-    """The integer array at this index of a table's pairs."""
-    return carray(address_as_pointer(table[2 * index]), (table[2 * index + 1],), np.int64)
+@intrinsic
+def integers(typingctx: Any, table: Any, index: Any) -> Any:
+    """The integer array at this index of the table at an address."""
+    return _entry(types.int64)
 
 
-@view
-def table_of(at, model, data, size):
-    """A simulation's table of ``size`` arrays, given both structs' addresses; empty if none."""
-    header = carray(address_as_pointer(model), (at.nuserdata + 1,), np.int64)
-    if header[at.nuserdata] == 0:
-        return carray(address_as_pointer(model), (0,), np.int64)
-    address = np.int64(field(data, at.userdata, 1)[0])
-    if address == 0:
-        return carray(address_as_pointer(model), (0,), np.int64)
-    return carray(address_as_pointer(address), (2 * size,), np.int64)
+def _entry(item: types.Type) -> Any:
+    kind = types.Array(item, 1, "C")
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        table, index = arguments
+        pair = builder.add(table, builder.mul(index, context.get_constant(types.intp, 16)))
+        length = builder.add(pair, context.get_constant(types.intp, 8))
+        return array_at(
+            context, builder, kind, load_word(builder, pair), load_word(builder, length)
+        )
+
+    return kind(types.int64, types.int64), codegen
+
+
+@kernel
+def table_of(at, model, data):
+    """Address of a simulation's table, given both structs' addresses; 0 if it has none."""
+    if word(model, at.nuserdata) == 0:
+        return np.int64(0)
+    return np.int64(field(data, at.userdata, 1)[0])
 
 
 @cache
