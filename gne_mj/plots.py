@@ -81,9 +81,8 @@ def _figure(
     with plt.rc_context(style):
         figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
         content(axes, data)
-        handles, _ = axes.get_legend_handles_labels()
-        if handles:
-            figure.legend(loc="outside upper center", ncols=min(6, len(handles)))
+        if axes.get_legend_handles_labels()[0]:  # beside the axes, so that it hides nothing
+            figure.legend(loc="outside right center", title=_agent_name(data), handlelength=2.4)
         axes.set_xlabel("time (s)")
         axes.set_ylabel(label)
         time = data["time"].to_numpy()
@@ -94,7 +93,11 @@ def _figure(
     return figure
 
 
-def _lines(axes: "Axes", data: "xarray.Dataset", name: str, label: str) -> None:
+def _agent_name(data: "xarray.Dataset") -> str:
+    return "robot" if "gap" in data else "channel" if data.attrs["game"] == "OSNR" else "agent"
+
+
+def _lines(axes: "Axes", data: "xarray.Dataset", name: str) -> None:
     values = data[name].to_numpy()
     time = data["time"].to_numpy()
     for index in range(values.shape[1]):
@@ -103,7 +106,7 @@ def _lines(axes: "Axes", data: "xarray.Dataset", name: str, label: str) -> None:
             values[:, index],
             color=_COLOURS[index % len(_COLOURS)],
             linestyle=_DASHES[(index + index // len(_COLOURS)) % len(_DASHES)],
-            label=f"{label} {index + 1}" if values.shape[1] <= _LEGEND else None,
+            label=f"{index + 1}" if values.shape[1] <= _LEGEND else None,
         )
 
 
@@ -112,12 +115,11 @@ def _limit(axes: "Axes", value: float, label: str | None) -> None:
 
 
 def _actions(axes: "Axes", data: "xarray.Dataset") -> None:
-    unit = "robot" if "gap" in data else "channel" if data.attrs["game"] == "OSNR" else "agent"
-    _lines(axes, data, "action", unit)
+    _lines(axes, data, "action")
 
 
 def _gaps(axes: "Axes", data: "xarray.Dataset") -> None:
-    _lines(axes, data, "gap", "robot")
+    _lines(axes, data, "gap")
     bounds = np.unique(data["gap_bound"].to_numpy())
     for index, bound in enumerate(bounds[:3]):
         _limit(axes, bound, "bound" if index == 0 else None)
@@ -126,7 +128,9 @@ def _gaps(axes: "Axes", data: "xarray.Dataset") -> None:
 
 def _total(axes: "Axes", data: "xarray.Dataset") -> None:
     total = data["action"].sum(axis=1)
-    axes.plot(data["time"], total, color=_COLOURS[0], label="total power")
+    axes.plot(data["time"], total, color=_COLOURS[0])
     # g of the last constraint is the total power less its limit
     limit = float(total[0] - data["constraint"].to_numpy()[0, -1])
-    _limit(axes, limit, "limit $P_0$")
+    _limit(axes, limit, None)
+    axes.annotate("limit $P_0$", (1.0, limit), xycoords=("axes fraction", "data"), ha="right",
+                  xytext=(0, 3), textcoords="offset points")  # fmt: skip
