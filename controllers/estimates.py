@@ -22,7 +22,7 @@ def add_disagreement(data, graph, y, memory, i, scale, out):
     m = at[len(at) - 1]
     own = memory[i * m : (i + 1) * m]
     for entry in range(graph.pointer[i], graph.pointer[i + 1]):
-        j = graph.index[entry]
+        j = graph.neighbour[entry]
         sent = memory[j * m : (j + 1) * m]
         for r in range(at[j]):
             out[r] += scale * (own[r] - sent[r])

@@ -150,4 +150,3 @@ def propagate(problem, y, memory, scratch):
     for r in range(agents * m, agents * m + m):
         own = y[r - agents * m]
         memory[r] = own + remaining * (memory[r] - own)
-

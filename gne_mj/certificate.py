@@ -193,9 +193,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
     try:
         variational = variational_equilibrium(system.game, penalised.action)
         result["variational"] = variational.action.tolist()
-        result["final_distance_to_variational"] = float(
-            np.max(np.abs(last - variational.action))
-        )
+        result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
         result["variational"] = result["final_distance_to_variational"] = None
     return result
@@ -216,9 +214,7 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def _settling_time(
-    time: NDArray[np.float64], distance: NDArray[np.float64]
-) -> float | None:
+def _settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> float | None:
     outside = np.flatnonzero(~(distance <= SETTLED * distance[0]))
     if len(outside) == 0:
         return float(time[0])

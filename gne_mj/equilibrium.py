@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.barrier import LogBarrier
 from gne_mj.errors import InfeasibleStart, SolverError
 from gne_mj.game import Game
 

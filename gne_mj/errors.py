@@ -33,7 +33,8 @@ class InfeasibleStart(GneError, ValueError):
         self.system, self.constraint, self.value = system, constraint, value
         super().__init__(
             f"{system}: the {what} must lie strictly inside the constraint set, but constraint"
-            f" '{constraint}' has g = {value + 0.0:.6g} (margin {0.0 - value:.6g}); it must be negative"
+            f" '{constraint}' has g = {value + 0.0:.6g} (margin {0.0 - value:.6g}); it must be"
+            " negative"
         )
 
 

@@ -13,10 +13,10 @@ from gne_mj.errors import InvalidInput
 
 
 class GraphData(NamedTuple):
-    """Neighbour lists for native code: agent i hears ``index[pointer[i]:pointer[i + 1]]``."""
+    """Neighbour lists for native code: agent i hears ``neighbour[pointer[i]:pointer[i + 1]]``."""
 
     pointer: np.ndarray
-    index: np.ndarray
+    neighbour: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -42,7 +42,9 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     return figures
 
 
-def save(trajectory: Trajectory, folder: str | Path, formats: tuple[str, ...] = ("png",)) -> list[Path]:
+def save(
+    trajectory: Trajectory, folder: str | Path, formats: tuple[str, ...] = ("png",)
+) -> list[Path]:
     """Write every figure of :func:`draw` into a folder; returns the files' paths."""
     import matplotlib.pyplot as plt
 
@@ -64,7 +66,7 @@ def _figure(
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    style = {
+    style: Any = {
         "font.size": 9,
         "font.family": "serif",
         "mathtext.fontset": "cm",

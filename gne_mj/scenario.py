@@ -170,7 +170,9 @@ class PiCascadeAgents(_AgentsTable):
         table = self.columns(*pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
         if np.any(table[:, 1] >= table[:, 0]):
             raise InvalidInput(
-                "agents.integral_gain", self.integral_gain, "it must be below decay_rate (0 < k < v)"
+                "agents.integral_gain",
+                self.integral_gain,
+                "it must be below decay_rate (0 < k < v)",
             )
         return Agents(pi_cascade, table, self.limits())
 
@@ -252,9 +254,7 @@ class SystemTable(_Table):
     """One game with its agents."""
 
     game: Annotated[VelocityGame | OsnrGame, Field(discriminator="type")]
-    agents: Annotated[
-        RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")
-    ]
+    agents: Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
     barrier: BarrierTable = BarrierTable()
     controller: Annotated[
         FullController | DistributedController, Field(discriminator="information")
@@ -271,9 +271,7 @@ class SystemTable(_Table):
             law = self.controller.build(count)
             state = self.initial.build(agents, self.game.default_start(count))
         except InvalidInput as error:
-            raise InvalidInput(
-                f"systems.{name}.{error.key}", error.value, error.expected
-            ) from None
+            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
         if self.plant.engine == "mujoco" and agents.kind is not flexible_robot:
             raise InvalidInput(
                 f"systems.{name}.plant.engine",
@@ -417,7 +415,9 @@ def _read(source: str | Path) -> dict[str, Any]:
     path = Path(source)
     if path.suffix != ".toml":
         raise InvalidInput(
-            "scenario", str(source), f"it must name a file ending in .toml; {nearest(str(source), names)}"
+            "scenario",
+            str(source),
+            f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))

@@ -171,7 +171,7 @@ class _Run:
         first = self.loop.time
         recorded = self.loop.advance(samples, every)
         self.wall_time += real_time.perf_counter() - started
-        rows = np.arange(len(recorded.input))
+        rows = np.arange(len(recorded.input), dtype=np.float64)
         self._times.append(first + rows * every * self.clock.timestep)
         self._samples.append(recorded)
 

@@ -176,7 +176,7 @@ class System:
         channels = Channels(self.agents.parameters, rest)
         memory = self.law.initial_memory(self.start)
         kind = self.agents.kind
-        if self.integrator == "rosenbrock":
+        if self.integrator == "rosenbrock" and self.law.graph is not None:
             from gne_mj.loops.rosenbrock import RosenbrockLoop
 
             return RosenbrockLoop(

@@ -1,8 +1,8 @@
 """Systems of the product beside the same ones of reference.py, for tests to compare."""
 
 import numpy as np
-import reference
 
+import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import osnr_game, ten_channels, velocity_game

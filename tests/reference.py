@@ -17,6 +17,8 @@ Conventions
 - Gradients accept complex vectors, so that Jacobians can be taken by the complex step.
 """
 
+import itertools
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -642,7 +644,7 @@ def dop853(rate, x0, times, rtol=1e-12, atol=1e-13):
     and is rejected. Explicit: stiff loops (small epsilon) need many steps.
     """
     states = [np.array(x0, dtype=float)]
-    for start, end in zip(times[:-1], times[1:], strict=True):
+    for start, end in itertools.pairwise(times):
         solution = solve_ivp(rate, (start, end), states[-1], method="DOP853", rtol=rtol, atol=atol)
         if not solution.success:
             raise ArithmeticError(f"DOP853 stopped at t = {solution.t[-1]}: {solution.message}")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import reference
 from builders import UNEQUAL, integrators, pi_cascades, reference_pi, reference_robots, robots
 from hypothesis import given
 from hypothesis import strategies as st
 
+import reference
 from gne_mj.plants.ode import OdePlant
 
 KINDS = {

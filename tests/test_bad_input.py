@@ -72,7 +72,11 @@ CASES = {
         ["controller.graph=[[1,11]]"],
         ["controller.graph", "[1, 11]", "1 to 10"],
     ),
-    "wrong graph": ("osnr", ["controller.graph=star"], ["systems.channels.controller.graph: got 'star'"]),
+    "wrong graph": (
+        "osnr",
+        ["controller.graph=star"],
+        ["systems.channels.controller.graph: got 'star'"],
+    ),
     "graph of another size": ("osnr", ["agents.count=3", "controller.graph=printed"], ["3"]),
     "nan": ("velocity-sync", ["barrier.rho=nan"], ["barrier.rho", "nan", "finite"]),
     "nan in a list": (

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import reference
 from builders import FIVE, V0, reference_osnr
 from hypothesis import given
 from hypothesis import strategies as st
 
+import reference
 from gne_mj.equilibrium import (
     best_response,
     measured_epsilon,

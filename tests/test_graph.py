@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-import reference
 from hypothesis import given
 from hypothesis import strategies as st
 
+import reference
 from gne_mj import graph as graphs
 from gne_mj.errors import InvalidInput
 
@@ -31,7 +31,7 @@ def test_random_trees_with_extra_edges(count, random):
     assert np.all(graph.laplacian.sum(axis=1) == 0)
     assert graph.algebraic_connectivity > 0
     for i in range(count):
-        heard = graph.data.index[graph.data.pointer[i] : graph.data.pointer[i + 1]]
+        heard = graph.data.neighbour[graph.data.pointer[i] : graph.data.pointer[i + 1]]
         assert set(heard) == set(np.flatnonzero(graph.laplacian[i] < 0))
 
 

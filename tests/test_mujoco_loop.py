@@ -5,7 +5,6 @@ import ctypes
 import mujoco
 import numpy as np
 import pytest
-import reference
 from builders import (
     EQUAL,
     FIVE,
@@ -20,6 +19,7 @@ from builders import (
     run_loop,
 )
 
+import reference
 from gne_mj.errors import EngineError
 from gne_mj.loops import monitor as watch
 from gne_mj.plants.mujoco import MujocoPlant, passive_callback

@@ -7,18 +7,16 @@ Parameters q = [v_0, delta_1, ..., delta_N].
 """
 
 import sys
-from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
 
 
-def velocity_game(
-    agents: int, reference_velocity: float, gap_bound: float | Sequence[float]
-) -> Game:
+def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) -> Game:
     """The game of N robots that follow each other, the first one a reference velocity.
 
     Args:

@@ -1,0 +1,1 @@
+"""The native closed loops, one engine a file, and what they share."""

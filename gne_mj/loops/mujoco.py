@@ -168,7 +168,7 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
 
     def advance(mj_step, model, data, qpos, qvel, userdata, m, p, every, before, states, inputs):
         _ = source
-        monitor, u, work, state = parts_of(userdata, m, p, len(agent.STATES))
+        monitor, u, _work, _state = parts_of(userdata, m, p, len(agent.STATES))
         done = 0
         for sample in range(len(inputs)):
             for substep in range(every):

@@ -50,9 +50,7 @@ def stored(agent, channels, state):
 
 
 @kernel
-def begin_step(
-    agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work
-):
+def begin_step(agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work):
     """Measure, act and observe at the start of a step; u is changed. False if the run must end.
 
     storage is V^{x*} now (see :func:`stored`).
@@ -121,15 +119,11 @@ def runge_kutta_step(
     for r in range(n):
         trial[r] = state[r] + 0.5 * h * k1[r]
     half = time + 0.5 * h
-    if not rates(
-        agent, law, game, problem, channels, half, 1, trial, work.u, monitor, work, k2
-    ):
+    if not rates(agent, law, game, problem, channels, half, 1, trial, work.u, monitor, work, k2):
         return False
     for r in range(n):
         trial[r] = state[r] + 0.5 * h * k2[r]
-    if not rates(
-        agent, law, game, problem, channels, half, 2, trial, work.u, monitor, work, k3
-    ):
+    if not rates(agent, law, game, problem, channels, half, 2, trial, work.u, monitor, work, k3):
         return False
     for r in range(n):
         trial[r] = state[r] + h * k3[r]

@@ -1,0 +1,1 @@
+"""Agents, and the engines that move them; nothing here knows a controller."""

@@ -86,7 +86,9 @@ def passive_callback(at: Offsets) -> Any:
 
 
 @cache
-def _native() -> Any:
+def run_steps() -> Any:
+    """The native loop of plain mj_step: (address of mj_step, of the model, of the data, steps)."""
+
     @compiled
     def run(mj_step, model, data, steps):
         for _step in range(steps):
@@ -122,7 +124,9 @@ class MujocoPlant(Plant):
     ) -> None:
         if agents.kind is not flexible_robot:
             raise InvalidInput(
-                "plant.engine", "mujoco", f"only flexible robots have a model, not {agents.kind.NAME}s"
+                "plant.engine",
+                "mujoco",
+                f"only flexible robots have a model, not {agents.kind.NAME}s",
             )
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.model = compile_model(
@@ -185,4 +189,4 @@ class MujocoPlant(Plant):
         self.data.userdata[0] = self._table.address
         self.data.ctrl[self.places[:, ACTUATOR]] = u
         with callbacks(passive=passive_callback(offsets())):
-            _native()(step_address(), self.model._address, self.data._address, steps)
+            run_steps()(step_address(), self.model._address, self.data._address, steps)

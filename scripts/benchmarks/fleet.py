@@ -1,0 +1,137 @@
+"""The closed loop in MuJoCo against bare mj_step, and against a loop as one would write it."""
+
+import statistics
+import time
+
+import mujoco
+import numpy as np
+
+from gne_mj.controllers import FullInformation
+from gne_mj.games import velocity_game
+from gne_mj.plants import flexible_robot
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.fleet import compile_model, compose
+from gne_mj.plants.mujoco import run_steps
+from gne_mj.plants.native_mujoco import step_address
+from gne_mj.system import Clock, System
+
+H = 1e-3
+INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
+
+
+def rows(runs: int = 25) -> list[dict[str, str]]:
+    """Medians over ``runs`` turns; microseconds per integration step."""
+    return [
+        *_closed_loop(5, "euler", 20_000, runs, "<= 1.10"),
+        *_closed_loop(200, "euler", 1_000, runs, "<= 1.10"),
+        *_closed_loop(5, "rk4", 5_000, runs, ""),
+    ]
+
+
+def _closed_loop(
+    count: int, integrator: str, steps: int, runs: int, target: str
+) -> list[dict[str, str]]:
+    table = np.ones((count, len(flexible_robot.PARAMETERS)))
+    agents = Agents(flexible_robot, table, np.full(count, np.inf))
+    y = 3.0 - np.linspace(0.0, 2.0, count)
+    state = agents.equilibrium(y)
+    system = System(
+        "robots", velocity_game(count, 3.0, 3.0), agents, FullInformation(), 0.1, state,
+        engine="mujoco", integrator=integrator,
+    )  # fmt: skip
+    clock = Clock(H * steps, H, H, H * 100)
+    # The same model as in the loop, and one without anything for the eye.
+    same = system.closed_loop(clock).plant.model
+    plain = compile_model(
+        compose(table, decorated=False), timestep=H, integrator=INTEGRATORS[integrator]
+    )
+    script = _Script(same, y)
+    kinds = {
+        "ours": lambda: _ours(system, clock, steps),
+        "bare": lambda: _bare(same, state, steps),
+        "bare, plain model": lambda: _bare(plain, state, steps),
+        "Python loop": lambda: script.run(steps // 20) * 20,
+    }
+    times: dict[str, list[float]] = {name: [] for name in kinds}
+    for measure in kinds.values():
+        measure()  # warm
+    for _ in range(runs):
+        for name, measure in kinds.items():
+            times[name].append(1e6 * measure() / steps)
+    what = f"{count} robots, {integrator}, full information, continuous: us per step"
+    ours = statistics.median(times["ours"])
+    pairs = {
+        "bare": (target, "ours / bare mj_step of the same model"),
+        "bare, plain model": ("", "ours / bare mj_step without decoration"),
+        "Python loop": (">= 4" if integrator == "euler" else "", "Python loop / ours"),
+    }
+    result = []
+    for name, (goal, meaning) in pairs.items():
+        other = statistics.median(times[name])
+        ratios = [a / b for a, b in zip(times["ours"], times[name], strict=True)]
+        ratio = statistics.median(ratios)
+        result.append(
+            {
+                "what": f"{what}; {meaning}",
+                "ours": f"{ours:.2f}",
+                "other": f"{other:.2f}",
+                "ratio": f"{1 / ratio if name == 'Python loop' else ratio:.3f}",
+                "target": goal,
+            }
+        )
+    return result
+
+
+def _ours(system: System, clock: Clock, steps: int) -> float:
+    loop = system.closed_loop(clock)
+    started = time.perf_counter()
+    loop.advance(steps // 100, 100)
+    return time.perf_counter() - started
+
+
+def _start(model: mujoco.MjModel, state: np.ndarray) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    data.qvel[0::2] = state[:, 1]
+    data.qvel[1::2] = state[:, 2]
+    return data
+
+
+def _bare(model: mujoco.MjModel, state: np.ndarray, steps: int) -> float:
+    data = _start(model, state)
+    run = run_steps()
+    started = time.perf_counter()
+    run(step_address(), model._address, data._address, steps)
+    return time.perf_counter() - started
+
+
+class _Script:
+    """The loop as researchers write it: a NumPy law, the spring's atan term by Python."""
+
+    def __init__(self, model: mujoco.MjModel, y: np.ndarray) -> None:
+        self.model, self.y = model, y
+        self.delta, self.rho, self.v0 = 3.0, 0.1, 3.0
+
+    def spring(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        pull = np.arctan(data.qpos[0::2] - data.qpos[1::2])
+        data.qfrc_passive[0::2] -= pull
+        data.qfrc_passive[1::2] += pull
+
+    def law(self, data: mujoco.MjData) -> np.ndarray:
+        gap = np.diff(data.qvel[0::2], prepend=self.v0)
+        slope = 2.0 * gap * self.rho / (self.delta**2 - gap**2)
+        u = -2.0 * gap - slope
+        u[:-1] += slope[1:]
+        return u
+
+    def run(self, steps: int) -> float:
+        data = mujoco.MjData(self.model)
+        data.qvel[0::2] = data.qvel[1::2] = self.y
+        mujoco.set_mjcb_passive(self.spring)
+        try:
+            started = time.perf_counter()
+            for _ in range(steps):
+                data.ctrl[:] = self.law(data)
+                mujoco.mj_step(self.model, data)
+            return time.perf_counter() - started
+        finally:
+            mujoco.set_mjcb_passive(None)
