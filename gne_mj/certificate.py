@@ -32,7 +32,8 @@ class Certificate:
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
-        lyapunov: V^{x*} over the run, and whether the theory claims that it never rises.
+        lyapunov: V^{x*} over the run, and whether the theory claims that it never rises: for
+            full information in mode continuous, passive agents and no limit met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """
@@ -225,7 +226,13 @@ def _settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> 
 
 def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
-    claimed = system.mode == "continuous" and system.law.information == "full"
+    agents = system.agents
+    claimed = (
+        system.mode == "continuous"
+        and system.law.information == "full"
+        and agents.kind.is_passive(agents.parameters)
+        and not monitor[watch.SATURATED]
+    )
     return {
         "claimed": claimed,
         "start": start,

@@ -6,6 +6,7 @@ xarray alone can read it: ``xarray.open_datatree(folder, engine="zarr")``.
 
 import json
 import platform
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,6 +69,7 @@ class Trajectory:
                     "seed": seed,
                     "versions": json.dumps(_versions()),
                     "wall_time": wall_time,
+                    "status": _worst(part[3].status for part in parts.values()),
                 }
             )
         }
@@ -78,7 +80,7 @@ class Trajectory:
     @property
     def status(self) -> str:
         """The worst of the systems' statuses."""
-        return min((report["status"] for report in self.reports.values()), key=_ORDER.index)
+        return str(self.tree.attrs["status"])
 
     @property
     def holds(self) -> bool:
@@ -117,6 +119,10 @@ class Trajectory:
 
         with xarray.open_datatree(Path(folder), engine="zarr") as tree:
             return cls(tree.load())
+
+
+def _worst(statuses: Iterable[str]) -> str:
+    return min(statuses, key=_ORDER.index)
 
 
 def _dataset(

@@ -127,6 +127,7 @@ def test_an_input_limit_saturates_and_is_reported():
     assert saturated == {"agent": 1, "time": 0.0, "demand": pytest.approx(4.055), "limit": 2.5}
     assert report["actuators"]["peak"] == pytest.approx(4.055)
     assert max(report["actuators"]["rms"]) <= 2.5
+    assert not report["lyapunov"]["claimed"]
     data = simulate(robot_system(robot_state(FIVE), limit=2.5, engine="mujoco"))["robots"]
     assert np.max(np.abs(data["input"])) == 2.5
 
@@ -173,6 +174,7 @@ def test_the_printed_spring_diverges():
         trajectory = simulate(system, duration=200.0)
         assert trajectory.status in ("diverged", "left_feasible_set")
         assert not trajectory.holds
+        assert not trajectory.reports["robots"]["lyapunov"]["claimed"]
 
 
 def test_systems_do_not_wait_for_one_that_left():

@@ -27,6 +27,18 @@ STATES = (
 OUTPUT = 1
 
 
+def is_passive(parameters):
+    """Whether every robot meets Assumption [asmp:nonlinearPlant]; parameters (m, 5).
+
+    psi is strongly monotone, since its slope lies between stiffness and stiffness +
+    atan_coefficient, and the damper dissipates.
+    """
+    _, _, stiffness, atan_coefficient, damping = parameters.T
+    return bool(
+        np.all(np.minimum(stiffness, stiffness + atan_coefficient) > 0) & np.all(damping > 0)
+    )
+
+
 @kernel
 def pull(q, x):
     """Force of spring and damper on the appendage, in N (the main mass feels its opposite)."""

@@ -2,7 +2,8 @@
 
 Every agent module describes one channel, that is one scalar output with its input; an agent with
 an action of m_i entries is m_i such channels. It defines STATES (their names and units), OUTPUT
-(which of them is y), INPUT (how u enters x'), and the kernels below.
+(which of them is y), INPUT (how u enters x'), ``is_passive`` (whether given
+parameters meet the theory's assumption), and the kernels below.
 """
 
 from gne_mj.native import kernel
@@ -12,6 +13,11 @@ PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)
 OUTPUT = 0
 INPUT = (1.0,)
+
+
+def is_passive(parameters):
+    """Always: y' = u meets Assumption [asmp:nonlinearPlant]."""
+    return True
 
 
 @kernel

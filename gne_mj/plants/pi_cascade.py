@@ -7,6 +7,8 @@ r = k / (v - k); for v = 1, k = 1/2 it is [[2, -1], [-1, 1]].
 Channel parameters q = [v, k], both in 1/s.
 """
 
+import numpy as np
+
 from gne_mj.native import kernel
 
 NAME = "PI cascade"
@@ -14,6 +16,11 @@ PARAMETERS = ("decay_rate", "integral_gain")
 STATES = (("action", ""), ("integral", ""))
 OUTPUT = 0
 INPUT = (1.0, 1.0)
+
+
+def is_passive(parameters):
+    """Whether 0 < k < v for every channel; parameters (m, 2)."""
+    return bool(np.all((parameters[:, 1] > 0) & (parameters[:, 1] < parameters[:, 0])))
 
 
 @kernel
