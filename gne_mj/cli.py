@@ -53,7 +53,7 @@ def paper(
 ) -> None:
     """Run the paper's two experiments beside each other and draw its four figures.
 
-    Results of an earlier `paper` in the same folder are replaced.
+    Results of an earlier `paper` in the same folder are replaced; other files there stay.
     """
     trajectory = _simulate("paper", set_, out, quiet=as_json, replace=True, figures=("png",))
     _tell(trajectory, as_json)
@@ -200,8 +200,8 @@ def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
     if out is None:
         yield None
         return
-    # Only what an earlier run wrote is ever replaced.
-    if out.exists() and not (replace and (out / "report.json").is_file()):
+    earlier = (out / "report.json").is_file() and (out / "trajectory.zarr").is_dir()
+    if out.exists() and not (replace and earlier):
         raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -212,11 +212,22 @@ def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
         yield folder
         folder.chmod(0o755)
         if out.exists():
-            shutil.rmtree(out)
-        folder.rename(out)
+            _replace(folder, out)
+        else:
+            folder.rename(out)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+def _replace(folder: Path, out: Path) -> None:
+    """Move everything in ``folder`` into ``out``, in place of what has the same names there."""
+    for entry in sorted(folder.iterdir()):
+        old = out / entry.name
+        if old.is_dir():
+            shutil.rmtree(old)
+        entry.replace(old)
+    folder.rmdir()
 
 
 @contextmanager

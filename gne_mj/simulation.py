@@ -168,11 +168,11 @@ class _Run:
         if not self.inside:
             return
         started = real_time.perf_counter()
-        first = self.loop.time
+        first = self.clock.steps(self.loop.time)
         recorded = self.loop.advance(samples, every)
         self.wall_time += real_time.perf_counter() - started
-        rows = np.arange(len(recorded.input), dtype=np.float64)
-        self._times.append(first + rows * every * self.clock.timestep)
+        steps = first + every * np.arange(len(recorded.input))
+        self._times.append(steps * self.clock.timestep)
         self._samples.append(recorded)
 
     def finish(self) -> None:

@@ -175,7 +175,7 @@ def native(law, game):
 
 
 def act(game, law, y, estimates, z):
-    """(code, u, rates of the estimates, rates of z) of the distributed law, true weights unknown."""
+    """Code, u, rates of the estimates and of z by the distributed law, true weights unknown."""
     action, rate = native(law.kernels, game.kernels)
     memory, u, rates = (
         pack_memory(estimates, z),

@@ -65,7 +65,7 @@ def full_information_cases():
 @pytest.mark.parametrize("name", full_information_cases())
 def test_full_information_equals_a_plain_rk4(name):
     system, agent, game = full_information_cases()[name]
-    h, steps = 0.005, 400
+    h, steps = (0.001, 200) if game.N == 10 else (0.005, 400)
     rate = reference.closed_loop_rate(agent, "full_information", game, RHO)
     expected = reference.rk4_fixed(rate, system.state[:, : agent.n].ravel(), h, steps)
     states, u, _, loop = run_loop(system, h, steps)
@@ -85,7 +85,7 @@ def test_fully_distributed_equals_a_plain_rk4(name, graph):
         "PI cascades": (pi_cascades(10), reference_pi(10)),
     }[name]
     law = distributed(graph, epsilon=0.1, gain=0.1)
-    system, game, h, steps = osnr_system(agents, law, powers()), reference_osnr(), 0.01, 100
+    system, game, h, steps = osnr_system(agents, law, powers()), reference_osnr(), 0.001, 60
     rate = reference.closed_loop_rate(
         agent, "fully_distributed", game, RHO,
         laplacian=reference.laplacian(10, law.graph.edges), k=0.1, epsilon=0.1,
@@ -99,7 +99,7 @@ def test_fully_distributed_equals_a_plain_rk4(name, graph):
         np.concatenate([x.ravel(), row[100:], row[:100].reshape(10, 10)[others]])
         for x, row in zip(states, memory, strict=True)
     ]
-    assert np.max(np.abs(expected[-1] - expected[0])) > 0.01
+    assert np.max(np.abs(expected[-1] - expected[0])) > 1e-3
     assert relative_error(np.array(got), expected) < 1e-11
 
 
@@ -148,7 +148,7 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
 @pytest.mark.parametrize("graph", ["line", "printed"])
 def test_sampled_distributed_equals_a_plain_loop(graph):
     """Several periods, agents moving in between: law, hold, plant, exponential."""
-    epsilon, gain, h, substeps, periods = 0.1, 0.1, 0.005, 4, 25
+    epsilon, gain, h, substeps, periods = 0.1, 0.1, 0.0005, 4, 25
     law = distributed(graph, epsilon, gain)
     system = osnr_system(pi_cascades(10), law, powers(), mode="sampled")
     agent, game = reference_pi(10), reference_osnr()
@@ -302,7 +302,7 @@ def test_splitting_a_run_changes_no_bit(engine, mode, integrator):
 def test_splitting_a_distributed_run_changes_no_bit(mode):
     law = distributed(epsilon=0.1, gain=0.1)
     system = osnr_system(pi_cascades(10), law, powers(), mode=mode)
-    whole, pieces, looked = splits(lambda: system.closed_loop(clock(0.004, 1.0, 0.02)))
+    whole, pieces, looked = splits(lambda: system.closed_loop(clock(0.0005, 1.0, 0.0025)))
     for other in (pieces, looked):
         for first, second in zip(whole, other, strict=True):
             assert np.array_equal(first, second)
@@ -334,25 +334,40 @@ def stages(rate, game, x, h):
     yield x + h * k3
 
 
+def steep_start(start):
+    """Robots at these gaps; or, for a number, random ones with appendages kicked hard."""
+    if isinstance(start, int):
+        return random_robot_state(np.random.default_rng(start), 0.9 * DELTA, spread=12.0)
+    return robot_state(V0 + np.cumsum(start))
+
+
 @ENGINES
 @pytest.mark.parametrize(
-    ("gaps", "h"),
-    [([-2.99, 2.98, 0.0, 0.0, 0.0], 0.1), ([-2.99, 2.98, 0.0, 0.0, 0.0], 0.2),
-     ([2.9, -2.5, 2.5, 0.0, 0.0], 0.4), ([0.0, 2.95, 0.0, 1.0, 0.0], 0.15),
-     ([2.0, 1.5, 1.0, 2.0, 2.0], 0.6)],
-)  # fmt: skip
-def test_an_exit_at_a_later_stage_is_latched(engine, gaps, h):
-    state = robot_state(V0 + np.cumsum(gaps))
+    ("start", "h"),
+    [
+        ([-2.99, 2.98, 0.01, 0.0, 0.0], 0.2),
+        ([2.99, -2.99, 2.99, -2.99, 0.0], 0.1),
+        ([0.0, 2.995, 0.0, -2.995, 0.0], 0.1),
+        ([0.0, 2.995, 0.0, -2.995, 0.0], 0.4),
+        (2, 0.1),  # in the fifth step, at its last stage
+        (5, 0.1),
+        (12, 0.2),
+        (37, 0.1),
+    ],
+)
+def test_an_exit_at_a_later_stage_is_latched(engine, start, h):
+    state, steps = steep_start(start), 20
     game = reference.VelocityGame(V0, DELTA)
     robot = reference_robots({key: [1.0] * 5 for key in UNEQUAL})
     rate = reference.closed_loop_rate(robot, "full_information", game, RHO)
     system = robot_system(state, engine=engine)
-    loop = system.closed_loop(clock(h, 20 * h))
-    recorded = loop.advance(20, 1)
+    loop = system.closed_loop(clock(h, steps * h))
+    recorded = loop.advance(steps, 1)
     monitor = loop.monitor
     assert monitor[watch.EXIT] == watch.LEFT_SET
     assert monitor[watch.EXIT_AGENT] == -1
     stage = int(monitor[watch.EXIT_STAGE])
+    assert stage > 0
     done = round(loop.time / h)
     before = loop.finish().state[0]
     assert len(recorded.input) == done + (stage > 0)
@@ -374,18 +389,6 @@ def test_an_exit_at_a_later_stage_is_latched(engine, gaps, h):
     assert len(loop.advance(3, 1).input) == 0 or stage > 0
     assert loop.time == pytest.approx(done * h)
     assert np.array_equal(loop.monitor[watch.EXIT : watch.STEPS], latched[watch.EXIT : watch.STEPS])
-
-
-def test_at_least_one_exit_is_at_a_later_stage():
-    seen = set()
-    for h in (0.05, 0.1, 0.2, 0.4):
-        for engine in ("ode", "mujoco"):
-            loop = robot_system(
-                robot_state(V0 + np.array([-2.99, -0.01, 0.0, 0.0, 0.0])), engine=engine
-            ).closed_loop(clock(h, 20 * h))
-            loop.advance(20, 1)
-            seen.add((engine, loop.monitor[watch.EXIT_STAGE] > 0))
-    assert {("ode", True), ("mujoco", True)} <= seen
 
 
 def test_an_estimate_that_leaves_at_a_later_stage_is_latched():

@@ -38,7 +38,7 @@ def osnr_game(
         system_matrix: Gamma >= 0, shape (N, N); its diagonal is not used.
         total_power_limit: P_0 > 0 in mW.
     """
-    agents = len(price)
+    agents = np.size(price)
     columns = {
         "price": price,
         "utility_weight": utility_weight,

@@ -279,6 +279,8 @@ class MujocoLoop(ClosedLoop):
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
+        if self.monitor[watch.EXIT] != watch.INSIDE:
+            samples = 0
         data = self.plant.data
         rows, inputs = np.empty((samples, *self._before.shape)), np.empty((samples, self._m))
         # The callback counts steps and stages; a step that ended in an exit is not one of them.

@@ -238,6 +238,8 @@ class OdeLoop(ClosedLoop):
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
+        if self.monitor[watch.EXIT] != watch.INSIDE:
+            samples = 0
         states, inputs = np.empty((samples, len(self._state))), np.empty((samples, len(self._u)))
         done, self._step = self._advance(
             *self._fixed, self._step, every, self._state, self._u, self.monitor, self._work,
