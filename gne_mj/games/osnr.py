@@ -3,7 +3,7 @@
 J_i = a_i y_i - b_i ln(1 + c_i y_i / (n0_i + sum_{j != i} Gamma_ij y_j)) with powers y in mW and
 the shared constraints y_i >= 0 (i = 1..N) and sum y <= P_0, in this order.
 
-Parameters q = [N, P_0, a (N), b (N), c (N), n0 (N), Gamma (N x N, by rows, diagonal unused)].
+Parameters q = [N, P_0, a (N), b (N), c (N), n0 (N), Gamma (N x N, by rows, its diagonal zero)].
 """
 
 import json
@@ -92,8 +92,7 @@ def disturbance(q, i, y):
     row = 2 + 4 * n + i * n
     total = q[2 + 3 * n + i]
     for j in range(n):
-        if j != i:
-            total += q[row + j] * y[j]
+        total += q[row + j] * y[j]  # Gamma_ii is zero
     return total
 
 
@@ -122,7 +121,8 @@ def add_cost_hessian(q, i, a, y, scale, out):
     factor = scale * b * c / (received * received)
     row = 2 + 4 * n + i * n
     for j in range(n):
-        out[j] += factor * (c if j == i else q[row + j])
+        out[j] += factor * q[row + j]
+    out[i] += factor * c
 
 
 @kernel

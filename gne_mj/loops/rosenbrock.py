@@ -1,22 +1,12 @@
 """The stiff closed loop of ODE agents under the fully distributed law, by a Rosenbrock method.
 
 Small epsilon makes the estimates and z of [eq:CentreDynamics2] fast, so that explicit methods
-crawl. RODAS is L-stable, stiffly accurate and of order 4, its steps hardly depend on epsilon, and
-the structure of the loop keeps them cheap. With s = 1 / (gamma h), each stage solves
-(s I - J) k = r, with J the loop's Jacobian at the start of the step, as follows.
+crawl. Rodas5P (:mod:`gne_mj.loops.rodas`) is L-stable, its steps hardly depend on epsilon, and the
+structure of the loop keeps them cheap (:mod:`gne_mj.loops.stage_system`).
 
-- Column r of the estimates (one action y_r of agent j) obeys epsilon e' = -L_j e for its errors,
-  L_j being the Laplacian without row and column j. In L_j's eigenbasis (eigenvalues lambda, modes
-  w, w = Q'1 y_r at rest) the equation is diagonal: k_w = (epsilon r_w + lambda Q'1 k_y) /
-  (epsilon s + lambda). Back in the agents' own coordinates that is k_e = p + T k_y, p known.
-- z likewise: k_z = (epsilon r_z + k_y) / (epsilon s + 1).
-- A channel x' = f(x) + G u answers by itself: k_x = (s I - A)^-1 (r_x + G k_u), A = df/dx.
-- The law ties them: k_u = U_y k_y + U_z k_z + U_e k_e. Put together, one system of m equations
-  remains for k_u, and it alone is factorised. It is solved for what the answers without inputs
-  (k_u = 0) leave over.
-
-The modes are integrated beside the estimates that the law reads; since the method commutes with
-linear maps, both are the same solution.
+The loop's flat vector holds the channels' states, the law's memory, and behind them the estimates'
+modes. The modes are integrated beside the estimates that the law reads; since the method commutes
+with linear maps, both are the same solution.
 """
 
 from functools import cache
@@ -26,174 +16,38 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.controllers.settings import EPSILON, GAIN, RHO
+from gne_mj.controllers.settings import EPSILON
 from gne_mj.graph import Graph
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
+from gne_mj.loops.estimate_modes import add_from_modes, modes_of, to_modes
 from gne_mj.loops.feedback import Problem, feedback, work
+from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure, stored
+from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
+from gne_mj.loops.stage_system import StageSystem, linearise, prepare, solve_stage, stage_system
 from gne_mj.native import compiled, copy, kernel, source_key
 from gne_mj.plants.ode import Channels
 
-STAGES = 6
-# RODAS, the first set of coefficients of E. Hairer's RODAS code (rodas.f, METH = 1), described in
-# E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd edition, section VI.4.
-# Stage i solves (I / (gamma h) - J) k_i = f(x + sum_j STAGE_ij k_j) + sum_j RATE_ij k_j / h; the
-# last row of STAGE gives the new state, and k_6 its difference from the embedded solution of
-# order 3.
-GAMMA = 0.25
-_FIFTH = (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.687886036105895)
-_STAGE: tuple[tuple[float, ...], ...] = (
-    (),
-    (1.544,),
-    (0.9466785280815826, 0.2557011698983284),
-    (3.314825187068521, 2.896124015972201, 0.9986419139977817),
-    _FIFTH,
-    (*_FIFTH, 1.0),
-    (*_FIFTH, 1.0, 1.0),
-)
-_RATE: tuple[tuple[float, ...], ...] = (
-    (),
-    (-5.6688,),
-    (-2.430093356833875, -0.2063599157091915),
-    (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
-    (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.7089089320616),
-    (
-        8.083246795921522,
-        -7.981132988064893,
-        -31.52159432874371,
-        16.31930543123136,
-        -6.058818238834054,
-    ),
-)
-# Dense output of order 3 at x0 + theta h, with theta' = 1 - theta:
-# theta' x0 + theta (x1 + theta' (sum_j DENSE_0j k_j + theta sum_j DENSE_1j k_j)).
-_DENSE = (
-    (10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823,
-     1.025137723295662),
-    (-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386,
-     -6.594389125716872),
-)  # fmt: skip
-
-# How the step is chosen: Gustafsson's predictive controller with the figures of RODAS.
+# How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
 SAFETY, GROW, SHRINK = 0.9, 6.0, 0.2
+POWER = 1.0 / ORDER
 SMALLEST = 1e-12  # step in s per max(1, time) below which a run ends
 
 # Entries of a loop's `progress`: the last accepted step runs from START to END.
 START, END, NEXT, LAST_STEP, LAST_ERROR, ACCEPTED, REJECTED, COUNT = range(8)
 
 
-class Method(NamedTuple):
-    """The coefficients as arrays, and what accuracy is asked for."""
-
-    stage: np.ndarray  # (7, 6)
-    rate: np.ndarray  # (6, 6)
-    dense: np.ndarray  # (2, 6)
-    rtol: float
-    atol: float
-
-
-class Modes(NamedTuple):
-    """The estimates' dynamics in their eigenbases; a column is one entry of a profile."""
-
-    owner: np.ndarray  # (m,) the agent that each column belongs to
-    rates: np.ndarray  # (N - 1, m) eigenvalues lambda of the owner's L_j
-    rest: np.ndarray  # (N - 1, m) Q'1, the modes at rest for an action of 1
-    vectors: np.ndarray  # (N - 1, N, m) Q, by mode, agent and column; zero for the owner itself
-
-
 class Solver(NamedTuple):
-    """Arrays that a step works on. n is the flat state's length, w that of the modes."""
+    """Arrays that a step works on; n is the length of states and memory, w that of the modes."""
 
-    inputs: np.ndarray  # (m, states) G, read-only
-    modes: np.ndarray  # (w,) modes at END
-    trial: np.ndarray  # (n,) state at a stage
-    trial_modes: np.ndarray  # (w,)
-    k: np.ndarray  # (6, n)
-    k_modes: np.ndarray  # (6, w)
-    dense: np.ndarray  # (4, n) what the dense output of the last accepted step needs
+    trial: np.ndarray  # (n + w,) the flat vector at a stage
+    k: np.ndarray  # (STAGES, n + w)
+    dense: np.ndarray  # (5, n) what the dense output of the last accepted step needs
     greatest: np.ndarray  # (states,) each state's greatest magnitude so far
     exit: np.ndarray  # why the last stage failed, as the monitor's header
     u: np.ndarray  # (m,) input at a stage
-    known: np.ndarray  # (w,) a stage's k_modes but for what k_y adds
-    pull: np.ndarray  # (w,) what k_y adds, for a k_y of 1
-    decay: np.ndarray  # (w,) 1 / (epsilon s + lambda)
-    spread: np.ndarray  # (N m,) T
-    local: np.ndarray  # (m, states, states) A
-    resolvent: np.ndarray  # (m, states, states) (s I - A)^-1 by columns, that is transposed
-    small: np.ndarray  # (states, states) s I - A of one channel, factorised
-    small_pivot: np.ndarray  # (states,)
-    response: np.ndarray  # (m, states) (s I - A)^-1 G
-    own: np.ndarray  # (m, m) du / dy and, off the agents' own blocks, du / d estimate
-    filtered: np.ndarray  # (m, m) du / dz
-    matrix: np.ndarray  # (m, m) of the reduced system, factorised
-    pivot: np.ndarray  # (m,)
-    k_x: np.ndarray  # (states,) one channel's
-    k_y: np.ndarray  # (m,)
-    k_u: np.ndarray  # (m,)
-
-
-@kernel
-def factorise(matrix, pivot):
-    """LU with partial pivoting, in place, the diagonal as its reciprocals; False if singular."""
-    n = len(pivot)
-    for c in range(n):
-        best = c
-        for r in range(c + 1, n):
-            if abs(matrix[r, c]) > abs(matrix[best, c]):
-                best = r
-        pivot[c] = best
-        if not 0.0 < abs(matrix[best, c]) < np.inf:
-            return False
-        if best != c:
-            for k in range(n):
-                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
-        inverse = 1.0 / matrix[c, c]
-        for r in range(c + 1, n):
-            factor = matrix[r, c] * inverse
-            matrix[r, c] = factor
-            for k in range(c + 1, n):
-                matrix[r, k] -= factor * matrix[c, k]
-        matrix[c, c] = inverse
-    return True
-
-
-@kernel
-def substitute(matrix, pivot, b):
-    """Solve in place with what :func:`factorise` left."""
-    n = len(b)
-    for c in range(n):
-        b[c], b[pivot[c]] = b[pivot[c]], b[c]
-    for r in range(1, n):
-        total = b[r]
-        for c in range(r):
-            total -= matrix[r, c] * b[c]
-        b[r] = total
-    for back in range(n):
-        r = n - 1 - back
-        total = b[r]
-        for c in range(r + 1, n):
-            total -= matrix[r, c] * b[c]
-        b[r] = total * matrix[r, r]
-
-
-@kernel
-def add_multiple(scale, source, target):
-    """target += scale * source."""
-    for r in range(len(target)):
-        target[r] += scale * source[r]
-
-
-@kernel
-def add_from_modes(vectors, modes, memory):
-    """memory += the estimates that belong to these modes (nothing in the agents' own blocks)."""
-    count, agents, m = vectors.shape
-    for a in range(count):
-        amount = modes[a * m : (a + 1) * m]
-        for i in range(agents):
-            row, vector = memory[i * m : (i + 1) * m], vectors[a, i]
-            for r in range(m):
-                row[r] += vector[r] * amount[r]
+    system: StageSystem
 
 
 @kernel
@@ -213,175 +67,6 @@ def look(
 
 
 @kernel
-def linearise(agent, game, problem, channels, states, state, u, work, solver):
-    """Fill the law's and the channels' derivatives at a state that :func:`look` has just seen."""
-    data = problem.data
-    at, q = data.offsets, data.parameters
-    m, agents = len(u), len(at) - 1
-    gain, rho = problem.settings[GAIN], problem.settings[RHO]
-    memory = state[m * states :]
-    z, profile = memory[agents * m :], work.profile
-    own, filtered = solver.own, solver.filtered
-    for r in range(m):
-        x = state[r * states : (r + 1) * states]
-        agent.jacobian(channels.parameters[r], x, solver.local[r])
-        for c in range(m):
-            own[r, c] = 0.0
-            filtered[r, c] = 0.0
-    for i in range(agents):
-        first, last = at[i], at[i + 1]
-        copy(memory[i * m : (i + 1) * m], profile)
-        copy(work.y[first:last], profile[first:last])
-        for a in range(first, last):
-            game.add_cost_hessian(q, i, a, profile, -gain, own[a])
-        copy(z[first:last], profile[first:last])
-        for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
-            k = data.own_index[entry]
-            room = -game.constraint(q, k, profile)
-            weight = -gain * rho / room
-            for a in range(first, last):
-                mine = game.constraint_gradient(q, k, a, profile) / room
-                for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
-                    j = data.member_index[member]
-                    target = filtered[a] if j == i else own[a]
-                    for b in range(at[j], at[j + 1]):
-                        other = game.constraint_gradient(q, k, b, profile)
-                        second = game.constraint_hessian(q, k, a, b, profile)
-                        target[b] += weight * (second + mine * other)
-    for r in range(m):
-        if u[r] != work.demand[r]:  # an input at its limit does not answer
-            for c in range(m):
-                own[r, c] = 0.0
-                filtered[r, c] = 0.0
-
-
-@kernel
-def prepare(agent, problem, modes, states, h, solver):
-    """Factorise for steps of length h from where the loop was linearised; False if singular."""
-    m = len(solver.k_u)
-    epsilon = problem.settings[EPSILON]
-    s = 1.0 / (GAMMA * h)
-    for a in range(len(modes.rates)):
-        decay, pull = solver.decay[a * m : (a + 1) * m], solver.pull[a * m : (a + 1) * m]
-        rates, rest = modes.rates[a], modes.rest[a]
-        for r in range(m):
-            decay[r] = 1.0 / (epsilon * s + rates[r])
-            pull[r] = rates[r] * rest[r] * decay[r]
-    for r in range(len(solver.spread)):
-        solver.spread[r] = 0.0
-    add_from_modes(modes.vectors, solver.pull, solver.spread)
-    filter_gain = 1.0 / (epsilon * s + 1.0)
-    small = solver.small
-    for r in range(m):
-        for a in range(states):
-            for b in range(states):
-                small[a, b] = -solver.local[r, a, b]
-            small[a, a] += s
-        if not factorise(small, solver.small_pivot):
-            return False
-        response = solver.response[r]
-        for a in range(states):
-            response[a] = 0.0
-        for b in range(states):
-            column = solver.resolvent[r, b]
-            for a in range(states):
-                column[a] = 0.0
-            column[b] = 1.0
-            substitute(small, solver.small_pivot, column)
-            add_multiple(solver.inputs[r, b], column, response)
-    for r in range(m):
-        i = modes.owner[r]
-        for c in range(m):
-            slope = solver.own[r, c]
-            if modes.owner[c] == i:
-                slope += filter_gain * solver.filtered[r, c]
-            else:
-                slope *= solver.spread[i * m + c]
-            solver.matrix[r, c] = -slope * solver.response[c, agent.OUTPUT]
-        solver.matrix[r, r] += 1.0
-    return factorise(solver.matrix, solver.pivot)
-
-
-@kernel
-def solve_stage(agent, problem, channels, modes, method, states, h, stage, solver):
-    """Fill k and k_modes of one stage from the trial state and the input there."""
-    at = problem.data.offsets
-    m, agents = len(solver.k_u), len(at) - 1
-    epsilon = problem.settings[EPSILON]
-    s = 1.0 / (GAMMA * h)
-    filter_gain = 1.0 / (epsilon * s + 1.0)
-    size = m * states
-    last = size + agents * m
-    k, k_modes = solver.k[stage], solver.k_modes[stage]
-    k_x, k_e, k_z = k[:size], k[size:last], k[last:]
-    k_y, k_u = solver.k_y, solver.k_u
-    # the right-hand sides
-    for r in range(m):
-        x = solver.trial[r * states : (r + 1) * states]
-        agent.rate(channels.parameters[r], x, solver.u[r], k_x[r * states : (r + 1) * states])
-        k_y[r] = x[agent.OUTPUT]
-        k_z[r] = k_y[r] - solver.trial[last + r]
-    for a in range(len(modes.rates)):
-        one, amount = k_modes[a * m : (a + 1) * m], solver.trial_modes[a * m : (a + 1) * m]
-        rates, rest = modes.rates[a], modes.rest[a]
-        for r in range(m):
-            one[r] = rates[r] * (rest[r] * k_y[r] - amount[r])
-    for j in range(stage):
-        scale = method.rate[stage, j] / h
-        add_multiple(scale, solver.k[j, :size], k_x)
-        add_multiple(epsilon * scale, solver.k[j, last:], k_z)
-        add_multiple(epsilon * scale, solver.k_modes[j], k_modes)
-    # answers without inputs
-    for r in range(m):
-        x = k_x[r * states : (r + 1) * states]
-        for a in range(states):
-            total = 0.0
-            for b in range(states):
-                total += solver.resolvent[r, b, a] * x[b]
-            solver.k_x[a] = total
-        for a in range(states):
-            x[a] = solver.k_x[a]
-        k_y[r] = x[agent.OUTPUT]
-        k_z[r] = filter_gain * (k_z[r] + k_y[r])
-    for r in range(len(k_modes)):
-        solver.known[r] = solver.decay[r] * k_modes[r]
-    for i in range(agents):
-        row, spread = k_e[i * m : (i + 1) * m], solver.spread[i * m : (i + 1) * m]
-        for r in range(m):
-            row[r] = spread[r] * k_y[r]
-        copy(k_y[at[i] : at[i + 1]], row[at[i] : at[i + 1]])  # the own action, until below
-    add_from_modes(modes.vectors, solver.known, k_e)
-    for r in range(m):
-        i = modes.owner[r]
-        total = 0.0
-        for c in range(m):
-            total += solver.own[r, c] * k_e[i * m + c]
-        for c in range(at[i], at[i + 1]):
-            total += solver.filtered[r, c] * k_z[c]
-        k_u[r] = total
-    substitute(solver.matrix, solver.pivot, k_u)
-    # what the inputs add
-    for r in range(m):
-        response = solver.response[r]
-        for a in range(states):
-            k_x[r * states + a] += k_u[r] * response[a]
-        k_u[r] *= response[agent.OUTPUT]
-        k_y[r] += k_u[r]
-        k_z[r] += filter_gain * k_u[r]
-    for i in range(agents):
-        row, spread = k_e[i * m : (i + 1) * m], solver.spread[i * m : (i + 1) * m]
-        for r in range(m):
-            row[r] += spread[r] * k_u[r]
-        for r in range(at[i], at[i + 1]):
-            row[r] = 0.0
-    for a in range(len(modes.rates)):
-        one, known = k_modes[a * m : (a + 1) * m], solver.known[a * m : (a + 1) * m]
-        pull = solver.pull[a * m : (a + 1) * m]
-        for r in range(m):
-            one[r] = known[r] + pull[r] * k_y[r]
-
-
-@kernel
 def error_of(agent, agents, method, states, state, solver):
     """Weighted estimate of the step's error, 1 being what is allowed: the worst of all states.
 
@@ -389,10 +74,9 @@ def error_of(agent, agents, method, states, state, solver):
     with that of the output; a column of estimates counts by its root mean square, which is that
     of its modes.
     """
-    m = len(solver.k_u)
-    k, k_modes = solver.k[STAGES - 1], solver.k_modes[STAGES - 1]
-    size = m * states
-    last = size + agents * m
+    m = len(solver.u)
+    k = solver.k[STAGES - 1]
+    at_z = m * states + agents * m
     worst = 0.0
     for a in range(states):
         allowed = method.atol + method.rtol * magnitude(states, state, solver, a)
@@ -400,10 +84,10 @@ def error_of(agent, agents, method, states, state, solver):
             error = abs(k[r * states + a])
             if a == agent.OUTPUT:
                 total = 0.0
-                for mode in range(agents - 1):
-                    total += k_modes[mode * m + r] ** 2
-                error = max(error, abs(k[last + r]), np.sqrt(total / max(agents - 1, 1)))
-                error += 0.0 * (total + k[last + r])  # not a number if one of them is not
+                for mode in range(at_z + m + r, len(k), m):
+                    total += k[mode] ** 2
+                error = max(error, abs(k[at_z + r]), np.sqrt(total / max(agents - 1, 1)))
+                error += 0.0 * (total + k[at_z + r])  # not a number if one of them is not
             error /= allowed
             if not error < np.inf:
                 return np.inf
@@ -415,7 +99,7 @@ def error_of(agent, agents, method, states, state, solver):
 def magnitude(states, state, solver, a):
     """Greatest magnitude of the channels' state a so far and at ``state``."""
     greatest = solver.greatest[a]
-    for r in range(len(solver.k_u)):
+    for r in range(len(solver.u)):
         greatest = max(greatest, abs(state[r * states + a]))
     return greatest
 
@@ -424,60 +108,87 @@ def magnitude(states, state, solver, a):
 def try_step(
     law, agent, game, problem, channels, modes, method, states, time, h, state, u, work, solver
 ):  # fmt: skip
-    """Fill trial with the state after a step of length h; return its weighted error.
+    """Fill trial with the flat vector after a step of length h; return its weighted error.
 
     The error is infinite, and solver.exit says why, if a stage or the new state is not inside.
     """
     size, agents = len(u) * states, len(problem.data.offsets) - 1
+    trial, k = solver.trial, solver.k
     solver.exit[watch.EXIT] = watch.INSIDE
-    if not prepare(agent, problem, modes, states, h, solver):
+    if not prepare(agent, problem, modes, states, h, solver.system):
         watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, np.inf, 1)
         return np.inf
     copy(u, solver.u)
     for stage in range(STAGES + 1):
-        copy(state, solver.trial)
-        copy(solver.modes, solver.trial_modes)
-        for j in range(stage):
-            scale = method.stage[stage, j]
-            add_multiple(scale, solver.k[j], solver.trial)
-            add_multiple(scale, solver.k_modes[j], solver.trial_modes)
+        if stage < ADDING:
+            copy(state, trial)
+            for j in range(stage):
+                add_multiple(method.stage[stage, j], k[j], trial)
+        else:
+            add_multiple(1.0, k[stage - 1], trial)
         if stage > 0:
-            measure(agent, solver.trial, states, work.y)
+            measure(agent, trial, states, work.y)
             if not feedback(
-                law, game, problem, time, stage, work.y, solver.trial[size:], work,
-                solver.exit, solver.u,
+                law, game, problem, time, stage, work.y, trial[size:], work, solver.exit,
+                solver.u,
             ):  # fmt: skip
                 return np.inf
         if stage < STAGES:
-            solve_stage(agent, problem, channels, modes, method, states, h, stage, solver)
-    error = error_of(agent, agents, method, states, solver.trial, solver)
+            solve_stage(
+                agent, problem, channels, modes, method, states, h, stage, trial, solver.u, k,
+                solver.system,
+            )  # fmt: skip
+    error = error_of(agent, agents, method, states, trial, solver)
     if not error <= 1.0:  # latched only if the run ends here
         watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, error, STAGES)
     return error
 
 
 @kernel
+def look_ahead(law, agent, game, problem, states, time, state, work, solver):
+    """Tell in solver.exit if the boundary is why even the smallest step has failed.
+
+    Next to the boundary the demand grows so fast that no step is accurate. The trial vector is
+    moved on along the step, until it is outside or a microsecond away.
+    """
+    y, trial = work.y, solver.trial
+    size = len(y) * states
+    for _ in range(20):
+        for r in range(len(trial)):
+            trial[r] += trial[r] - state[r]
+        measure(agent, trial, states, y)
+        why = solver.exit[watch.EXIT]
+        solver.exit[watch.EXIT] = watch.INSIDE
+        if not feedback(
+            law, game, problem, time, STAGES, y, trial[size:], work, solver.exit, solver.u
+        ) and solver.exit[watch.EXIT] != watch.DIVERGED:  # fmt: skip
+            return
+        solver.exit[watch.EXIT] = why
+
+
+@kernel
 def accept(problem, modes, method, states, h, progress, state, solver):
     """Move to the trial state, and keep what the dense output of the step needs."""
     at = problem.data.offsets
-    m, agents = len(solver.k_u), len(at) - 1
-    copy(state, solver.dense[0])
+    m, agents = len(solver.u), len(at) - 1
+    size, n = m * states, solver.dense.shape[1]
+    copy(state[:n], solver.dense[0])
     copy(solver.trial, state)
-    copy(solver.trial_modes, solver.modes)
     # anew from the modes, so that rounding does not add up in the estimates
-    memory = state[m * states :]
+    estimates = state[size : size + agents * m]
     for i in range(agents):
+        row = estimates[i * m : (i + 1) * m]
         for r in range(at[i]):
-            memory[i * m + r] = 0.0
+            row[r] = 0.0
         for r in range(at[i + 1], m):
-            memory[i * m + r] = 0.0
-    add_from_modes(modes.vectors, solver.modes, memory)
-    copy(state, solver.dense[1])
-    for line in range(2):
+            row[r] = 0.0
+    add_from_modes(modes.vectors, state[n:], estimates)
+    copy(state[:n], solver.dense[1])
+    for line in range(len(method.dense)):
         out = solver.dense[2 + line]
-        for r in range(len(out)):
+        for r in range(n):
             out[r] = 0.0
-        for j in range(STAGES - 1):
+        for j in range(STAGES):
             add_multiple(method.dense[line, j], solver.k[j], out)
     for a in range(states):
         solver.greatest[a] = magnitude(states, state, solver, a)
@@ -498,7 +209,7 @@ def step_on(
     ):  # fmt: skip
         return False
     monitor[watch.STEPS] = progress[ACCEPTED]
-    linearise(agent, game, problem, channels, states, state, u, work, solver)
+    linearise(agent, game, problem, channels, states, state, u, work, solver.system)
     h, retried = progress[NEXT], False
     while True:
         smallest = SMALLEST * max(1.0, time)
@@ -512,6 +223,8 @@ def step_on(
             break
         if h == smallest:
             why = solver.exit
+            if why[watch.EXIT] == watch.DIVERGED:
+                look_ahead(law, agent, game, problem, states, time, state, work, solver)
             watch.leave(
                 monitor, int(why[watch.EXIT]), time, why[watch.EXIT_AGENT],
                 why[watch.EXIT_CONSTRAINT], why[watch.EXIT_VALUE], why[watch.EXIT_STAGE],
@@ -519,12 +232,13 @@ def step_on(
             return False
         progress[REJECTED] += 1.0
         retried = True
-        h *= max(SHRINK, SAFETY * error**-0.25) if error < np.inf else 0.5
+        h *= max(SHRINK, SAFETY * error**-POWER) if error < np.inf else 0.5
     accept(problem, modes, method, states, h, progress, state, solver)
-    factor = min(GROW, SAFETY * max(error, 1e-12) ** -0.25)
+    error = max(error, 1e-12)
+    factor = min(GROW, SAFETY * error**-POWER)
     if progress[LAST_STEP] > 0.0:
         trend = SAFETY * h / progress[LAST_STEP]
-        factor = min(factor, trend * (progress[LAST_ERROR] / max(error, 1e-12) ** 2) ** 0.25)
+        factor = min(factor, trend * (progress[LAST_ERROR] / error**2) ** POWER)
     factor = max(factor, SHRINK)
     progress[NEXT] = h * (min(factor, 1.0) if retried else factor)
     progress[LAST_STEP] = h
@@ -534,13 +248,13 @@ def step_on(
 
 @kernel
 def interpolate(progress, time, dense, out):
-    """Fill out with the state at a time in the last accepted step."""
+    """Fill out (n,) with states and memory at a time in the last accepted step."""
     length = progress[END] - progress[START]
     theta = (time - progress[START]) / length if length > 0.0 else 1.0
     rest = 1.0 - theta
-    before, after, second, third = dense[0], dense[1], dense[2], dense[3]
     for r in range(len(out)):
-        out[r] = rest * before[r] + theta * (after[r] + rest * (second[r] + theta * third[r]))
+        bend = dense[2, r] + theta * (dense[3, r] + theta * dense[4, r])
+        out[r] = rest * dense[0, r] + theta * (dense[1, r] + rest * bend)
 
 
 @cache
@@ -594,26 +308,6 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
     return advance, finish
 
 
-def modes_of(graph: Graph, owner: NDArray[np.int64]) -> Modes:
-    """The estimates' eigenbases, for a graph and the agent that each column belongs to."""
-    agents, m = graph.agents, len(owner)
-    rates, rest = np.zeros((agents - 1, m)), np.zeros((agents - 1, m))
-    vectors = np.zeros((agents - 1, agents, m))
-    if agents > 1:
-        others = np.array([np.delete(np.arange(agents), j) for j in range(agents)])
-        grounded = graph.laplacian[others[:, :, None], others[:, None, :]]
-        values, bases = np.linalg.eigh(grounded)
-        rates[:] = values[owner].T
-        rest[:] = bases.sum(axis=1)[owner].T
-        for r, j in enumerate(owner):
-            vectors[:, others[j], r] = bases[j].T
-    return Modes(owner, rates, rest, vectors)
-
-
-def _table(rows: tuple[tuple[float, ...], ...]) -> NDArray[np.float64]:
-    return np.array([[*row, *[0.0] * (STAGES - len(row))] for row in rows])
-
-
 class RosenbrockLoop(ClosedLoop):
     """The closed loop of ODE agents under the fully distributed law, with adaptive steps.
 
@@ -648,20 +342,29 @@ class RosenbrockLoop(ClosedLoop):
     ) -> None:
         self._advance, self._finish = build(agent, law, game)
         self._shape = state.shape
-        m = len(state)
+        m, agents = len(state), graph.agents
         constraints = len(problem.data.member_pointer) - 1
-        self._state = np.concatenate([state.ravel(), memory])
-        owner = np.repeat(np.arange(graph.agents), np.diff(problem.data.offsets))
-        modes = modes_of(graph, owner)
-        method = Method(_table(_STAGE), _table(_RATE), _table(_DENSE), rtol, atol)
-        self._fixed = (problem, channels, modes, method)
+        modes = modes_of(graph, np.repeat(np.arange(agents), np.diff(problem.data.offsets)))
+        self._fixed = (problem, channels, modes, method(rtol, atol))
         self._h = h
         self._step = 0
+        self._length = state.size + len(memory)
+        self._state = np.concatenate([state.ravel(), memory, to_modes(modes, memory[: agents * m])])
         self._progress = np.zeros(COUNT)
         self._progress[NEXT] = min(h, float(problem.settings[EPSILON]))
         self._u = np.zeros(m)
         self._work = work(m, constraints)
-        self._solver = _solver(agent, channels, modes, self._state)
+        dense = np.zeros((5, self._length))
+        dense[:2] = self._state[: self._length]
+        self._solver = Solver(
+            trial=np.zeros_like(self._state),
+            k=np.zeros((STAGES, len(self._state))),
+            dense=dense,
+            greatest=np.abs(state).max(axis=0),
+            exit=np.zeros(watch.HEADER),
+            u=np.zeros(m),
+            system=stage_system(_input_columns(agent, channels), agents),
+        )
         self.monitor = np.zeros(watch.length(m, constraints))
 
     @property
@@ -677,7 +380,7 @@ class RosenbrockLoop(ClosedLoop):
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
-        states, inputs = np.empty((samples, len(self._state))), np.empty((samples, len(self._u)))
+        states, inputs = np.empty((samples, self._length)), np.empty((samples, len(self._u)))
         done = 0
         if self.monitor[watch.EXIT] == watch.INSIDE:
             done, self._step = self._advance(
@@ -688,7 +391,7 @@ class RosenbrockLoop(ClosedLoop):
 
     def finish(self) -> Samples:
         """See the base class."""
-        row, u = np.empty((1, len(self._state))), np.empty((1, len(self._u)))
+        row, u = np.empty((1, self._length)), np.empty((1, len(self._u)))
         self._finish(
             *self._fixed[:2], self.time, self._progress, self.monitor, self._work, self._solver,
             row[0], u[0],
@@ -704,46 +407,14 @@ class RosenbrockLoop(ClosedLoop):
         )
 
 
-def _solver(
-    agent: ModuleType, channels: Channels, modes: Modes, state: NDArray[np.float64]
-) -> Solver:
-    m, states = channels.rest.shape
-    size, n, agents = m * states, len(state), modes.vectors.shape[1]
-    inputs = np.zeros((m, states))
-    for r, q in enumerate(channels.parameters):  # the agents are affine in u, with constant G
-        with_u, without = np.zeros(states), np.zeros(states)
-        agent.rate(q, np.zeros(states), 1.0, with_u)
-        agent.rate(q, np.zeros(states), 0.0, without)
-        inputs[r] = with_u - without
-    estimates = state[size : size + agents * m].reshape(agents, m)
-    start = np.einsum("air,ir->ar", modes.vectors, estimates).ravel()
-    dense = np.zeros((4, n))
-    dense[:2] = state
-    return Solver(
-        inputs=inputs,
-        modes=start,
-        trial=np.zeros(n),
-        trial_modes=np.zeros_like(start),
-        k=np.zeros((STAGES, n)),
-        k_modes=np.zeros((STAGES, len(start))),
-        dense=dense,
-        greatest=np.abs(state[:size]).reshape(m, states).max(axis=0),
-        exit=np.zeros(watch.HEADER),
-        u=np.zeros(m),
-        known=np.zeros_like(start),
-        pull=np.zeros_like(start),
-        decay=np.zeros_like(start),
-        spread=np.zeros(agents * m),
-        local=np.zeros((m, states, states)),
-        resolvent=np.zeros((m, states, states)),
-        small=np.zeros((states, states)),
-        small_pivot=np.zeros(states, dtype=np.int64),
-        response=np.zeros((m, states)),
-        own=np.zeros((m, m)),
-        filtered=np.zeros((m, m)),
-        matrix=np.zeros((m, m)),
-        pivot=np.zeros(m, dtype=np.int64),
-        k_x=np.zeros(states),
-        k_y=np.zeros(m),
-        k_u=np.zeros(m),
-    )
+def _input_columns(agent: ModuleType, channels: Channels) -> NDArray[np.float64]:
+    """G of each channel, (m, states): the agents are affine in u, with constant G."""
+    columns = np.zeros(channels.rest.shape)
+    origin = np.zeros(channels.rest.shape[1])
+    for q, column in zip(channels.parameters, columns, strict=True):
+        without = np.zeros_like(origin)
+        agent.rate(q, origin, 0.0, without)
+        agent.rate(q, origin, 1.0, column)
+        column -= without
+    columns.flags.writeable = False
+    return columns

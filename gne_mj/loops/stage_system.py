@@ -1,0 +1,259 @@
+"""The linear systems of a Rosenbrock step of the fully distributed loop, solved by structure.
+
+With s = 1 / (GAMMA h), each stage solves (s I - J) k = r, with J the loop's Jacobian at the start
+of the step. The loop's flat vector holds the channels' states x, the estimates (N m), z (m), and
+behind them the estimates' modes.
+
+- In the modes (see :mod:`gne_mj.loops.estimate_modes`) the estimates' equation is diagonal:
+  k_w = (epsilon r_w + lambda Q'1 k_y) / (epsilon s + lambda). In the agents' own coordinates that
+  is k_e = p + T k_y, p known.
+- z likewise: k_z = (epsilon r_z + k_y) / (epsilon s + 1).
+- A channel x' = f(x) + G u answers by itself: k_x = (s I - A)^-1 (r_x + G k_u), A = df/dx.
+- The law ties them: k_u = U_y k_y + U_z k_z + U_e k_e. Put together, one system of m equations
+  remains for k_u, and it alone is factorised.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gne_mj.controllers.settings import EPSILON, GAIN, RHO
+from gne_mj.loops.estimate_modes import add_from_modes
+from gne_mj.loops.linear import add_multiple, factorise, substitute
+from gne_mj.loops.rodas import GAMMA
+from gne_mj.native import copy, kernel
+
+
+class StageSystem(NamedTuple):
+    """Arrays of the systems of one step."""
+
+    inputs: np.ndarray  # (m, states) G, read-only
+    local: np.ndarray  # (m, states, states) A
+    resolvent: np.ndarray  # (m, states, states) (s I - A)^-1 by columns, that is transposed
+    response: np.ndarray  # (m, states) (s I - A)^-1 G
+    small: np.ndarray  # (states, states) s I - A of one channel, factorised
+    small_pivot: np.ndarray  # (states,)
+    own: np.ndarray  # (m, m) du / dy and, off the agents' own blocks, du / d estimate
+    filtered: np.ndarray  # (m, m) du / dz
+    decay: np.ndarray  # (N - 1, m) 1 / (epsilon s + lambda)
+    pull: np.ndarray  # (N - 1, m) what a k_y of 1 adds to k_w
+    spread: np.ndarray  # (N, m) T: what a k_y of 1 adds to k_e
+    slope: np.ndarray  # (m, m) what k_y adds to k_u, directly and through z and the estimates
+    matrix: np.ndarray  # (m, m) of the system for k_u, factorised
+    pivot: np.ndarray  # (m,)
+    k_x: np.ndarray  # (states,) one channel's
+    k_y: np.ndarray  # (m,)
+    k_u: np.ndarray  # (m,)
+
+
+def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
+    """Fresh arrays for N agents; inputs (m, states) is G."""
+    m, states = inputs.shape
+    return StageSystem(
+        inputs=inputs,
+        local=np.zeros((m, states, states)),
+        resolvent=np.zeros((m, states, states)),
+        response=np.zeros((m, states)),
+        small=np.zeros((states, states)),
+        small_pivot=np.zeros(states, dtype=np.int64),
+        own=np.zeros((m, m)),
+        filtered=np.zeros((m, m)),
+        decay=np.zeros((agents - 1, m)),
+        pull=np.zeros((agents - 1, m)),
+        spread=np.zeros((agents, m)),
+        slope=np.zeros((m, m)),
+        matrix=np.zeros((m, m)),
+        pivot=np.zeros(m, dtype=np.int64),
+        k_x=np.zeros(states),
+        k_y=np.zeros(m),
+        k_u=np.zeros(m),
+    )
+
+
+@kernel
+def linearise(agent, game, problem, channels, states, state, u, work, system):
+    """Fill the law's and the channels' derivatives at a state.
+
+    Args:
+        agent, game, problem, channels: as the loop has them.
+        states: states of a channel.
+        state: the loop's flat vector.
+        u: (m,) input there; work.y and work.demand as the law has just left them.
+        work: scratch arrays.
+        system: its local, own and filtered are filled.
+    """
+    data = problem.data
+    at, q = data.offsets, data.parameters
+    m, agents = len(u), len(at) - 1
+    gain, rho = problem.settings[GAIN], problem.settings[RHO]
+    memory = state[m * states :]
+    z, profile = memory[agents * m :], work.profile
+    own, filtered = system.own, system.filtered
+    for r in range(m):
+        x = state[r * states : (r + 1) * states]
+        agent.jacobian(channels.parameters[r], x, system.local[r])
+        for c in range(m):
+            own[r, c] = 0.0
+            filtered[r, c] = 0.0
+    for i in range(agents):
+        first, last = at[i], at[i + 1]
+        copy(memory[i * m : (i + 1) * m], profile)
+        copy(work.y[first:last], profile[first:last])
+        for a in range(first, last):
+            game.add_cost_hessian(q, i, a, profile, -gain, own[a])
+        copy(z[first:last], profile[first:last])
+        for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
+            k = data.own_index[entry]
+            room = -game.constraint(q, k, profile)
+            weight = -gain * rho / room
+            for a in range(first, last):
+                mine = game.constraint_gradient(q, k, a, profile) / room
+                for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
+                    j = data.member_index[member]
+                    target = filtered[a] if j == i else own[a]
+                    for b in range(at[j], at[j + 1]):
+                        other = game.constraint_gradient(q, k, b, profile)
+                        second = game.constraint_hessian(q, k, a, b, profile)
+                        target[b] += weight * (second + mine * other)
+    for r in range(m):
+        if u[r] != work.demand[r]:  # an input at its limit does not answer
+            for c in range(m):
+                own[r, c] = 0.0
+                filtered[r, c] = 0.0
+
+
+@kernel
+def prepare(agent, problem, modes, states, h, system):
+    """Factorise for steps of length h from where the loop was linearised; False if singular."""
+    agents, m = system.spread.shape
+    epsilon = problem.settings[EPSILON]
+    s = 1.0 / (GAMMA * h)
+    for a in range(agents - 1):
+        for r in range(m):
+            system.decay[a, r] = 1.0 / (epsilon * s + modes.rates[a, r])
+            system.pull[a, r] = modes.rates[a, r] * modes.rest[a, r] * system.decay[a, r]
+    for i in range(agents):
+        for r in range(m):
+            system.spread[i, r] = 0.0
+    add_from_modes(modes.vectors, system.pull, system.spread)
+    for r in range(m):
+        if not respond(system, r, states, s):
+            return False
+    filter_gain = 1.0 / (epsilon * s + 1.0)
+    for r in range(m):
+        i = modes.owner[r]
+        for c in range(m):
+            slope = system.own[r, c]
+            if modes.owner[c] == i:
+                slope += filter_gain * system.filtered[r, c]
+            else:
+                slope *= system.spread[i, c]
+            system.slope[r, c] = slope
+            system.matrix[r, c] = -slope * system.response[c, agent.OUTPUT]
+        system.matrix[r, r] += 1.0
+    return factorise(system.matrix, system.pivot)
+
+
+@kernel
+def respond(system, r, states, s):
+    """Fill channel r's resolvent and response; False if s is an eigenvalue of its A."""
+    small = system.small
+    for a in range(states):
+        system.response[r, a] = 0.0
+        for b in range(states):
+            small[a, b] = -system.local[r, a, b]
+        small[a, a] += s
+    if not factorise(small, system.small_pivot):
+        return False
+    for b in range(states):
+        column = system.resolvent[r, b]
+        for a in range(states):
+            column[a] = 0.0
+        column[b] = 1.0
+        substitute(small, system.small_pivot, column)
+        for a in range(states):
+            system.response[r, a] += system.inputs[r, b] * column[a]
+    return True
+
+
+@kernel
+def solve_stage(agent, problem, channels, modes, method, states, h, stage, trial, u, k, system):
+    """Fill k[stage], given the stages before it.
+
+    Args:
+        agent, problem, channels, modes, method: as the loop has them.
+        states: states of a channel.
+        h: the step.
+        stage: which, from 0.
+        trial: the flat vector at which the stage is taken.
+        u: (m,) input there.
+        k: (STAGES, length of the flat vector).
+        system: prepared for h.
+    """
+    at = problem.data.offsets
+    agents, m = system.spread.shape
+    epsilon = problem.settings[EPSILON]
+    s = 1.0 / (GAMMA * h)
+    filter_gain = 1.0 / (epsilon * s + 1.0)
+    size = m * states
+    at_z = size + agents * m
+    one, k_y, k_u = k[stage], system.k_y, system.k_u
+    # views of k[stage] and of the trial vector
+    k_x = one[:size].reshape((m, states))
+    k_e = one[size:at_z].reshape((agents, m))
+    k_z = one[at_z : at_z + m]
+    k_w = one[at_z + m :].reshape((agents - 1, m))
+    x = trial[:size].reshape((m, states))
+    z = trial[at_z : at_z + m]
+    w = trial[at_z + m :].reshape((agents - 1, m))
+    # right-hand sides, those of z and the modes times epsilon
+    for r in range(m):
+        agent.rate(channels.parameters[r], x[r], u[r], k_x[r])
+        k_y[r] = x[r, agent.OUTPUT]
+        k_z[r] = k_y[r] - z[r]
+    for a in range(agents - 1):
+        for r in range(m):
+            k_w[a, r] = modes.rates[a, r] * (modes.rest[a, r] * k_y[r] - w[a, r])
+    for j in range(stage):
+        scale = method.rate[stage, j] / h
+        add_multiple(scale, k[j], one[:size])
+        add_multiple(epsilon * scale, k[j, at_z:], one[at_z:])
+    # the solution for k_u = 0 in x, and for k_y = 0 in z, the modes and the estimates
+    for r in range(m):
+        for a in range(states):
+            total = 0.0
+            for b in range(states):
+                total += system.resolvent[r, b, a] * k_x[r, b]
+            system.k_x[a] = total
+        copy(system.k_x, k_x[r])
+        k_y[r] = k_x[r, agent.OUTPUT]
+        k_z[r] *= filter_gain
+    for a in range(agents - 1):
+        for r in range(m):
+            k_w[a, r] *= system.decay[a, r]
+    for i in range(agents):
+        for r in range(m):
+            k_e[i, r] = 0.0
+    add_from_modes(modes.vectors, k_w, k_e)
+    # what these leave over is for k_u
+    for r in range(m):
+        i = modes.owner[r]
+        total = 0.0
+        for c in range(m):
+            total += system.own[r, c] * k_e[i, c] + system.slope[r, c] * k_y[c]
+        for c in range(at[i], at[i + 1]):
+            total += system.filtered[r, c] * k_z[c]
+        k_u[r] = total
+    substitute(system.matrix, system.pivot, k_u)
+    # what k_u and with it k_y add
+    for r in range(m):
+        for a in range(states):
+            k_x[r, a] += k_u[r] * system.response[r, a]
+        k_y[r] = k_x[r, agent.OUTPUT]
+        k_z[r] += filter_gain * k_y[r]
+    for i in range(agents):
+        for r in range(m):
+            k_e[i, r] += system.spread[i, r] * k_y[r]
+    for a in range(agents - 1):
+        for r in range(m):
+            k_w[a, r] += system.pull[a, r] * k_y[r]
