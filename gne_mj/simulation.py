@@ -171,7 +171,7 @@ class _Run:
         first = self.clock.steps(self.loop.time)
         recorded = self.loop.advance(samples, every)
         self.wall_time += real_time.perf_counter() - started
-        steps = first + every * np.arange(len(recorded.input))
+        steps = first + every * np.arange(len(recorded.input), dtype=np.float64)
         self._times.append(steps * self.clock.timestep)
         self._samples.append(recorded)
 

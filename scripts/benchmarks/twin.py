@@ -7,8 +7,8 @@ is the loosest of a grid whose greatest error over all states and samples is at 
 DOP853 reference at 1e-12; SciPy's absolute tolerance is 1e-3 of the relative one or equal to it,
 whichever is faster, as is its method: Radau, BDF or LSODA. Ours includes the law, the monitor and
 the inputs at all samples. SciPy is given the rate and the analytic Jacobian, compiled by numba; in
-the rows "law by NumPy" the fastest of the three methods gets the rate written with NumPy arrays, with
-that same compiled Jacobian or with none, as in a script where SciPy takes differences.
+the rows "law by NumPy" the fastest of the three methods gets the rate written with NumPy arrays,
+with that same compiled Jacobian or with none, as in a script where SciPy takes differences.
 """
 
 import statistics
