@@ -103,8 +103,8 @@ def scenarios(
     """List the shipped scenarios, or print one."""
     import tomllib
 
-    from gne_mj.errors import InvalidInput
-    from gne_mj.scenario import nearest, shipped
+    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.scenario import shipped
 
     files = shipped()
     if name is None:

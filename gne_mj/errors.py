@@ -1,5 +1,8 @@
 """Errors that the package raises on purpose; each message is one sentence a user can act on."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class GneError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -48,3 +51,12 @@ class SolverError(GneError, RuntimeError):
     def __init__(self, message: str, residual: float, iterations: int) -> None:
         self.residual, self.iterations = residual, iterations
         super().__init__(f"{message} (residual {residual:.3g} after {iterations} iterations)")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint for a name that is not known: the nearest one, or all."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"choose from {', '.join(known)}"

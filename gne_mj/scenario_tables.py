@@ -1,0 +1,366 @@
+"""The tables of a scenario file: what may stand where, and what is built from it.
+
+Each table has the fields that a user may set, with their units, and a ``build`` that makes the
+object they describe.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from gne_mj import graph as graphs
+from gne_mj.controllers import FullInformation, FullyDistributed, Law
+from gne_mj.errors import InvalidInput, nearest
+from gne_mj.game import Game
+from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.plants import flexible_robot, integrator, pi_cascade
+from gne_mj.plants.agents import Agents
+from gne_mj.simulation import Simulation
+from gne_mj.system import Clock, System
+
+# One number for all agents, or one each
+PerAgent = float | list[float]
+
+# The paper gives no initial velocities, and from rest the first gap would lie on its bound.
+DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
+
+
+class _Table(BaseModel):
+    """A TOML table: unknown keys and numbers that are not finite are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, values: Any) -> Any:
+        if isinstance(values, Mapping):
+            for key in values:
+                if key not in cls.model_fields:
+                    raise PydanticCustomError(
+                        "unknown_key",
+                        "{name} is not a key here; {hint}",
+                        {"name": repr(key), "hint": nearest(str(key), cls.model_fields)},
+                    )
+        return values
+
+
+class VelocityGame(_Table):
+    """[eq:sensorNetGNE]"""
+
+    type: Literal["velocity-synchronization"]
+    reference_velocity: float = Field(3.0, description="v_0 in m/s")
+    gap_bound: PerAgent = Field(3.0, description="delta_i in m/s, positive")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        bound = _per_agent("game.gap_bound", self.gap_bound, count, positive=True)
+        return velocity_game(count, self.reference_velocity, bound)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """The named start for five agents; else everyone half a bound below the reference."""
+        if count == len(DEFAULT_VELOCITIES):
+            return np.array(DEFAULT_VELOCITIES)
+        first = self.gap_bound if isinstance(self.gap_bound, float) else self.gap_bound[0]
+        return np.full(count, self.reference_velocity - 0.5 * first)
+
+
+class OsnrGame(_Table):
+    """[eq:osnrGNE]; what is left out is taken from the ten-channel link."""
+
+    type: Literal["osnr"]
+    total_power_limit: float | None = Field(None, gt=0, description="P_0 in mW")
+    price: list[float] | None = None
+    utility_weight: list[float] | None = None
+    gain: list[float] | None = None
+    noise_power: list[float] | None = None
+    system_matrix: list[list[float]] | None = None
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        parameters = ten_channels()
+        given = self.model_dump(exclude={"type"}, exclude_none=True)
+        parameters.update(given)
+        for key in ("price", "utility_weight", "gain", "noise_power", "system_matrix"):
+            if len(parameters[key]) != count:
+                raise InvalidInput(
+                    f"game.{key}",
+                    f"{len(parameters[key])} channels",
+                    f"agents.count is {count}; every list must have that many entries",
+                )
+        return osnr_game(**parameters)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """80% of the power limit, shared equally."""
+        limit = self.total_power_limit or ten_channels()["total_power_limit"]
+        return np.full(count, 0.8 * limit / count)
+
+
+class _AgentsTable(_Table):
+    count: int = Field(gt=0, description="N")
+    input_limit: PerAgent | None = Field(
+        None, description="greatest |u_i| that the actuators deliver; no limit if left out"
+    )
+
+    def limits(self) -> NDArray[np.float64]:
+        """(N,) limits, infinite where none is given."""
+        if self.input_limit is None:
+            return np.full(self.count, np.inf)
+        return _per_agent("agents.input_limit", self.input_limit, self.count, positive=True)
+
+    def columns(self, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
+        """(N, len(names)) parameters."""
+        columns = [
+            _per_agent(f"agents.{n}", getattr(self, n), self.count, positive=n in positive)
+            for n in names
+        ]
+        return np.column_stack(columns)
+
+
+class RobotAgents(_AgentsTable):
+    """[eq:MobileRobot]"""
+
+    type: Literal["flexible-robot"]
+    main_mass: PerAgent = Field(1.0, description="M in kg, positive")
+    appendage_mass: PerAgent = Field(1.0, description="m in kg, positive")
+    stiffness: PerAgent = Field(1.0, description="linear part of psi in N/m")
+    atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
+    damping: PerAgent = Field(1.0, description="gamma in N s/m")
+
+    def build(self) -> Agents:
+        """The agents."""
+        names = flexible_robot.PARAMETERS
+        table = self.columns(*names, positive=("main_mass", "appendage_mass"))
+        if np.any(table[:, 4] < 0):
+            raise InvalidInput("agents.damping", self.damping, "no entry may be negative")
+        return Agents(flexible_robot, table, self.limits())
+
+
+class IntegratorAgents(_AgentsTable):
+    """[eq:int]"""
+
+    type: Literal["integrator"]
+
+    def build(self) -> Agents:
+        """The agents."""
+        return Agents(integrator, np.zeros((self.count, 0)), self.limits())
+
+
+class PiCascadeAgents(_AgentsTable):
+    """[eq:cascadePI]"""
+
+    type: Literal["pi-cascade"]
+    decay_rate: PerAgent = Field(1.0, description="v in 1/s")
+    integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
+
+    def build(self) -> Agents:
+        """The agents."""
+        table = self.columns(*pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
+        if np.any(table[:, 1] >= table[:, 0]):
+            raise InvalidInput(
+                "agents.integral_gain",
+                self.integral_gain,
+                "it must be below decay_rate (0 < k < v)",
+            )
+        return Agents(pi_cascade, table, self.limits())
+
+
+class BarrierTable(_Table):
+    """[eq:logbarrier]"""
+
+    rho: float = Field(0.1, gt=0)
+
+
+class FullController(_Table):
+    """[eq:nonlinFIfeedback]"""
+
+    information: Literal["full"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+
+    def build(self, count: int) -> Law:
+        """The law."""
+        return FullInformation()
+
+
+class DistributedController(_Table):
+    """[eq:CenterFeedback]"""
+
+    information: Literal["distributed"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+    epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
+    gain: float = Field(1.0, gt=0, description="k")
+    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
+    )
+
+    def build(self, count: int) -> Law:
+        """The law."""
+        if isinstance(self.graph, str):
+            graph = graphs.NAMED[self.graph](count)
+        else:
+            graph = graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
+        return FullyDistributed(graph, self.epsilon, self.gain)
+
+
+class PlantTable(_Table):
+    """What moves the agents."""
+
+    engine: Literal["mujoco", "ode"] = "ode"
+    integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
+        None, description="in place of the simulation's"
+    )
+
+
+class InitialTable(_Table):
+    """The start; what is left out rests, relaxed, at the default actions."""
+
+    action: PerAgent | None = Field(None, description="y(0)")
+    extension: PerAgent | None = Field(None, description="robots: x1(0) in m")
+    appendage_velocity: PerAgent | None = Field(None, description="robots: x3(0) in m/s")
+    position: PerAgent | None = Field(None, description="robots: d(0) in m")
+    integral: PerAgent | None = Field(None, description="PI cascade: s(0)")
+
+    def build(self, agents: Agents, default: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, states): at rest at y(0), but for what is given."""
+        count = agents.channels
+        y = default if self.action is None else _per_agent("initial.action", self.action, count)
+        state = agents.equilibrium(y)
+        names = [name for name, _ in agents.kind.STATES]
+        if agents.kind is flexible_robot:
+            state[:, names.index("position")] = -1.5 * np.arange(count)
+        for key in ("extension", "appendage_velocity", "position", "integral"):
+            given = getattr(self, key)
+            if given is None:
+                continue
+            if key not in names:
+                raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
+            state[:, names.index(key)] = _per_agent(f"initial.{key}", given, count)
+        return state
+
+
+class SystemTable(_Table):
+    """One game with its agents."""
+
+    game: Annotated[VelocityGame | OsnrGame, Field(discriminator="type")]
+    agents: Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
+    barrier: BarrierTable = BarrierTable()
+    controller: Annotated[
+        FullController | DistributedController, Field(discriminator="information")
+    ] = FullController(information="full")
+    plant: PlantTable = PlantTable()
+    initial: InitialTable = InitialTable()
+
+    def build(self, name: str, integrator_name: str) -> System:
+        """The system, with the simulation's integrator unless it names its own."""
+        count = self.agents.count
+        try:
+            game = self.game.build(count)
+            agents = self.agents.build()
+            law = self.controller.build(count)
+            state = self.initial.build(agents, self.game.default_start(count))
+        except InvalidInput as error:
+            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
+        if self.plant.engine == "mujoco" and agents.kind is not flexible_robot:
+            raise InvalidInput(
+                f"systems.{name}.plant.engine",
+                "mujoco",
+                f"MuJoCo has models of flexible robots only; run {agents.kind.NAME}s on 'ode'",
+            )
+        return System(
+            name=name,
+            game=game,
+            agents=agents,
+            law=law,
+            rho=self.barrier.rho,
+            state=state,
+            mode=self.controller.mode,
+            engine=self.plant.engine,
+            integrator=self.plant.integrator or integrator_name,
+        )
+
+
+class SimulationTable(_Table):
+    """The clock that all systems share."""
+
+    duration: float = Field(30.0, gt=0, description="s")
+    timestep: float = Field(0.002, gt=0, description="s")
+    control_period: float | None = Field(
+        None, gt=0, description="s, for mode sampled; the timestep if left out"
+    )
+    integrator: Literal["rk4", "euler"] = "rk4"
+    tolerance: float = Field(1e-3, gt=0, description="on max |y - y*|, for status converged")
+    seed: int = Field(0, ge=0)
+
+
+class RecordingTable(_Table):
+    """What is kept."""
+
+    period: float = Field(0.05, gt=0, description="s between samples")
+
+
+class Scenario(_Table):
+    """A whole run: systems on one clock."""
+
+    description: str = ""
+    simulation: SimulationTable = SimulationTable()
+    recording: RecordingTable = RecordingTable()
+    systems: dict[str, SystemTable] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names(self) -> "Scenario":
+        for name in self.systems:
+            if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+                raise PydanticCustomError(
+                    "name", "a system's name has letters, digits, '-' and '_' only"
+                )
+        return self
+
+    def clock(self) -> Clock:
+        """The shared clock."""
+        simulation = self.simulation
+        try:
+            return Clock(
+                duration=simulation.duration,
+                timestep=simulation.timestep,
+                control_period=simulation.control_period or simulation.timestep,
+                sample_period=self.recording.period,
+            )
+        except InvalidInput as error:
+            if error.key == "simulation.sample_period":
+                raise InvalidInput("recording.period", error.value, error.expected) from None
+            raise
+
+    def simulation_object(self) -> Simulation:
+        """The scenario, ready to run.
+
+        Raises:
+            InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
+        """
+        clock = self.clock()
+        systems = [
+            table.build(name, self.simulation.integrator) for name, table in self.systems.items()
+        ]
+        return Simulation(
+            systems,
+            clock,
+            tolerance=self.simulation.tolerance,
+            seed=self.simulation.seed,
+            source=self.model_dump_json(exclude_none=True),
+        )
+
+
+def _per_agent(
+    key: str, given: PerAgent, count: int, *, positive: bool = False
+) -> NDArray[np.float64]:
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim == 1 and len(values) != count:
+        raise InvalidInput(
+            key, given, f"it must be one number or a list of {count}, one for each agent"
+        )
+    if positive and np.any(values <= 0):
+        raise InvalidInput(key, given, "it must be positive")
+    return np.broadcast_to(values, (count,)).copy()
