@@ -33,14 +33,15 @@ class Certificate:
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V^{x*} over the run, and whether the theory claims that it never rises: for
-            full information in mode continuous, passive agents and no limit met.
+            full information in mode continuous (not by Euler's method, which is far from continuous
+            time), passive agents and no limit met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """
 
     status: str
     message: str
-    worst_constraint: dict[str, Any]
+    worst_constraint: dict[str, Any] | None
     worst_gap: dict[str, Any] | None
     equilibrium: dict[str, Any]
     epsilon: dict[str, Any]
@@ -65,6 +66,7 @@ def certify_run(
     system: System,
     time: NDArray[np.float64],
     action: NDArray[np.float64],
+    inputs: NDArray[np.float64],
     monitor: NDArray[np.float64],
     *,
     tolerance: float,
@@ -78,6 +80,7 @@ def certify_run(
         system: what was run.
         time: sample times (samples,).
         action: y at the sample times (samples, m).
+        inputs: u there (samples, m), not a number where there is none.
         monitor: the loop's flat array of what was seen at every step.
         tolerance: for the status ``converged``.
         duration: how long the run was meant to last.
@@ -86,6 +89,12 @@ def certify_run(
     """
     distance = np.max(np.abs(action - system.equilibrium.action), axis=1)
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
+    between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
+    if between and monitor[watch.EXIT] == watch.INSIDE:
+        message += (
+            f"; at {between} sample times the state interpolated between two integration steps is"
+            " outside, though both steps are inside"
+        )
     return Certificate(
         status=status,
         message=message,
@@ -149,15 +158,32 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     return (
         "estimate_left_feasible_set",
         f"agent {agent}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g}, not"
-        " negative, so its law has no action there (a smaller epsilon keeps estimates closer)",
+        " negative, so its law has no action there (a smaller epsilon or gain keeps estimates"
+        " closer to the actions)",
     )
 
 
-def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+def _worst(
+    system: System, monitor: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Each constraint's greatest value and when, that at an exit included."""
     p = system.game.constraints_count
     at = int(watch.worst_at(p))
-    worst, when = monitor[at : at + p], monitor[at + p : at + 2 * p]
+    worst, when = monitor[at : at + p].copy(), monitor[at + p : at + 2 * p].copy()
+    if monitor[watch.STARTED] == 0.0:
+        worst[:] = -np.inf
+    if monitor[watch.EXIT] == watch.LEFT_SET:
+        index = int(monitor[watch.EXIT_CONSTRAINT])
+        if monitor[watch.EXIT_VALUE] > worst[index]:
+            worst[index], when[index] = monitor[watch.EXIT_VALUE], monitor[watch.EXIT_TIME]
+    return worst, when
+
+
+def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+    worst, when = _worst(system, monitor)
     index = int(np.argmax(worst))
+    if not np.isfinite(worst[index]):
+        return None
     return {
         "name": system.game.constraint_names[index],
         "index": index + 1,
@@ -167,18 +193,17 @@ def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str,
 
 
 def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
-    if system.game.kernels is not velocity:
+    worst, when = _worst(system, monitor)
+    if system.game.kernels is not velocity or not np.any(np.isfinite(worst)):
         return None
-    p = system.game.constraints_count
-    at = int(watch.worst_at(p))
     bounds = system.game.parameters[1:]
-    gaps = np.sqrt(np.maximum(monitor[at : at + p] + bounds**2, 0.0))
+    gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
     index = int(np.argmax(gaps / bounds))
     return {
         "agent": index + 1,
         "gap": float(gaps[index]),
         "bound": float(bounds[index]),
-        "time": float(monitor[at + p + index]),
+        "time": float(when[index]),
         "each": gaps.tolist(),
     }
 
@@ -211,6 +236,10 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,
+        # The same set by affine constraints, two a gap, meets Assumption [asmp:cost] to the letter.
+        "p_rho_affine": (
+            2 * game.constraints_count * system.rho if game.kernels is velocity else None
+        ),
         "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
     }
 
@@ -230,7 +259,9 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     claimed = (
         system.mode == "continuous"
         and system.law.information == "full"
+        and system.integrator != "euler"
         and agents.kind.is_passive(agents.parameters)
+        and bool(monitor[watch.STARTED])
         and not monitor[watch.SATURATED]
     )
     return {

@@ -169,6 +169,7 @@ def _simulate(
 ) -> "Trajectory":
     from gne_mj.errors import InvalidInput
     from gne_mj.scenario import load_scenario, parse_value
+    from gne_mj.simulation import interruption
 
     settings: dict[str, Any] = {}
     for change in changes or []:
@@ -176,8 +177,14 @@ def _simulate(
         if not (key and equals):
             raise InvalidInput("--set", change, "it must read KEY=VALUE")
         settings[key.strip()] = parse_value(value.strip())
-    simulation = load_scenario(scenario, settings).simulation_object()
-    with _results(out, replace) as folder, _progress(simulation.clock.duration, quiet) as show:
+    with _preparing(quiet):
+        simulation = load_scenario(scenario, settings).simulation_object()
+    # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
+    with (
+        interruption(),
+        _results(out, replace) as folder,
+        _progress(simulation.clock.duration, quiet) as show,
+    ):
         trajectory = simulation.run(show)
         if folder is not None:
             trajectory.save(folder / "trajectory.zarr")
@@ -192,7 +199,10 @@ def _simulate(
 
 @contextmanager
 def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
-    """A folder that becomes ``out`` when all is written, and vanishes if something fails."""
+    """A folder that becomes ``out`` when all is written, and vanishes if something fails.
+
+    `paper` may replace results of its own, and only those.
+    """
     import tempfile
 
     from gne_mj.errors import InvalidInput
@@ -200,8 +210,7 @@ def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
     if out is None:
         yield None
         return
-    earlier = (out / "report.json").is_file() and (out / "trajectory.zarr").is_dir()
-    if out.exists() and not (replace and earlier):
+    if out.exists() and not (replace and _is_of_paper(out)):
         raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -220,14 +229,36 @@ def _results(out: Path | None, replace: bool) -> Iterator[Path | None]:
         raise
 
 
+def _is_of_paper(out: Path) -> bool:
+    """Whether a folder holds what `paper` writes: `run` does not draw."""
+    figures = ("robots-velocities", "robots-gaps", "channels-powers", "channels-total-power")
+    names = ("report.json", "trajectory.zarr", *(f"{figure}.png" for figure in figures))
+    return all((out / name).exists() for name in names)
+
+
 def _replace(folder: Path, out: Path) -> None:
-    """Move everything in ``folder`` into ``out``, in place of what has the same names there."""
+    """Move all in ``folder`` into ``out``; what has the same names there goes last of all."""
+    import tempfile
+
+    aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
     for entry in sorted(folder.iterdir()):
-        old = out / entry.name
-        if old.is_dir():
-            shutil.rmtree(old)
-        entry.replace(old)
+        if (out / entry.name).exists():
+            (out / entry.name).rename(aside / entry.name)
+        entry.rename(out / entry.name)
     folder.rmdir()
+    shutil.rmtree(aside)
+
+
+@contextmanager
+def _preparing(quiet: bool) -> Iterator[None]:
+    """A word on a terminal's stderr while a first run compiles."""
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("preparing (a first run compiles for a few seconds)"):
+        yield
 
 
 @contextmanager
@@ -267,7 +298,9 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
     unknown = distances["final_distance_to_variational"] is None
     rows = {
         "status": f"{report['status']}: {report['message']}",
-        "least margin": f"{worst['margin']:.6g} of '{worst['name']}' at {worst['time']:.4g} s",
+        "least margin": "nothing was observed"
+        if worst is None
+        else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
         "settling time": "not settled" if settling is None else f"{settling:.4g} s",
         "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
         + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),

@@ -46,7 +46,8 @@ def penalised_equilibrium(
         game: with F strictly monotone.
         rho: the penalty parameter.
         start: strictly inside, shape (m,).
-        tolerance: on the residual as :class:`Equilibrium` defines it.
+        tolerance: on the residual as :class:`Equilibrium` defines it; where rounding ends the
+            progress before, up to a hundred times as much is accepted and reported.
 
     Raises:
         InfeasibleStart: ``start`` is not strictly inside.
@@ -126,22 +127,23 @@ def _solve(
         raise InfeasibleStart(game.name, "start", game.constraint_names[worst], value)
     slack = -game.constraints(y)
     point = _Point(game, rho, free, y, slack, rho / slack)
-    best, stalled = np.inf, 0
+    best, stalled = point, 0
     for iteration in range(300):
         # Near the boundary rounding can end progress shortly before the tolerance.
-        if point.error <= tolerance or (stalled >= 4 and best <= 100 * tolerance):
+        if best.error <= tolerance or (stalled >= 4 and best.error <= 100 * tolerance):
             return Equilibrium(
-                action=point.y,
-                multipliers=point.multipliers,
+                action=best.y,
+                multipliers=best.multipliers,
                 rho=rho,
-                residual=point.dual,
-                complementarity=float(np.max(point.multipliers * point.slack)),
+                residual=best.dual,
+                complementarity=float(np.max(best.multipliers * best.slack)),
                 iterations=iteration,
             )
-        stalled = stalled + 1 if point.error > 0.5 * best else 0
-        best = min(best, point.error)
         point = point.improved()
-    raise SolverError(f"the equilibrium of the {game.name} game was not found", best, 300)
+        stalled = stalled + 1 if point.error > 0.5 * best.error else 0
+        if point.error < best.error:
+            best = point
+    raise SolverError(f"the equilibrium of the {game.name} game was not found", best.error, 300)
 
 
 class _Point:
@@ -182,7 +184,14 @@ class _Point:
         ]
         matrix += (self.jacobian.T * ratio) @ self.jacobian
         change = (-self.product + self.multipliers * self.gap) / self.slack
-        step = np.linalg.solve(matrix, -self.stationarity - change @ self.jacobian)
+        try:
+            step = np.linalg.solve(matrix, -self.stationarity - change @ self.jacobian)
+        except np.linalg.LinAlgError:
+            raise SolverError(
+                f"the derivative of F + dphi is singular in the {self.game.name} game",
+                self.error,
+                0,
+            ) from None
         along = self.jacobian @ step
         step_slack = -self.gap - along
         step_multipliers = change + ratio * along

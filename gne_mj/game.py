@@ -144,6 +144,8 @@ class Game:
         """sum_l w_l d2g_l/dy2, shape (m, m), at one profile y (m,) with weights w (p,)."""
         out = np.zeros((self.actions, self.actions))
         weights = np.ascontiguousarray(weights, dtype=np.float64)
+        if weights.shape != (self.constraints_count,):
+            raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
         _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
         return out
 

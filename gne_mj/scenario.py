@@ -85,7 +85,9 @@ def _read(source: str | Path) -> dict[str, Any]:
 
 
 def _change(tables: dict[str, Any], key: str, value: Any) -> None:
-    systems = tables.get("systems", {})
+    systems = tables.get("systems")
+    if not isinstance(systems, dict):
+        systems = {}
     parts = key.split(".")
     if parts[0] in systems and parts[0] not in Scenario.model_fields:
         parts.insert(0, "systems")
@@ -140,5 +142,7 @@ def _first(error: ValidationError) -> InvalidInput:
     if kind == "literal_error":
         names = re.findall(r"'([^']*)'", context["expected"])
         return InvalidInput(".".join(where), value, nearest(str(value), names))
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return InvalidInput(".".join(where), value, "it must be a table")
     message = detail["msg"][0].lower() + detail["msg"][1:]
     return InvalidInput(".".join(where), value, message.replace("input should", "it should"))

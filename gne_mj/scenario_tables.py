@@ -83,6 +83,8 @@ class OsnrGame(_Table):
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
         parameters = ten_channels()
+        if self.system_matrix is not None and len({len(row) for row in self.system_matrix}) > 1:
+            raise InvalidInput("game.system_matrix", "...", "its rows must be of one length")
         given = self.model_dump(exclude={"type"}, exclude_none=True)
         parameters.update(given)
         for key in ("price", "utility_weight", "gain", "noise_power", "system_matrix"):
@@ -264,12 +266,6 @@ class SystemTable(_Table):
             state = self.initial.build(agents, self.game.default_start(count))
         except InvalidInput as error:
             raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
-        if self.plant.engine == "mujoco" and agents.kind is not flexible_robot:
-            raise InvalidInput(
-                f"systems.{name}.plant.engine",
-                "mujoco",
-                f"MuJoCo has models of flexible robots only; run {agents.kind.NAME}s on 'ode'",
-            )
         return System(
             name=name,
             game=game,

@@ -49,8 +49,8 @@ class Simulation:
         systems: with different names.
         clock: durations and steps.
         tolerance: on max |y - y*| for the status ``converged``.
-        seed: kept with the results; nothing random happens without faults.
-        source: the scenario in words (TOML), kept with the results.
+        seed: kept with the results; nothing random happens in a run yet.
+        source: the scenario as JSON, kept with the results.
 
     >>> simulation = Simulation([system], clock)
     >>> snapshot = simulation.step()["robots"]    # one integration step
@@ -97,7 +97,7 @@ class Simulation:
         total = self.clock.steps(self.clock.duration)
         done = self.clock.steps(self.time)
         size = 1
-        with _interruption() as interrupted:
+        with interruption() as interrupted:
             while done < total and not interrupted.is_set() and any(r.inside for r in self._runs):
                 # Whole sample periods; the last one may be shorter.
                 samples = min(size, (total - done) // every)
@@ -111,7 +111,7 @@ class Simulation:
                 size = max(1, min(10 * size, int(size * _CHUNK / max(elapsed, 1e-6))))
                 if progress is not None:
                     progress(done * self.clock.timestep)
-        return self._trajectory(interrupted.is_set(), started)
+            return self._trajectory(interrupted.is_set() and done < total, started)
 
     def _trajectory(self, interrupted: bool, started: float) -> Trajectory:
         parts = {}
@@ -122,6 +122,7 @@ class Simulation:
                 run.system,
                 time,
                 samples.state[:, :, run.system.agents.kind.OUTPUT],
+                samples.input,
                 run.loop.monitor,
                 tolerance=self.tolerance,
                 duration=self.clock.duration,
@@ -167,6 +168,7 @@ class _Run:
     def advance(self, samples: int, every: int) -> None:
         if not self.inside:
             return
+        self._forget_last()
         started = real_time.perf_counter()
         first = self.clock.steps(self.loop.time)
         recorded = self.loop.advance(samples, every)
@@ -176,13 +178,17 @@ class _Run:
         self._samples.append(recorded)
 
     def finish(self) -> None:
-        """Add the last state, unless it was recorded at this very time."""
+        """Add the present state as the last row."""
+        self._forget_last()
+        self._times.append(np.array([self.loop.time]))
+        self._samples.append(self.loop.finish())
+
+    def _forget_last(self) -> None:
+        """Drop the last row if it is of the present time, as when a run goes on after its end."""
         if self._times and len(self._times[-1]) and self._times[-1][-1] >= self.loop.time:
             self._times[-1] = self._times[-1][:-1]
             last = self._samples[-1]
             self._samples[-1] = Samples(last.state[:-1], last.input[:-1], last.memory[:-1])
-        self._times.append(np.array([self.loop.time]))
-        self._samples.append(self.loop.finish())
 
     def recorded(self) -> tuple[NDArray[np.float64], Samples]:
         return np.concatenate(self._times), Samples(
@@ -193,7 +199,7 @@ class _Run:
 
 
 @contextmanager
-def _interruption() -> Iterator[threading.Event]:
+def interruption() -> Iterator[threading.Event]:
     """An event that Ctrl-C sets, so that a run ends between chunks and keeps what it has.
 
     A second Ctrl-C acts as usual. Outside the main thread signals are left alone.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import Law
+from gne_mj.controllers.settings import EPSILON
 from gne_mj.equilibrium import Equilibrium, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.game import Game
@@ -17,6 +18,9 @@ from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.loops.ode import Clock as LoopClock
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.ode import METHODS, Channels
+
+# Largest step times rate of decay that a method is stable for, on the negative real axis
+STABLE = {"rk4": 2.785, "euler": 2.0}
 
 
 @dataclass(frozen=True)
@@ -115,13 +119,22 @@ class System:
         if not value < 0.0:
             names = self.game.constraint_names
             raise InfeasibleStart(
-                f"systems.{self.name}", f"initial {self.game.action_name}", names[worst], value
+                f"systems.{self.name}.initial.action",
+                f"initial {self.game.action_name} {np.round(self.start[:6], 4).tolist()}",
+                names[worst],
+                value,
             )
         self._check_engine()
 
     def _check_engine(self) -> None:
         key = f"systems.{self.name}.plant"
         static = self.law.graph is None
+        if self.engine == "mujoco" and self.agents.kind.NAME != "flexible robot":
+            raise InvalidInput(
+                f"{key}.engine",
+                self.engine,
+                f"MuJoCo has models of flexible robots only; run {self.agents.kind.NAME}s on 'ode'",
+            )
         if self.integrator == "rosenbrock" and (
             static or self.mode != "continuous" or self.engine != "ode"
         ):
@@ -137,6 +150,23 @@ class System:
                 f"the {self.law.information} law runs on engine 'ode' only",
             )
 
+    def _check_step(self, clock: Clock) -> None:
+        """Explicit methods are unstable for estimates beyond a step of about 2 epsilon / lambda."""
+        law = self.law
+        if law.graph is None or self.mode != "continuous" or self.integrator == "rosenbrock":
+            return
+        fastest = max(1.0, float(np.linalg.eigvalsh(law.graph.laplacian)[-1]))
+        rate = fastest / law.settings(self.rho)[EPSILON]
+        largest = STABLE[self.integrator] / rate
+        if clock.timestep > largest:
+            raise InvalidInput(
+                "simulation.timestep",
+                clock.timestep,
+                f"with epsilon = {law.settings(self.rho)[EPSILON]:g} s the estimates of"
+                f" '{self.name}' need at most {largest:.3g} s under '{self.integrator}';"
+                " integrator 'rosenbrock' and mode 'sampled' have no such limit",
+            )
+
     @property
     def start(self) -> NDArray[np.float64]:
         """y(0), shape (m,)."""
@@ -148,7 +178,12 @@ class System:
         return penalised_equilibrium(self.game, self.rho, self.start)
 
     def closed_loop(self, clock: Clock) -> ClosedLoop:
-        """The native loop, at its start."""
+        """The native loop, at its start.
+
+        Raises:
+            InvalidInput: a step that the estimates' dynamics do not allow.
+        """
+        self._check_step(clock)
         rest = self.agents.equilibrium(self.equilibrium.action)
         problem = Problem(
             data=self.game.data,

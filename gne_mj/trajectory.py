@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.certificate import SUCCESSES, Certificate
+from gne_mj.errors import InvalidInput
 from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.loops.base import Samples
 from gne_mj.plants import flexible_robot
@@ -70,6 +71,9 @@ class Trajectory:
                     "versions": json.dumps(_versions()),
                     "wall_time": wall_time,
                     "status": _worst(part[3].status for part in parts.values()),
+                    "message": "; ".join(
+                        f"{name}: {part[3].message}" for name, part in parts.items()
+                    ),
                 }
             )
         }
@@ -104,10 +108,14 @@ class Trajectory:
         }
 
     def save(self, folder: str | Path) -> Path:
-        """Write the tree as a Zarr folder that must not exist yet; returns its path."""
+        """Write the tree as a Zarr folder that must not exist yet; returns its path.
+
+        Raises:
+            InvalidInput: the folder exists.
+        """
         path = Path(folder)
         if path.exists():
-            raise FileExistsError(f"{path} exists already")
+            raise InvalidInput("folder", str(path), "it exists already; name one that does not")
         # The second Zarr format: the third has no settled way to store names yet.
         self.tree.to_zarr(path, mode="w-", zarr_format=2)
         return path
@@ -141,9 +149,16 @@ def _dataset(
         "input": (
             ("time", axis),
             samples.input,
-            {"units": "N" if robots else "", "long_name": "delivered input u"},
+            {
+                "units": "N" if robots else f"{game.action_unit}/s",
+                "long_name": "delivered input u",
+            },
         ),
-        "state": (("time", axis, "component"), samples.state),
+        "state": (
+            ("time", axis, "component"),
+            samples.state,
+            {"units": ", ".join(u or game.action_unit for _, u in kind.STATES)},
+        ),
         "constraint": (
             ("time", "constraint"),
             game.constraints(y),

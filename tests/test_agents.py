@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import reference
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.agents import Agents
 from gne_mj.plants.ode import OdePlant
 
 KINDS = {
@@ -53,13 +55,26 @@ def test_jacobians_by_finite_differences(kind):
             assert np.allclose(jacobian, numeric, atol=1e-8)
 
 
-def test_the_input_column(kind):
+def test_rates_are_affine_in_the_input(kind):
     agents, _, _ = kind
     state = np.random.default_rng(2).normal(0, 2, (5, agents.states))
-    difference = rate(agents, state, np.full(5, 1.0)) - rate(agents, state, np.zeros(5))
-    column = np.array(agents.kind.INPUT) if hasattr(agents.kind, "INPUT") else None
-    if column is not None:
-        assert np.allclose(difference, np.broadcast_to(column, difference.shape))
+    zero, one, two = (rate(agents, state, np.full(5, u)) for u in (0.0, 1.0, 2.0))
+    assert np.allclose(two - one, one - zero, atol=1e-12)
+    assert np.all((one - zero)[:, agents.kind.OUTPUT] > 0)
+
+
+def test_arrays_of_a_wrong_shape_are_refused(kind):
+    agents, _, _ = kind
+    with pytest.raises(InvalidInput, match="input_limit"):
+        Agents(agents.kind, agents.parameters, np.array([1.0]))
+    with pytest.raises(InvalidInput, match="parameters"):
+        Agents(agents.kind, np.zeros((5, 7)), np.full(5, np.inf))
+    with pytest.raises(ValueError, match="y must be"):
+        agents.equilibrium(np.zeros(4))
+    with pytest.raises(ValueError, match="states must be"):
+        agents.storage(np.zeros((5, agents.states)), np.zeros((4, agents.states)))
+    with pytest.raises(ValueError, match="could not be broadcast"):
+        OdePlant(agents, 0.01).step(np.zeros(6))
 
 
 def test_equilibria_rest_and_storage_equals_the_reference(kind):

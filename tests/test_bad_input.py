@@ -14,7 +14,7 @@ CASES = {
     "start on the boundary": (
         "velocity-sync",
         ["initial.action=[0, 0, 0, 0, 0]"],
-        ["initial velocity", "gap of agent 1", "margin 0"],
+        ["initial.action", "initial velocity [0.0, 0.0", "gap of agent 1", "margin 0"],
     ),
     "start outside": (
         "velocity-sync",
@@ -128,6 +128,17 @@ CASES = {
         ['controller={information="distributed"}'],
         ["controller.epsilon", "must be given"],
     ),
+    "a step too long for the estimates": (
+        "osnr",
+        ["controller.epsilon=0.001", "plant.integrator=rk4"],
+        ["simulation.timestep", "0.002", "rosenbrock", "sampled"],
+    ),
+    "a ragged matrix": (
+        "osnr",
+        ["game.system_matrix=[[0, 1], [0]]"],
+        ["game.system_matrix", "one length"],
+    ),
+    "a number for a table": ("velocity-sync", ["barrier=1"], ["barrier", "must be a table"]),
     "set without a value": ("velocity-sync", ["barrier.rho"], ["--set", "KEY=VALUE"]),
     "a state that robots lack": ("velocity-sync", ["initial.integral=1"], ["initial.integral"]),
 }
@@ -192,6 +203,9 @@ def test_a_broken_file(tmp_path):
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(InvalidInput, match="UTF-8"):
         load_scenario(path)
+    path.write_text("systems = 5\n")
+    with pytest.raises(InvalidInput, match="systems: got 5"):
+        load_scenario(path, {"simulation.duration": 1.0})
     path.write_text("description = 'no system'\n")
     with pytest.raises(InvalidInput, match="systems"):
         load_scenario(path)

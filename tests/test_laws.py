@@ -125,7 +125,7 @@ def test_fully_distributed_is_the_formula(kind, count, graph):
     if graph in ("line", "ring", "complete"):
         edges = getattr(reference, graph)(count)
     laplacian = reference.laplacian(count, edges)
-    for _ in range(STATES if count < 10 else STATES):
+    for _ in range(STATES):
         y, estimates, z = draw(now)
         u, rate = step(now.game, law, y, pack_memory(estimates, z))
         expected_u, z_rate, estimates_rate = reference.fully_distributed(

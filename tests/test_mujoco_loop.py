@@ -183,13 +183,28 @@ def test_other_simulations_are_left_alone_by_installed_callbacks():
     <size nuserdata="{}"/></mujoco>"""
     system = robot_system(robot_state(FIVE), engine="mujoco")
     loop = system.closed_loop(clock(0.01))
-    for size in (0, 4):
+    for size, content in ((0, None), (1, 1.0), (4, 0.0), (4, 1.0), (4, np.nan)):
         model = mujoco.MjModel.from_xml_string(text.format(size))
         data = mujoco.MjData(model)
+        data.userdata[:] = content
         with callbacks(control=loop._control, passive=passive_callback(offsets())):
             mujoco.mj_step(model, data, 10)
         assert data.time == pytest.approx(10 * model.opt.timestep)
-        assert np.all(data.userdata == 0)
+        assert np.array_equal(data.userdata, np.full(size, content or 0.0), equal_nan=True)
+
+
+def test_stepping_or_resetting_a_loops_own_plant():
+    loop = robot_system(robot_state(FIVE), engine="mujoco").closed_loop(clock(0.01))
+    loop.plant.step(np.ones(5), 3)  # before the start: the loop starts from there
+    assert len(loop.advance(4, 1).input) == 4
+    loop.plant.step(np.ones(5), 3)
+    moved = loop.plant.state
+    assert np.array_equal(loop.advance(1, 1).state[0], moved)
+    loop.plant.reset(robot_state(FIVE))
+    with pytest.raises(EngineError, match="was reset"):
+        loop.advance(1, 1)
+    with pytest.raises(EngineError, match="was reset"):
+        loop.finish()
 
 
 def test_a_reset_simulation_is_not_started():

@@ -150,6 +150,8 @@ def test_leaving_the_set_is_a_status_with_its_sentence():
         assert trajectory.status == "left_feasible_set"
         assert not trajectory.holds
         assert "constraint 'gap of agent 1' was violated at" in report["message"]
+        assert report["worst_constraint"]["margin"] <= 0
+        assert report["worst_gap"]["gap"] >= report["worst_gap"]["bound"]
         data = trajectory["robots"]
         assert np.max(data["constraint"].to_numpy()[-1]) >= 0
         assert np.all(data["constraint"].to_numpy()[:-1] < 0)
@@ -241,6 +243,31 @@ def test_ctrl_c_keeps_what_was_done():
     assert not trajectory.holds
     assert 0 < trajectory["robots"]["time"].to_numpy()[-1] < 2000
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_run_goes_on_after_an_interruption():
+    changes = {"simulation.duration": 2000, "plant.engine": "ode"}
+    simulation = load_scenario("velocity-sync", changes).simulation_object()
+    simulation.step()
+    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    first = simulation.run()
+    timer.join()
+    assert first.status == "interrupted"
+    whole = simulation.run()
+    assert whole.status == "converged"
+    times = whole["robots"]["time"].to_numpy()
+    assert np.all(np.diff(times) > 0)
+    assert np.allclose(np.diff(times[:-1]), 0.05)
+    assert times[-1] == pytest.approx(2000)
+
+
+def test_a_run_that_never_began_claims_nothing():
+    report = simulate(robot_system(robot_state(FIVE), rho=1e15)).reports["robots"]
+    assert report["status"] == "diverged"
+    assert report["worst_constraint"] is None
+    assert report["worst_gap"] is None
+    assert not report["lyapunov"]["claimed"]
 
 
 def test_running_twice_gives_the_same_bits():

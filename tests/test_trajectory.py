@@ -8,6 +8,7 @@ from importlib.metadata import version
 import numpy as np
 import pytest
 
+from gne_mj.errors import InvalidInput
 from gne_mj.scenario import load_scenario, run
 from gne_mj.trajectory import Trajectory
 
@@ -23,7 +24,7 @@ TIMES = 21
 COMMON = {
     "time": (("time",), "s"),
     "constraint": (("time", "constraint"), None),
-    "state": (("time", "agent", "component"), None),
+    "state": (("time", "agent", "component"), "m, m/s, m/s, m"),
 }
 ROBOTS = {
     **COMMON,
@@ -38,7 +39,8 @@ ROBOTS = {
 CHANNELS = {
     **COMMON,
     "action": (("time", "agent"), "mW"),
-    "input": (("time", "agent"), ""),
+    "input": (("time", "agent"), "mW/s"),
+    "state": (("time", "agent", "component"), "mW, mW"),
     "estimate": (("time", "estimating_agent", "agent"), "mW"),
     "filtered_action": (("time", "agent"), "mW"),
     "equilibrium": (("agent",), "mW"),
@@ -194,15 +196,15 @@ def test_nothing_is_written_over(trajectory, tmp_path):
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "file").write_text("mine")
-    with pytest.raises(FileExistsError, match="mine"):
+    with pytest.raises(InvalidInput, match="mine"):
         trajectory.save(mine)
-    with pytest.raises(FileExistsError):
+    with pytest.raises(InvalidInput):
         trajectory.save(str(mine / "file"))
     assert [path.name for path in mine.iterdir()] == ["file"]
     assert (mine / "file").read_text() == "mine"
     saved = trajectory.save(tmp_path / "new")
     before = sorted(path.stat().st_mtime_ns for path in saved.rglob("*"))
-    with pytest.raises(FileExistsError):
+    with pytest.raises(InvalidInput):
         trajectory.save(saved)
     assert sorted(path.stat().st_mtime_ns for path in saved.rglob("*")) == before
 

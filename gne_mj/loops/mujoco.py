@@ -4,7 +4,7 @@ MuJoCo evaluates control at every stage of its integrator. The callback counts t
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
 (:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. What it keeps
 from call to call lies in mjData's ``userdata``, which is part of MuJoCo's state:
-[address of the table, arctangents of the springs, step, stage, monitor, input held, scratch].
+[mark, address of the table, arctangents of the springs, step, stage, monitor, input held, scratch].
 """
 
 from functools import cache
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.errors import EngineError
 from gne_mj.game import Game, GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import monitor as watch
@@ -37,6 +38,8 @@ from gne_mj.plants.mujoco import (
 )
 from gne_mj.plants.native_mujoco import (
     CALLBACK,
+    LOOP_MARK,
+    USERDATA_HEADER,
     Offsets,
     Table,
     address_of,
@@ -137,7 +140,7 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
         _ = source
         struct = address_of(data)
         table = table_of(at, address_of(model), struct)
-        if table == 0:
+        if table <= 0:
             return
         sizes, steps = integers(table, SIZES), integers(table, STEP)
         ctrl = field(struct, at.ctrl, sizes[2])
@@ -264,7 +267,6 @@ class MujocoLoop(ClosedLoop):
         )
         data = plant.data
         data.userdata[:] = 0.0
-        data.userdata[0] = self._table.address
         self._step = 0
         length = int(watch.length(self._m, self._p))
         start = MONITOR + self._m
@@ -283,6 +285,7 @@ class MujocoLoop(ClosedLoop):
             samples = 0
         data = self.plant.data
         rows, inputs = np.empty((samples, *self._before.shape)), np.empty((samples, self._m))
+        self._mark()
         # The callback counts steps and stages; a step that ended in an exit is not one of them.
         data.userdata[STEP_NOW + self._m] = self._step
         data.userdata[STAGE_NOW + self._m] = 0.0
@@ -298,9 +301,18 @@ class MujocoLoop(ClosedLoop):
     def finish(self) -> Samples:
         """See the base class."""
         data = self.plant.data
+        self._mark()
         inside = self._finish(self.plant.model._address, data._address, self._step)
         u = self._u if inside else np.full(self._m, np.nan)
         return self._samples(np.stack([data.qpos, data.qvel])[None], u[None].copy())
+
+    def _mark(self) -> None:
+        """Mark the data as this loop's: the plant's own step, or a reset, may have come between."""
+        if self._step > 0 and self.monitor[watch.STARTED] == 0.0:
+            raise EngineError(
+                "the loop's MuJoCo data was reset: make a new loop to start from there"
+            )
+        self.plant.data.userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
 
     def _samples(self, rows: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
         state = self.plant.states_of(rows[:, 0], rows[:, 1])

@@ -289,7 +289,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
                     law, agent, game, problem, channels, modes, method, states, progress, state,
                     u, monitor, work, solver,
                 ):  # fmt: skip
-                    return sample, step
+                    return sample + 1, step
             step += every
         return len(samples_u), step
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
 
 
@@ -25,6 +26,22 @@ class Agents:
     parameters: NDArray[np.float64]
     input_limit: NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        width = len(self.kind.PARAMETERS)
+        parameters = np.array(self.parameters, dtype=np.float64)
+        if parameters.ndim != 2 or parameters.shape[1] != width:
+            raise InvalidInput(
+                "agents.parameters", parameters.shape, f"its shape must be (channels, {width})"
+            )
+        limit = np.array(self.input_limit, dtype=np.float64)
+        if limit.shape != parameters.shape[:1] or not np.all(limit > 0):
+            raise InvalidInput(
+                "agents.input_limit", limit, f"it must be {len(parameters)} positive numbers"
+            )
+        parameters.flags.writeable = limit.flags.writeable = False
+        object.__setattr__(self, "parameters", parameters)
+        object.__setattr__(self, "input_limit", limit)
+
     @property
     def channels(self) -> int:
         """m."""
@@ -37,20 +54,23 @@ class Agents:
 
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""
-        return self._each(_native(self.kind)[0], y)
+        y = np.ascontiguousarray(y, dtype=np.float64)
+        if y.shape != (self.channels,):
+            raise ValueError(f"y must be ({self.channels},), not {y.shape}")
+        out = np.zeros((self.channels, self.states))
+        _native(self.kind)[0](self.parameters, y, out)
+        return out
 
     def storage(self, state: ArrayLike, rest: ArrayLike) -> NDArray[np.float64]:
         """V^{x*} of each channel; states (..., m, states), equilibrium (m, states): (..., m)."""
+        shape = (self.channels, self.states)
         state = np.ascontiguousarray(state, dtype=np.float64)
-        out = np.empty(state.shape[:-1])
-        rows = state.reshape(-1, self.channels, self.states)
         rest = np.ascontiguousarray(rest, dtype=np.float64)
+        if state.shape[-2:] != shape or rest.shape != shape:
+            raise ValueError(f"states must be (..., {shape[0]}, {shape[1]}), not {state.shape}")
+        out = np.empty(state.shape[:-1])
+        rows = state.reshape(-1, *shape)
         _native(self.kind)[1](self.parameters, rows, rest, out.reshape(len(rows), self.channels))
-        return out
-
-    def _each(self, native: Any, y: ArrayLike) -> NDArray[np.float64]:
-        out = np.zeros((self.channels, self.states))
-        native(self.parameters, np.ascontiguousarray(y, dtype=np.float64), out)
         return out
 
 

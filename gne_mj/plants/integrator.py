@@ -1,9 +1,9 @@
 """Integrator agent [eq:int]: y' = u, one state a channel; V = y^2 / 2.
 
 Every agent module describes one channel, that is one scalar output with its input; an agent with
-an action of m_i entries is m_i such channels. It defines STATES (their names and units), OUTPUT
-(which of them is y), INPUT (how u enters x'), ``is_passive`` (whether given
-parameters meet the theory's assumption), and the kernels below.
+an action of m_i entries is m_i such channels. It defines PARAMETERS (their names), STATES (names
+and units), OUTPUT (which of them is y), ``is_passive`` (whether given parameters meet the theory's
+assumption), and the kernels below; x' is affine in u.
 """
 
 from gne_mj.native import kernel
@@ -12,7 +12,6 @@ NAME = "integrator"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)
 OUTPUT = 0
-INPUT = (1.0,)
 
 
 def is_passive(parameters):

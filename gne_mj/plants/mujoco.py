@@ -15,6 +15,8 @@ from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import compile_model, compose
 from gne_mj.plants.native_mujoco import (
     CALLBACK,
+    PLANT_MARK,
+    USERDATA_HEADER,
     Offsets,
     Table,
     address_of,
@@ -38,8 +40,8 @@ PLANT_TABLE = 3
 # A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
 MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
 
-# A fleet's userdata: the table's address, then the springs' arctangents at the last evaluation
-ARCTANGENTS = 1
+# A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
+ARCTANGENTS = USERDATA_HEADER
 
 
 @kernel
@@ -65,7 +67,7 @@ def passive_callback(at: Offsets) -> Any:
     def passive(model, data):
         _ = source
         struct = address_of(data)
-        table = table_of(at, address_of(model), struct)
+        table = abs(table_of(at, address_of(model), struct))
         if table == 0:
             return
         sizes = integers(table, SIZES)
@@ -89,8 +91,11 @@ def passive_callback(at: Offsets) -> Any:
 def run_steps() -> Any:
     """The native loop of plain mj_step: (address of mj_step, of the model, of the data, steps)."""
 
+    source = source_key()
+
     @compiled
     def run(mj_step, model, data, steps):
+        _ = source
         for _step in range(steps):
             call(mj_step, model, data)
 
@@ -186,7 +191,7 @@ class MujocoPlant(Plant):
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
-        self.data.userdata[0] = self._table.address
+        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
         self.data.ctrl[self.places[:, ACTUATOR]] = u
         with callbacks(passive=passive_callback(offsets())):
             run_steps()(step_address(), self.model._address, self.data._address, steps)

@@ -3,8 +3,9 @@
 MuJoCo calls plain C functions ``(const mjModel*, mjData*)`` where it evaluates control and passive
 forces. What such a callback needs is reached through two pointers: a field's offset inside mjData
 is found at start-up by looking for its array's address in the struct's memory and is checked by
-writing and reading back; everything else lies in a table of arrays whose address is kept in
-``userdata[0]``. No address there means that the simulation is not one of ours.
+writing and reading back; everything else lies in a table of arrays. ``userdata`` begins with a
+mark that says whose simulation this is, and that table's address. A simulation without the mark is
+left alone.
 """
 
 import ctypes
@@ -28,6 +29,12 @@ from gne_mj.native import array_at, callback, compiled, kernel, load_word
 CALLBACK = types.void(types.voidptr, types.voidptr)
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 _WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+
+
+# What userdata begins with. All zero, as after a reset, means "not started".
+MARK, TABLE_ADDRESS, USERDATA_HEADER = range(3)
+# Marks: numbers that nobody else would write there by chance.
+PLANT_MARK, LOOP_MARK = 7.390125461e173, 5.870193424e191
 
 
 class Offsets(NamedTuple):
@@ -62,11 +69,18 @@ def offsets() -> Offsets:
         array = getattr(data, name)
         array[0] = mark
         if read_back(data._address, getattr(result, name)) != mark or array[0] != -mark:
-            raise EngineError(
-                f"MuJoCo {mujoco.__version__} keeps mjData.{name} elsewhere than expected,"
-                " so its simulations cannot be driven natively"
-            )
+            raise _unknown_layout(f"mjData.{name}")
+    other = mujoco.MjModel.from_xml_string('<mujoco><size nuserdata="6133"/></mujoco>')
+    if ctypes.c_int64.from_address(other._address + 8 * result.nuserdata).value != 6133:
+        raise _unknown_layout("mjModel.nuserdata")
     return result
+
+
+def _unknown_layout(name: str) -> EngineError:
+    return EngineError(
+        f"MuJoCo {mujoco.__version__} keeps {name} elsewhere than expected, so its simulations"
+        " cannot be driven natively"
+    )
 
 
 def _find(struct: int, word: int) -> int:
@@ -77,10 +91,7 @@ def _find(struct: int, word: int) -> int:
         for index, content in enumerate(words):
             if content == word:
                 return start + index
-    raise EngineError(
-        f"MuJoCo {mujoco.__version__} has an unknown struct layout, so its simulations cannot be"
-        " driven natively"
-    )
+    raise _unknown_layout("a field")
 
 
 @cache
@@ -160,13 +171,16 @@ def step_address() -> int:
 class Table:
     """Arrays that callbacks read, as one block of (address, length) pairs.
 
-    The arrays are kept alive as long as the table is.
+    The arrays are kept alive as long as the table is; so keep the plant or loop that made a
+    simulation for as long as that simulation, or a copy of it, is stepped with its callbacks.
     """
 
     def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
         for array in arrays:
-            assert array.dtype in (np.float64, np.int64), array.dtype
-            assert array.flags.c_contiguous
+            if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
+                raise EngineError(
+                    f"native code reads contiguous arrays of 8-byte items, not {array.dtype}"
+                )
         self._arrays = tuple(arrays)
         pairs = [(array.ctypes.data, array.size) for array in arrays]
         self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
@@ -175,7 +189,8 @@ class Table:
     def address(self) -> float:
         """Where the pairs lie; a double holds a user-space address exactly."""
         address = self._pairs.ctypes.data
-        assert int(float(address)) == address
+        if int(float(address)) != address:
+            raise EngineError(f"the address {address} does not fit into a double")
         return float(address)
 
 
@@ -207,10 +222,18 @@ def _entry(item: types.Type) -> Any:
 
 @kernel
 def table_of(at, model, data):
-    """Address of a simulation's table, given both structs' addresses; 0 if it has none."""
-    if word(model, at.nuserdata) == 0:
+    """Address of a simulation's table, given both structs' addresses.
+
+    0 for a simulation that is not ours; negative for that of a plant without a loop.
+    """
+    if word(model, at.nuserdata) < USERDATA_HEADER:
         return np.int64(0)
-    return np.int64(field(data, at.userdata, 1)[0])
+    userdata = field(data, at.userdata, USERDATA_HEADER)
+    if userdata[MARK] == LOOP_MARK:
+        return np.int64(userdata[TABLE_ADDRESS])
+    if userdata[MARK] == PLANT_MARK:
+        return -np.int64(userdata[TABLE_ADDRESS])
+    return np.int64(0)
 
 
 @cache

@@ -96,7 +96,7 @@ class OdePlant(Plant):
             METHODS[self.integrator],
             self.timestep,
             self._state,
-            np.ascontiguousarray(u, dtype=np.float64),
+            np.ascontiguousarray(np.broadcast_to(u, self.agents.channels), dtype=np.float64),
             steps,
             self._scratch,
         )

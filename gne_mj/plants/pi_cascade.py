@@ -15,7 +15,6 @@ NAME = "PI cascade"
 PARAMETERS = ("decay_rate", "integral_gain")
 STATES = (("action", ""), ("integral", ""))
 OUTPUT = 0
-INPUT = (1.0, 1.0)
 
 
 def is_passive(parameters):
