@@ -88,9 +88,15 @@ def plot(
     for name in formats:
         if name not in plots.FORMATS:
             raise InvalidInput("--format", name, f"choose from {', '.join(plots.FORMATS)}")
+    try:
+        trajectory = Trajectory.load(store)
+    except (OSError, KeyError):
+        raise InvalidInput(
+            "RUN", str(run_folder), "its trajectory.zarr must be one that a run wrote"
+        ) from None
     target = out or run_folder
     target.mkdir(parents=True, exist_ok=True)
-    for path in plots.save(Trajectory.load(store), target, formats):
+    for path in plots.save(trajectory, target, formats):
         print(path)
 
 

@@ -195,6 +195,17 @@ def test_a_folder_that_cannot_be_written(tmp_path, capsys, monkeypatch):
     assert "cannot be written" in capsys.readouterr().err
 
 
+def test_plot_of_a_folder_that_no_run_wrote(tmp_path, capsys, monkeypatch):
+    for content in ((), ("trajectory.zarr",)):
+        for name in content:
+            (tmp_path / name).mkdir()
+        monkeypatch.setattr("sys.argv", ["gne-mj", "plot", str(tmp_path)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert ended.value.code == 2
+        assert capsys.readouterr().err.startswith("gne-mj: RUN: got ")
+
+
 def test_a_broken_file(tmp_path):
     path = tmp_path / "broken.toml"
     path.write_text("[systems\n")
