@@ -52,11 +52,14 @@ def callback(signature: types.Type, function: Callable[..., Any]) -> Any:
 
 @cache
 def _package_digest() -> str:
+    """Digest of all files that can hold kernels, loops or constants that are baked into them."""
     digest = hashlib.sha256()
     root = Path(__file__).parent
-    for folder in (root, root / "controllers", root / "games", root / "plants", root / "loops"):
-        for path in sorted(folder.glob("*.py")):
-            digest.update(path.read_bytes())
+    native = [path for path in root.glob("*.py") if b"gne_mj.native" in path.read_bytes()]
+    for folder in ("controllers", "games", "plants", "loops"):
+        native.extend((root / folder).glob("*.py"))
+    for path in sorted([*native, Path(__file__)]):
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
