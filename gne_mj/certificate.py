@@ -194,9 +194,9 @@ def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str,
 
 def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
     worst, when = _worst(system, monitor)
-    if system.game.kernels is not velocity or not np.any(np.isfinite(worst)):
+    bounds = system.game.gap_bounds
+    if bounds is None or not np.any(np.isfinite(worst)):
         return None
-    bounds = system.game.parameters[1:]
     gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
     index = int(np.argmax(gaps / bounds))
     return {

@@ -18,7 +18,7 @@ agent, a and b entries of a profile (a belonging to agent i) and l a constraint,
 :class:`Game` joins such a module with its parameters and with who appears where.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
@@ -28,6 +28,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, source_key
+
+# Lower and upper bounds of the entries of an array
+Box = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class GameData(NamedTuple):
@@ -60,6 +63,11 @@ class Game:
         constraint_names: one name for each constraint, used in messages and files.
         action_name: what an action is, e.g. "velocity".
         action_unit: its unit.
+        affine: whether F is an affine map, so that its Jacobian is the same everywhere.
+        box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
+        jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
+            every entry of dF/dy over it, each (m, m).
+        gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
     """
 
     name: str
@@ -71,6 +79,10 @@ class Game:
     constraint_names: tuple[str, ...]
     action_name: str = "action"
     action_unit: str = ""
+    affine: bool = False
+    box: Box | None = None
+    jacobian_bounds: Callable[[Box], Box] | None = None
+    gap_bounds: NDArray[np.float64] | None = None
 
     @property
     def agents(self) -> int:

@@ -74,6 +74,7 @@ def osnr_game(
         constraint_names=(*(f"power of channel {i + 1} >= 0" for i in everyone), "total power"),
         action_name="power",
         action_unit="mW",
+        box=(np.zeros(agents), np.full(agents, total_power_limit)),
     )
 
 

@@ -27,6 +27,7 @@ def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) 
     bounds = np.broadcast_to(np.asarray(gap_bound, dtype=np.float64), (agents,))
     if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
         raise InvalidInput("game.gap_bound", gap_bound, "every bound must be positive and finite")
+    reach = np.cumsum(bounds)
     predecessors = [[] if i == 0 else [i - 1] for i in range(agents)]
     return Game(
         name="velocity synchronisation",
@@ -38,6 +39,9 @@ def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) 
         constraint_names=tuple(f"gap of agent {i + 1}" for i in range(agents)),
         action_name="velocity",
         action_unit="m/s",
+        affine=True,
+        box=(reference_velocity - reach, reference_velocity + reach),
+        gap_bounds=bounds,
     )
 
 
