@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj import graph as graphs
-from gne_mj.controllers import FullInformation, FullyDistributed, Law
+from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
@@ -188,24 +188,42 @@ class FullController(_Table):
         return FullInformation()
 
 
-class DistributedController(_Table):
+class _NetworkController(_Table):
+    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
+    )
+
+    def network(self, count: int) -> graphs.Graph:
+        """The communication graph."""
+        if isinstance(self.graph, str):
+            return graphs.NAMED[self.graph](count)
+        return graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
+
+
+class PartialController(_NetworkController):
+    """[eq:nonlinearPIFeedback]"""
+
+    information: Literal["partial"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+    coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
+    time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
+
+    def build(self, count: int) -> Law:
+        """The law."""
+        return PartialInformation(self.network(count), self.coupling, self.time_constant)
+
+
+class DistributedController(_NetworkController):
     """[eq:CenterFeedback]"""
 
     information: Literal["distributed"]
     mode: Literal["continuous", "sampled"] = "continuous"
     epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
     gain: float = Field(1.0, gt=0, description="k")
-    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
-        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
-    )
 
     def build(self, count: int) -> Law:
         """The law."""
-        if isinstance(self.graph, str):
-            graph = graphs.NAMED[self.graph](count)
-        else:
-            graph = graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
-        return FullyDistributed(graph, self.epsilon, self.gain)
+        return FullyDistributed(self.network(count), self.epsilon, self.gain)
 
 
 class PlantTable(_Table):
@@ -225,6 +243,10 @@ class InitialTable(_Table):
     appendage_velocity: PerAgent | None = Field(None, description="robots: x3(0) in m/s")
     position: PerAgent | None = Field(None, description="robots: d(0) in m")
     integral: PerAgent | None = Field(None, description="PI cascade: s(0)")
+    estimate: float | list[float] | list[list[float]] | None = Field(
+        None, description="one number, a profile that all agents hold, or one profile each; y(0)"
+    )
+    filtered: PerAgent | None = Field(None, description="distributed law: z(0); y(0) if left out")
 
     def build(self, agents: Agents, default: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
@@ -251,7 +273,8 @@ class SystemTable(_Table):
     agents: Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
     barrier: BarrierTable = BarrierTable()
     controller: Annotated[
-        FullController | DistributedController, Field(discriminator="information")
+        FullController | PartialController | DistributedController,
+        Field(discriminator="information"),
     ] = FullController(information="full")
     plant: PlantTable = PlantTable()
     initial: InitialTable = InitialTable()
@@ -264,6 +287,8 @@ class SystemTable(_Table):
             agents = self.agents.build()
             law = self.controller.build(count)
             state = self.initial.build(agents, self.game.default_start(count))
+            start = state[:, agents.kind.OUTPUT]
+            memory = law.initial_memory(start, self.initial.estimate, self.initial.filtered)
         except InvalidInput as error:
             raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
         return System(
@@ -273,6 +298,7 @@ class SystemTable(_Table):
             law=law,
             rho=self.barrier.rho,
             state=state,
+            memory=memory,
             mode=self.controller.mode,
             engine=self.plant.engine,
             integrator=self.plant.integrator or integrator_name,

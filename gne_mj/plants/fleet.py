@@ -43,9 +43,23 @@ def compose(parameters: NDArray[np.float64], *, decorated: bool = True) -> Any:
 
 
 def compile_model(
-    lane: Any, *, timestep: float, integrator: str, userdata: int = 0
+    lane: Any, *, timestep: float, integrator: str, userdata: int = 0, memory: int = 0
 ) -> mujoco.MjModel:
-    """Compile a composed fleet with its step in s, integrator and room for user data."""
+    """Compile a composed fleet.
+
+    Args:
+        lane: what :func:`compose` returned.
+        timestep: in s.
+        integrator: MuJoCo's name of it.
+        userdata: entries of mjData's ``userdata``.
+        memory: entries of ``act`` for a law's memory; an actuator without any force, ``memory``,
+            holds them, and its rates come from a callback.
+    """
+    if memory:
+        lane.actuator.add(
+            "general", name="memory", joint=lane.find_all("joint")[0], dyntype="user",
+            actdim=memory, gear=[0], gainprm=[0],
+        )  # fmt: skip
     lane.option.timestep = timestep
     lane.option.integrator = integrator
     lane.size.nuserdata = userdata
