@@ -4,5 +4,6 @@ from gne_mj.controllers.full_information import FullInformation
 from gne_mj.controllers.fully_distributed import FullyDistributed
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.partial_information import PartialInformation
+from gne_mj.controllers.plain_law import PlainLaw
 
-__all__ = ["FullInformation", "FullyDistributed", "Law", "PartialInformation"]
+__all__ = ["FullInformation", "FullyDistributed", "Law", "PartialInformation", "PlainLaw"]

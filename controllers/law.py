@@ -33,10 +33,12 @@ class Law(ABC):
     Attributes:
         information: name of the information structure.
         graph: over which agents communicate; None if they need not.
+        propagates: whether its memory can be propagated, as mode sampled needs.
     """
 
     information: ClassVar[str]
     graph: Graph | None = None
+    propagates: bool = True
 
     @property
     @abstractmethod

@@ -5,7 +5,8 @@ object they describe.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -18,10 +19,12 @@ from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialIn
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
-from gne_mj.plants import flexible_robot, integrator, pi_cascade
+from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
+from gne_mj.user_files import load_game, load_law
 
 # One number for all agents, or one each
 PerAgent = float | list[float]
@@ -102,6 +105,22 @@ class OsnrGame(_Table):
         return np.full(count, 0.8 * limit / count)
 
 
+class CustomGame(_Table):
+    """A game of the user's own."""
+
+    type: Literal["custom"]
+    file: str = Field(description="Python file that defines game(count, ...)")
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        return load_game(self.file, count, self.parameters)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """There is none."""
+        raise InvalidInput("initial.action", None, "a custom game has no default start: give one")
+
+
 class _AgentsTable(_Table):
     count: int = Field(gt=0, description="N")
     input_limit: PerAgent | None = Field(
@@ -171,6 +190,47 @@ class PiCascadeAgents(_AgentsTable):
         return Agents(pi_cascade, table, self.limits())
 
 
+class MjcfAgents(_AgentsTable):
+    """Robots of the user's own."""
+
+    type: Literal["mjcf-robot"]
+    file: str | list[str] = Field(description="MJCF file, one for all or one each")
+    output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
+    input: str | list[str] = Field(description="actuator that u_i drives")
+
+    def build(self) -> Agents:
+        """The agents."""
+        columns = []
+        for key in ("file", "output", "input"):
+            given = getattr(self, key)
+            each = [given] * self.count if isinstance(given, str) else given
+            if len(each) != self.count:
+                raise InvalidInput(
+                    f"agents.{key}", given, f"it must be one name or a list of {self.count}"
+                )
+            columns.append(each)
+        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
+        return mjcf_robots(robots, self.limits())
+
+
+class MixedAgents(_Table):
+    """Agents of several types."""
+
+    type: Literal["mixed"]
+    groups: list[
+        Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
+    ] = Field(min_length=1, description="tables of agents, one behind the other")
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return sum(group.count for group in self.groups)
+
+    def build(self) -> Agents:
+        """The agents."""
+        return mixed.join([group.build() for group in self.groups])
+
+
 class BarrierTable(_Table):
     """[eq:logbarrier]"""
 
@@ -183,7 +243,7 @@ class FullController(_Table):
     information: Literal["full"]
     mode: Literal["continuous", "sampled"] = "continuous"
 
-    def build(self, count: int) -> Law:
+    def build(self, game: Game) -> Law:
         """The law."""
         return FullInformation()
 
@@ -208,9 +268,9 @@ class PartialController(_NetworkController):
     coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
     time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
 
-    def build(self, count: int) -> Law:
+    def build(self, game: Game) -> Law:
         """The law."""
-        return PartialInformation(self.network(count), self.coupling, self.time_constant)
+        return PartialInformation(self.network(game.agents), self.coupling, self.time_constant)
 
 
 class DistributedController(_NetworkController):
@@ -221,15 +281,35 @@ class DistributedController(_NetworkController):
     epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
     gain: float = Field(1.0, gt=0, description="k")
 
-    def build(self, count: int) -> Law:
+    def build(self, game: Game) -> Law:
         """The law."""
-        return FullyDistributed(self.network(count), self.epsilon, self.gain)
+        return FullyDistributed(self.network(game.agents), self.epsilon, self.gain)
+
+
+class CustomController(_NetworkController):
+    """A law of the user's own."""
+
+    information: Literal["custom"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+    file: str = Field(description="Python file that defines law(game, graph, ...) or action(...)")
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        law = load_law(self.file, game, self.network(game.agents), self.parameters)
+        if self.mode == "sampled" and not law.propagates:
+            raise InvalidInput(
+                "controller.mode", self.mode, "a plain law with a memory runs in mode 'continuous'"
+            )
+        return law
 
 
 class PlantTable(_Table):
     """What moves the agents."""
 
-    engine: Literal["mujoco", "ode"] = "ode"
+    engine: Literal["mujoco", "ode"] | None = Field(
+        None, description="'ode' if left out, but 'mujoco' for MJCF robots"
+    )
     integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
         None, description="in place of the simulation's"
     )
@@ -248,10 +328,12 @@ class InitialTable(_Table):
     )
     filtered: PerAgent | None = Field(None, description="distributed law: z(0); y(0) if left out")
 
-    def build(self, agents: Agents, default: NDArray[np.float64]) -> NDArray[np.float64]:
+    def build(
+        self, agents: Agents, default: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
         count = agents.channels
-        y = default if self.action is None else _per_agent("initial.action", self.action, count)
+        y = default() if self.action is None else _per_agent("initial.action", self.action, count)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
         if agents.kind is flexible_robot:
@@ -269,11 +351,14 @@ class InitialTable(_Table):
 class SystemTable(_Table):
     """One game with its agents."""
 
-    game: Annotated[VelocityGame | OsnrGame, Field(discriminator="type")]
-    agents: Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
+    game: Annotated[VelocityGame | OsnrGame | CustomGame, Field(discriminator="type")]
+    agents: Annotated[
+        RobotAgents | IntegratorAgents | PiCascadeAgents | MixedAgents | MjcfAgents,
+        Field(discriminator="type"),
+    ]
     barrier: BarrierTable = BarrierTable()
     controller: Annotated[
-        FullController | PartialController | DistributedController,
+        FullController | PartialController | DistributedController | CustomController,
         Field(discriminator="information"),
     ] = FullController(information="full")
     plant: PlantTable = PlantTable()
@@ -285,8 +370,8 @@ class SystemTable(_Table):
         try:
             game = self.game.build(count)
             agents = self.agents.build()
-            law = self.controller.build(count)
-            state = self.initial.build(agents, self.game.default_start(count))
+            law = self.controller.build(game)
+            state = self.initial.build(agents, lambda: self.game.default_start(count))
             start = state[:, agents.kind.OUTPUT]
             memory = law.initial_memory(start, self.initial.estimate, self.initial.filtered)
         except InvalidInput as error:
@@ -300,7 +385,7 @@ class SystemTable(_Table):
             state=state,
             memory=memory,
             mode=self.controller.mode,
-            engine=self.plant.engine,
+            engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
             integrator=self.plant.integrator or integrator_name,
         )
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,14 @@ from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.loops.ode import Clock as LoopClock
+from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import METHODS, Channels
+
+if TYPE_CHECKING:
+    from gne_mj.plants.mjcf_fleet import MjcfPlant
+    from gne_mj.plants.mujoco import MujocoPlant
 
 # Largest step times rate of decay that a method is stable for, on the negative real axis
 STABLE = {"rk4": 2.785, "euler": 2.0}
@@ -152,12 +159,16 @@ class System:
 
     def _check_engine(self) -> None:
         key = f"systems.{self.name}.plant"
-        if self.engine == "mujoco" and self.agents.kind.NAME != "flexible robot":
+        own_model = isinstance(self.agents, MjcfRobots)
+        if self.engine == "mujoco" and not own_model and self.agents.kind is not flexible_robot:
             raise InvalidInput(
                 f"{key}.engine",
                 self.engine,
-                f"MuJoCo has models of flexible robots only; run {self.agents.kind.NAME}s on 'ode'",
+                f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
+                f" {self.agents.kind.NAME}s on 'ode'",
             )
+        if self.engine == "ode" and own_model:
+            raise InvalidInput(f"{key}.engine", self.engine, "MJCF robots run on 'mujoco'")
         if self.integrator == "rosenbrock" and (
             self.law.information != "distributed"
             or self.mode != "continuous"
@@ -176,7 +187,9 @@ class System:
         up to a constant of the method; lambda_max bounds the grounded Laplacians' eigenvalues.
         """
         law = self.law
-        if law.graph is None or self.mode != "continuous" or self.integrator == "rosenbrock":
+        if law.graph is None or law.estimate_rate == 0.0 or self.mode != "continuous":
+            return np.inf
+        if self.integrator == "rosenbrock":
             return np.inf
         # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
         fastest = max(1.0, law.graph.largest_eigenvalue)
@@ -231,15 +244,8 @@ class System:
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
-            from gne_mj.plants.mujoco import MujocoPlant
 
-            plant = MujocoPlant(
-                self.agents,
-                clock.timestep,
-                self.integrator,
-                userdata=room(self.game, self.agents),
-                memory=len(self.memory),
-            )
+            plant = self._mujoco_plant(clock.timestep, room(self.game, self.agents))
             plant.reset(self.state)
             return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
@@ -253,3 +259,26 @@ class System:
             )  # fmt: skip
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
         return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
+
+    def _mujoco_plant(self, timestep: float, userdata: int) -> "MujocoPlant | MjcfPlant":
+        from gne_mj.plants.mjcf_fleet import MjcfPlant
+        from gne_mj.plants.mujoco import MujocoPlant
+
+        memory = len(self.memory)
+        if not isinstance(self.agents, MjcfRobots):
+            return MujocoPlant(
+                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
+            )
+        plant = MjcfPlant(self.agents, timestep, self.integrator, userdata=userdata, memory=memory)
+        if (
+            not plant.measures_every_stage
+            and self.mode == "continuous"
+            and (self.integrator != "euler")
+        ):
+            raise InvalidInput(
+                f"systems.{self.name}.agents.output",
+                [robot.output for robot in self.agents.robots],
+                "a tendon's or actuator's sensor is read once a step: use mode 'sampled', or"
+                " integrator 'euler', or name a joint",
+            )
+        return plant

@@ -12,7 +12,7 @@ state at the step's start, flat state at a later stage].
 
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, look
 from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mujoco import (
+    MEMORY,
     NA,
     NU,
     NUSERDATA,
@@ -35,7 +36,6 @@ from gne_mj.plants.mujoco import (
     ROOM,
     SIZES,
     STAGES,
-    MujocoPlant,
 )
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
@@ -55,6 +55,10 @@ from gne_mj.plants.native_mujoco import (
     table_of,
 )
 from gne_mj.plants.ode import Channels
+
+if TYPE_CHECKING:
+    from gne_mj.plants.mjcf_fleet import MjcfPlant
+    from gne_mj.plants.mujoco import MujocoPlant
 
 # Behind the plant's arrays: the game's (as in GameData), the graph's, the propagator's, the rest
 GAME = PLANT_TABLE
@@ -190,7 +194,8 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
         acts = monitor[watch.EXIT] == watch.INSIDE and look(
             agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
-            stage, storage, state, field(struct, at.act, sizes[NA]), u, monitor, work,
+            stage, storage, state, field(struct, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor,
+            work,
         )  # fmt: skip
         for r in range(m):
             ctrl[fleet.actuator_of(table, r)] = work.u[r] if acts else 0.0
@@ -202,7 +207,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         if table <= 0:
             return 0.0
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        rates = field(struct, at.act_dot, sizes[NA])
+        rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
         if steps[5] != CONTINUOUS:
             for r in range(len(rates)):
                 rates[r] = 0.0
@@ -211,7 +216,8 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         _monitor, _u, work, _state, _later = parts_of(
             userdata, sizes[ROOM], steps[0], steps[1], steps[2], states
         )
-        law.rate(problem_in(table), work.y, field(struct, at.act, sizes[NA]), rates)
+        memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
+        law.rate(problem_in(table), work.y, memory, rates)
         return 0.0
 
     def advance(
@@ -268,7 +274,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         return begin_step(
             agent, law, game, problem_in(table), channels,
             Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0), step, storage, state,
-            field(data, at.act, sizes[NA]), u, monitor, work,
+            field(data, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor, work,
         )  # fmt: skip
 
     return (
@@ -299,7 +305,7 @@ class MujocoLoop(ClosedLoop):
 
     def __init__(
         self,
-        plant: MujocoPlant,
+        plant: "MujocoPlant | MjcfPlant",
         law: ModuleType,
         game: ModuleType,
         problem: Problem,
@@ -333,9 +339,11 @@ class MujocoLoop(ClosedLoop):
         )
         data = plant.data
         data.userdata[:] = 0.0
-        data.act[:] = memory
+        sizes = plant.table_arrays[SIZES]
+        self._memory = data.act[sizes[MEMORY] :]
+        self._memory[:] = memory
         self._step = 0
-        self._start = int(plant.table_arrays[SIZES][ROOM])
+        self._start = int(sizes[ROOM])
         self._sizes = (m, p, agents)
         # in mode sampled the memory stands still but at control instants
         restores = mode == CONTINUOUS and len(memory) > 0
@@ -361,7 +369,7 @@ class MujocoLoop(ClosedLoop):
         recorded = (
             np.empty((samples, m * agents.states)),
             np.empty((samples, m)),
-            np.empty((samples, len(data.act))),
+            np.empty((samples, len(self._memory))),
         )
         self._mark()
         # The callback counts steps and stages; a step that ended in an exit is not one of them.
@@ -372,7 +380,7 @@ class MujocoLoop(ClosedLoop):
         ):
             done, steps = self._advance(
                 step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
-                data.act, data.userdata, self._start, *self._sizes, restores, every, before,
+                self._memory, data.userdata, self._start, *self._sizes, restores, every, before,
                 *recorded,
             )  # fmt: skip
         self._step += steps
@@ -383,10 +391,11 @@ class MujocoLoop(ClosedLoop):
     def finish(self) -> Samples:
         """See the base class."""
         data = self.plant.data
+        state = self.plant.state  # first, since it brings a plant's sensors up to date
         self._mark()
         inside = self._finish(self.plant.model._address, data._address, self._step)
         u = self._u if inside else np.full_like(self._u, np.nan)
-        return Samples(self.plant.state[None], u[None].copy(), data.act[None].copy())
+        return Samples(state[None], u[None].copy(), self._memory[None].copy())
 
     def _mark(self) -> None:
         """Mark the data as this loop's: the plant's own step, or a reset, may have come between."""

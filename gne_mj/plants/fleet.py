@@ -21,8 +21,8 @@ def compose(parameters: NDArray[np.float64], *, decorated: bool = True) -> Any:
         A ``dm_control.mjcf.RootElement``; robot i's elements are named ``robot_i/...``, from 1.
     """
     mjcf = _import_mjcf()
-    lane = mjcf.from_xml_string(_read("lane.xml"))
-    robot_xml = _read("flexible_robot.xml")
+    lane = mjcf.from_xml_string(read_model("lane.xml"))
+    robot_xml = read_model("flexible_robot.xml")
     if not decorated:
         lane.worldbody.light.clear()
         lane.worldbody.geom.clear()
@@ -66,7 +66,8 @@ def compile_model(
     return mujoco.MjModel.from_xml_string(lane.to_xml_string())
 
 
-def _read(name: str) -> str:
+def read_model(name: str) -> str:
+    """The text of a packaged MJCF file."""
     with as_file(files("gne_mj.models").joinpath(name)) as path:
         return path.read_text(encoding="utf-8")
 

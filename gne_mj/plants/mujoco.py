@@ -41,8 +41,9 @@ PLANT_TABLE = 3
 # A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
 MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
 
-# Entries of SIZES: lengths of mjData's arrays, and of userdata before what a loop keeps there
-NQ, NV, NU, NUSERDATA, NA, ROOM = range(6)
+# Entries of SIZES: lengths of mjData's arrays, and where a loop's part of userdata and the
+# memory's part of act begin
+NQ, NV, NU, NUSERDATA, NA, ROOM, MEMORY = range(7)
 
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
@@ -190,7 +191,7 @@ class MujocoPlant(Plant):
         ]
         model = self.model
         room = ARCTANGENTS + self.agents.channels
-        sizes = (model.nq, model.nv, model.nu, model.nuserdata, model.na, room)
+        sizes = (model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)
         return [
             self.places,
             np.ascontiguousarray(self.agents.parameters[:, 3]),
