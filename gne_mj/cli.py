@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from gne_mj.scenario import Scenario
     from gne_mj.trajectory import Trajectory
 
 app = typer.Typer(
@@ -41,6 +42,45 @@ def run(scenario: _SCENARIO, set_: _SET = None, out: _OUT = None, as_json: _JSON
     if out is not None and not as_json:
         print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
     raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def certify(
+    scenario: _SCENARIO,
+    set_: _SET = None,
+    as_json: _JSON = False,
+    search: Annotated[
+        bool,
+        typer.Option(
+            "--search-epsilon", help="Find by trial runs the largest epsilon that stays inside."
+        ),
+    ] = False,
+) -> None:
+    """Tell what the theory guarantees for a scenario's systems, and what it does not."""
+    from dataclasses import asdict, replace
+
+    from gne_mj.errors import InvalidInput
+    from gne_mj.theory import certify as examine
+    from gne_mj.theory import search_epsilon, words
+
+    loaded = _load(scenario, set_)
+    clock = loaded.clock()
+    systems = loaded.system_objects()
+    reports = {system.name: examine(system, clock) for system in systems}
+    if search:
+        searched = [s for s in systems if reports[s.name].epsilon is not None]
+        if not searched:
+            raise InvalidInput("--search-epsilon", scenario, "no system has the distributed law")
+        for system in searched:
+            with _working(as_json, f"searching epsilon of {system.name}") as tell:
+                found = asdict(search_epsilon(system, clock, tell))
+            epsilon = {**(reports[system.name].epsilon or {}), "search": found}
+            reports[system.name] = replace(reports[system.name], epsilon=epsilon)
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    else:
+        for report in reports.values():
+            print("\n".join(words(report)))
 
 
 @app.command()
@@ -164,6 +204,19 @@ def _fail(message: str, status: str | None = None) -> None:
     sys.exit(2)
 
 
+def _load(scenario: str, changes: list[str] | None) -> "Scenario":
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import load_scenario, parse_value
+
+    settings: dict[str, Any] = {}
+    for change in changes or []:
+        key, equals, value = change.partition("=")
+        if not (key and equals):
+            raise InvalidInput("--set", change, "it must read KEY=VALUE")
+        settings[key.strip()] = parse_value(value.strip())
+    return load_scenario(scenario, settings)
+
+
 def _simulate(
     scenario: str,
     changes: list[str] | None,
@@ -173,18 +226,10 @@ def _simulate(
     replace: bool = False,
     figures: tuple[str, ...] = (),
 ) -> "Trajectory":
-    from gne_mj.errors import InvalidInput
-    from gne_mj.scenario import load_scenario, parse_value
     from gne_mj.simulation import interruption
 
-    settings: dict[str, Any] = {}
-    for change in changes or []:
-        key, equals, value = change.partition("=")
-        if not (key and equals):
-            raise InvalidInput("--set", change, "it must read KEY=VALUE")
-        settings[key.strip()] = parse_value(value.strip())
-    with _preparing(quiet):
-        simulation = load_scenario(scenario, settings).simulation_object()
+    with _working(quiet, "preparing (a first run compiles for a few seconds)"):
+        simulation = _load(scenario, changes).simulation_object()
     # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
     with (
         interruption(),
@@ -256,15 +301,15 @@ def _replace(folder: Path, out: Path) -> None:
 
 
 @contextmanager
-def _preparing(quiet: bool) -> Iterator[None]:
-    """A word on a terminal's stderr while a first run compiles."""
+def _working(quiet: bool, what: str) -> Iterator[Any]:
+    """A word on a terminal's stderr meanwhile; what is handed out changes it."""
     if quiet or not sys.stderr.isatty():
-        yield
+        yield None
         return
     from rich.console import Console
 
-    with Console(stderr=True).status("preparing (a first run compiles for a few seconds)"):
-        yield
+    with Console(stderr=True).status(what) as status:
+        yield status.update
 
 
 @contextmanager
