@@ -120,13 +120,15 @@ class Slopes:
     @property
     def monotone(self) -> bool:
         """Whether F is certainly strongly monotone over the set: mu > 0 beyond rounding."""
-        return self.mu.certified and self.mu.value > 1e-12 * self.theta_1.value
+        if self.label == SAMPLED:
+            return False
+        return self.mu.value > 1e-12 * float(np.max(np.abs(self._greatest)))
 
     @property
     def refuted(self) -> bool:
         """Whether F is certainly not strongly monotone: a negative direction was met."""
         met = self.mu.value if self.label != BOUNDED else self.samples["mu"]
-        return bool(met < -1e-9 * max(1.0, self.theta_1.value))
+        return met < -1e-9 * max(1.0, self.theta_1.value)
 
     @cached_property
     def samples(self) -> dict[str, float]:
@@ -206,12 +208,12 @@ def profiles(
     return center + ways[:, None] * (ends - center)
 
 
-def _monotonicity(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _monotonicity(slopes: NDArray[np.float64]) -> NDArray[np.floating]:
     """Least eigenvalue of the symmetric part of each matrix (..., m, m)."""
     return np.linalg.eigvalsh(0.5 * (slopes + np.swapaxes(slopes, -1, -2)))[..., 0]
 
 
-def _row_norms(game: Game, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _row_norms(game: Game, slopes: NDArray[np.float64]) -> NDArray[np.floating]:
     """Greatest singular value of each agent's rows of each matrix (..., m, m): (..., N)."""
     if all(size == 1 for size in game.sizes):
         return np.linalg.norm(slopes, axis=-1)

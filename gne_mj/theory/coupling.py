@@ -46,7 +46,8 @@ class Coupling:
 
     Attributes:
         gain: c.
-        printed: mu (c lambda_2 - theta_2) > theta_2^2; never certified, since V can rise.
+        printed: mu (c lambda_2 - theta_2) > theta_2^2; never certified, since V can rise
+            all the same (docs/certificates.md has a case).
         rigorous: 4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2.
         quadratic: the quadratic form is positive definite; None where it is not computed.
         label: what ``quadratic`` is: "exact" for affine F, else "bounded".

@@ -14,9 +14,11 @@ from gne_mj.errors import InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.system import Clock, System
 
-# How the bracket's ends may differ, as a factor, and how far the search goes from the given value
+# How the bracket's ends may differ, as a factor
 PRECISION = 1.01
-FARTHEST = 2.0**20
+# The search ends at this fraction of the given value, and at this many durations: with a larger
+# epsilon estimates hardly move in a trial
+LEAST, MOST = 2.0**-20, 10.0
 
 
 @dataclass(frozen=True)
@@ -62,20 +64,22 @@ def search_epsilon(
         if progress is not None:
             progress(f"{system.name}: trying epsilon = {epsilon:.4g} s")
         trial = replace(system, law=replace(law, epsilon=epsilon))
-        trials.append((epsilon, _stays_inside(trial, clock)))
-        return trials[-1][1]
+        stayed = _stays_inside(trial, clock)
+        trials.append((epsilon, stayed))
+        return stayed
 
     note = None
     factor = 2.0 if stays(law.epsilon) else 0.5
     good = bad = epsilon = law.epsilon
     while True:
-        if not law.epsilon / FARTHEST < epsilon < law.epsilon * FARTHEST:
-            note = "the search went no further"
+        following = factor * epsilon
+        if following < LEAST * law.epsilon or following > MOST * clock.duration:
+            note = f"{following:.4g} s was not tried"
             break
         try:
-            stayed = stays(factor * epsilon)
+            stayed = stays(following)
         except InvalidInput as error:  # a step too long for a smaller epsilon
-            note = f"the search ended at epsilon = {factor * epsilon:.4g} s: {error.expected}"
+            note = f"{following:.4g} s cannot be tried: {error.expected}"
             break
         epsilon *= factor
         if stayed:

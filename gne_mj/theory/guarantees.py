@@ -17,6 +17,7 @@ from gne_mj.theory.gain import Gain, required_gain
 from gne_mj.theory.periods import linear_period, push_period
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
+CONVENTION = "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2, where the paper's definition has mu/2"
 THEOREMS = {
     FullInformation: "full information, lemma:FI and thm:FI",
     PartialInformation: "partial information, lemma:nonlinearPI and the theorem after it",
@@ -214,7 +215,7 @@ def _constants(slopes: Slopes) -> dict[str, Any]:
     box = slopes.box
     return {
         **{name: asdict(getattr(slopes, name)) for name in ("mu", "theta_1", "theta_2")},
-        "convention": "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2; the paper's definition has mu/2",
+        "convention": CONVENTION,
         "domain": "everywhere"
         if slopes.label == "exact"
         else "feasible profiles"

@@ -42,7 +42,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if g["gain"] is not None:
         yield "gain k", _gain(g["gain"])
     if g["epsilon"] is not None:
-        yield "epsilon", _epsilon(g["epsilon"])
+        yield "epsilon", _epsilon(g["epsilon"], g["status"])
     start = g["start"]
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
@@ -88,7 +88,7 @@ def _domain(constants: dict[str, Any]) -> str:
 def _coupling(coupling: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "coupling", f"c = {coupling['gain']:g}, tau = {coupling['time_constant']:g} s"
     texts = {
-        "printed": "mu (c lambda_2 - theta_2) > theta_2^2; V can rise",
+        "printed": "mu (c lambda_2 - theta_2) > theta_2^2; no proof, since theta_1 is missing",
         "rigorous": "4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2",
         "quadratic": f"-dV/dt's quadratic form positive definite ({coupling['label']})",
     }
@@ -99,6 +99,8 @@ def _coupling(coupling: dict[str, Any]) -> Iterator[tuple[str, str]]:
             continue
         least = _number(condition["least"])
         holds = "holds" if condition["holds"] else "does not hold"
+        if name != "printed" and not condition["certified"]:
+            holds += " with constants that are not certain"
         yield f"  {name}", f"{holds}, needs c > {least}: {text}"
 
 
@@ -116,11 +118,10 @@ def _gain(gain: dict[str, Any]) -> str:
     return text
 
 
-def _epsilon(epsilon: dict[str, Any]) -> str:
-    text = (
-        f"{epsilon['given']:g} s given; the theorem says that some epsilon* is small enough, and"
-        " computes none"
-    )
+def _epsilon(epsilon: dict[str, Any], status: str) -> str:
+    text = f"{epsilon['given']:g} s given"
+    if status == CONDITIONAL:
+        text += "; the theorem says that some epsilon* is small enough, and computes none"
     search = epsilon["search"]
     if search is None:
         return text + " (--search-epsilon tries)"
