@@ -117,8 +117,8 @@ def _first(error: ValidationError) -> InvalidInput:
     if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
         # of "one number or a list of them" the user meant the list
         detail = details[1]
-    tags = {"velocity-synchronization", "osnr", "flexible-robot", "integrator", "pi-cascade",
-            "full", "distributed", "float", "list", "literal"}  # fmt: skip
+    tags = {"velocity-synchronization", "osnr", "cournot", "flexible-robot", "integrator",
+            "pi-cascade", "full", "distributed", "float", "list", "literal"}  # fmt: skip
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})
