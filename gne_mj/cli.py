@@ -113,8 +113,8 @@ def passivity(
 ) -> None:
     """Look for violations of equilibrium-independent passivity in the plants of a scenario.
 
-    Trials last as long as the scenario and use its step and half of it; input limits and the
-    law's mode do not matter here. A violation is found for certain, its absence is no proof.
+    Trials last as long as the scenario, and use its step and half of it; input limits and the law
+    do not matter here. That no violation is found is no proof.
     """
     from gne_mj.errors import InvalidInput, nearest
     from gne_mj.passivity import examine, plants_of
@@ -134,6 +134,7 @@ def passivity(
                 trials=trials,
                 seed=seed,
                 outputs=built.game.box or (-1.0, 1.0),
+                owners=built.game.agent_of_action,
             )
         if not as_json:
             print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))
