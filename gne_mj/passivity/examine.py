@@ -6,7 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gne_mj.errors import InvalidInput
-from gne_mj.passivity.report import CHECKS, NO_VIOLATION, VIOLATED, Finding, PassivityReport
+from gne_mj.passivity.report import (
+    CHECKS,
+    NO_VIOLATION,
+    UNRESOLVED,
+    VIOLATED,
+    Finding,
+    PassivityReport,
+)
 from gne_mj.passivity.trials import Build, Rest, Storage, Trials
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
@@ -93,25 +100,31 @@ def examine(
         if place not in worst or _severity(finding) > _severity(worst[place]):
             worst[place] = finding
     findings = tuple(worst[place] for place in sorted(worst))
-    counterexample = None
-    for check in reversed(CHECKS):
-        violations = [f for f in findings if f.check == check and f.violated]
-        if violations:
-            first = max(violations, key=_severity)
-            counterexample = parts[first.trial // batch].counterexample(first)
-    guilty = sorted({finding.agent for finding in findings if finding.violated})
+    violations = sorted((f for f in findings if f.violated), key=_rank)
+    shown = violations[-1] if violations else None
+    counterexample = parts[shown.trial // batch].counterexample(shown) if shown else None
+    guilty = sorted({finding.agent for finding in violations})
     examined = min(part.time[-1] for part in parts)
     message = f"{trials} trials of {duration:g} s for each of {agents} agents, seed {seed}"
-    if parts[0].storage is None:
+    if not parts[0].has_storage:
         message += ", no storage function known"
     if any(part.escaped for part in parts):
         message += f"; some ended at {examined:.4g} s, when an output had run away"
-    if guilty:
+    if counterexample is None:
+        status = NO_VIOLATION
+        message += "; this is no proof"
+    elif counterexample.confirmed:
+        status = VIOLATED
         message = f"by agent{'s' * (len(guilty) > 1)} {', '.join(map(str, guilty))}; {message}"
     else:
-        message += "; this is no proof"
+        status = UNRESOLVED
+        message += (
+            f"; an excess of {counterexample.finding.excess:.3g} became"
+            f" {counterexample.repeated_excess:.3g} with a sixth of the step {timestep:g} s, which"
+            " does not resolve the plant's motion"
+        )
     return PassivityReport(
-        status=VIOLATED if guilty else NO_VIOLATION,
+        status=status,
         message=message,
         agents=agents,
         trials=trials,
@@ -119,7 +132,7 @@ def examine(
         duration=duration,
         examined=float(examined),
         timestep=timestep,
-        storage=parts[0].storage is not None,
+        storage=parts[0].has_storage,
         findings=findings,
         counterexample=counterexample,
     )
@@ -130,3 +143,8 @@ def _severity(finding: Finding) -> tuple[bool, float]:
     if finding.violated:
         return True, (finding.excess - finding.error) / finding.exchanged
     return False, finding.excess
+
+
+def _rank(finding: Finding) -> tuple[int, tuple[bool, float]]:
+    """The last is shown: what refutes the plant before what refutes its storage function."""
+    return -CHECKS.index(finding.check), _severity(finding)

@@ -5,7 +5,7 @@ from typing import Any
 
 # In the order in which one is shown as counter-example
 CHECKS = ("energy extracted", "storage risen", "storage negative")
-NO_VIOLATION, VIOLATED = "no violation found", "violated"
+NO_VIOLATION, VIOLATED, UNRESOLVED = "no violation found", "violated", "step too long"
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class Counterexample:
 
     Attributes:
         finding: what happens.
+        repeated_excess: its excess once more, with a third of the finer step.
         rest_state, rest_input: the equilibrium, beside ``finding.rest_output``.
         initial_state: where the trial starts.
         hold: time in s that each input is held.
@@ -69,6 +70,7 @@ class Counterexample:
     """
 
     finding: Finding
+    repeated_excess: float
     rest_state: list[float]
     rest_input: float
     initial_state: list[float]
@@ -76,13 +78,19 @@ class Counterexample:
     timestep: float
     input: list[float]
 
+    @property
+    def confirmed(self) -> bool:
+        """Whether the repetition agrees, to within the error that was estimated."""
+        return abs(self.repeated_excess - self.finding.excess) <= self.finding.error
+
 
 @dataclass(frozen=True)
 class PassivityReport:
     """What was looked for, and what was found.
 
     Attributes:
-        status: "no violation found", which is no proof, or "violated".
+        status: "no violation found", which is no proof; "violated"; or "step too long" where a
+            violation was not confirmed by a shorter step, so that nothing can be said.
         message: one sentence.
         agents, trials, seed: how many agents, trials of each, and the random numbers' seed.
         duration: how long the trials were meant to last, in s.

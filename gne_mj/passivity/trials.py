@@ -55,12 +55,8 @@ class Trials:
         self.trials, self.timestep, self.owner = trials, timestep, owner
         self.hold = self.substeps * timestep
         self.plants = [build(len(trials), timestep), build(len(trials), 0.5 * timestep)]
-        own = self.plants[0].agents
-        if storage == "agents":
-            known = hasattr(getattr(own, "kind", None), "storage")
-            self.storage: Storage | None = own.storage if known else None
-        else:
-            self.storage = storage
+        self.build, self.storage = build, storage
+        self.has_storage = _storage(self.plants[0], storage) is not None
         # Numbers of a trial depend on the seed and the trial alone.
         generators = [np.random.default_rng([seed, trial]) for trial in trials]
         lower, upper = outputs
@@ -68,7 +64,7 @@ class Trials:
         self.width = np.tile(width, len(trials))
         self.rest_output = np.concatenate([rng.uniform(lower, upper) for rng in generators])
         if equilibrium is None:
-            self.rest_state = own.equilibrium(self.rest_output)
+            self.rest_state = self.plants[0].agents.equilibrium(self.rest_output)
             self.rest_input = np.zeros(len(self.rest_output))
         else:
             self.rest_state, self.rest_input = equilibrium(self.rest_output)
@@ -80,7 +76,7 @@ class Trials:
             ]
         )
         self.at_rest = np.repeat(
-            [self.storage is None or trial // COMBINATIONS % 2 == 0 for trial in trials],
+            [not self.has_storage or trial // COMBINATIONS % 2 == 0 for trial in trials],
             len(self.owner),
         )
         shape = (len(owner), self.rest_state.shape[1])
@@ -118,15 +114,16 @@ class Trials:
         moved, gross = np.zeros((holds + 1, channels)), np.zeros((holds + 1, channels))
         for plant in self.plants:
             plant.reset(self.initial_state)
-        stored[:, 0] = self._stored(self.plants[1])
+        everyone = slice(None)
+        stored[:, 0] = self._stored(self.plants[1], everyone)
         done = 0
         for k in range(holds):
             change = self.excitation.input(k * self.hold, self.plants[1].output - self.rest_output)
             self.input[k] = self.rest_input + change
             for level, plant in enumerate(self.plants):
-                integral, size = self._hold(plant, self.input[k], self.substeps << level)
+                integral, size = self._hold(plant, k, everyone, self.substeps << level)
                 supplied[level, k + 1] = supplied[level, k] + change * integral
-                stored[level, k + 1] = self._stored(plant)
+                stored[level, k + 1] = self._stored(plant, everyone)
             moved[k + 1] = moved[k] + np.abs(supplied[1, k + 1] - supplied[1, k])
             gross[k + 1] = gross[k] + np.abs(change) * size
             away = [np.abs(plant.output - self.rest_output) for plant in self.plants]
@@ -145,31 +142,36 @@ class Trials:
         self.escaped = done < holds
 
     def _hold(
-        self, plant: Plant, u: NDArray[np.float64], steps: int
+        self, plant: Plant, k: int, mine: slice, steps: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Integrals of y - y*, by Simpson's rule, and of |y| + |y*| over one held input."""
+        """Integrals of y - y*, by Simpson's rule, and of |y| + |y*| while the k-th input is held.
+
+        The plant is one of the channels ``mine``, and takes this many steps.
+        """
+        u, rest = self.input[k, mine], self.rest_output[mine]
         integral, size = np.zeros(len(u)), np.zeros(len(u))
         for step in range(steps + 1):
             if step:
                 plant.step(u)
             weight = 1.0 if step in (0, steps) else 4.0 if step % 2 else 2.0
             y = plant.output
-            integral += weight * (y - self.rest_output)
-            size += weight * (np.abs(y) + np.abs(self.rest_output))
+            integral += weight * (y - rest)
+            size += weight * (np.abs(y) + np.abs(rest))
         third = self.hold / steps / 3.0
         return third * integral, third * size
 
-    def _stored(self, plant: Plant) -> NDArray[np.float64]:
-        if self.storage is None:
-            return np.zeros(len(self.rest_output))
-        return self.storage(plant.state, self.rest_state)
+    def _stored(self, plant: Plant, mine: slice) -> NDArray[np.float64]:
+        storage = _storage(plant, self.storage)
+        if storage is None:
+            return np.zeros(plant.agents.channels)
+        return storage(plant.state, self.rest_state[mine])
 
     def findings(self) -> list[Finding]:
         """The worst of each check for each channel."""
         start = np.broadcast_to(0, self.supplied[1].shape)
         extracted = np.where(self.at_rest, -self.supplied[1], -np.inf)
         found = self._worst(CHECKS[0], extracted, _error(self.supplied), start)
-        if self.storage is None:
+        if not self.has_storage:
             return found
         surplus = self.stored - self.supplied
         least, since = _running_least(surplus[1])
@@ -217,10 +219,11 @@ class Trials:
         return found
 
     def counterexample(self, finding: Finding) -> Counterexample:
-        """The data of one of this batch's findings."""
+        """The data of one of these trials' findings."""
         r = (finding.trial - self.trials[0]) * len(self.owner) + finding.channel - 1
         return Counterexample(
             finding=finding,
+            repeated_excess=self._repeated(finding),
             rest_state=self.rest_state[r].tolist(),
             rest_input=float(self.rest_input[r]),
             initial_state=self.initial_state[r].tolist(),
@@ -228,6 +231,36 @@ class Trials:
             timestep=0.5 * self.timestep,
             input=self.input[: round(finding.time / self.hold), r].tolist(),
         )
+
+    def _repeated(self, finding: Finding) -> float:
+        """The finding's excess once more, by a third of the finer step and the same inputs."""
+        first = (finding.trial - self.trials[0]) * len(self.owner)
+        mine = slice(first, first + len(self.owner))
+        channel = finding.channel - 1
+        since, end = round(finding.since / self.hold), round(finding.time / self.hold)
+        plant = self.build(1, self.timestep / 6.0)
+        plant.reset(self.initial_state[mine])
+        supplied = before = np.zeros(len(self.owner))
+        for k in range(end):
+            if k == since:
+                before = self._stored(plant, mine) - supplied
+            integral, _ = self._hold(plant, k, mine, 6 * self.substeps)
+            supplied = supplied + (self.input[k, mine] - self.rest_input[mine]) * integral
+        stored = self._stored(plant, mine)
+        excess = {
+            "energy extracted": -supplied,
+            "storage risen": stored - supplied - before,
+            "storage negative": -stored,
+        }
+        return float(excess[finding.check][channel])
+
+
+def _storage(plant: Plant, storage: Storage | Literal["agents"] | None) -> Storage | None:
+    """The storage function to check: the one given, or that of the plant's agents, if any."""
+    if storage != "agents":
+        return storage
+    known = hasattr(getattr(plant.agents, "kind", None), "storage")
+    return plant.agents.storage if known else None
 
 
 def _error(both: NDArray[np.float64]) -> NDArray[np.float64]:
