@@ -2,7 +2,7 @@
 
 For every equilibrium (x*, u*, y*) there should be a storage V >= 0, zero at x*, with
 V(x(t2)) - V(x(t1)) <= integral of (y - y*)(u - u*) dt [asmp:nonlinearPlant]. Checked are, along
-trajectories under the inputs of :mod:`gne_mj.excitation`:
+trajectories under the inputs of :mod:`gne_mj.passivity.excitation`:
 
 - *energy extracted*: from rest at x*, -integral (y - y*)(u - u*) dt must never be positive. This
   needs no storage function, and what violates it has none.

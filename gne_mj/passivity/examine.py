@@ -11,6 +11,7 @@ from gne_mj.passivity.report import (
     NO_VIOLATION,
     UNRESOLVED,
     VIOLATED,
+    Counterexample,
     Finding,
     PassivityReport,
 )
@@ -86,43 +87,32 @@ def examine(
     lower, upper = (np.broadcast_to(np.asarray(b, dtype=np.float64), (channels,)) for b in outputs)
     if not (np.all(np.isfinite(upper - lower)) and np.all(lower < upper)):
         raise InvalidInput("outputs", outputs, "each lower one must be below the upper one")
-    agents = len(set(owner.tolist()))
-    batch = max(1, _CHANNELS // channels)
-    parts = [
-        Trials(build, range(first, min(first + batch, trials)), timestep, duration, seed,
-               (lower, upper), owner, equilibrium, storage)
-        for first in range(0, trials, batch)
-    ]  # fmt: skip
-    found = [finding for part in parts for finding in part.findings()]
     worst: dict[tuple[int, int], Finding] = {}
-    for finding in found:
-        place = (finding.channel, CHECKS.index(finding.check))
-        if place not in worst or _severity(finding) > _severity(worst[place]):
-            worst[place] = finding
+    counterexample, examined, escaped, has_storage = None, duration, False, False
+    batch = max(1, _CHANNELS // channels)
+    for first in range(0, trials, batch):
+        part = Trials(build, range(first, min(first + batch, trials)), timestep, duration, seed,
+                      (lower, upper), owner, equilibrium, storage)  # fmt: skip
+        examined = min(examined, float(part.time[-1]))
+        escaped, has_storage = escaped or part.escaped, part.has_storage
+        found = part.findings()
+        for finding in found:
+            place = (finding.channel, CHECKS.index(finding.check))
+            if place not in worst or _severity(finding) > _severity(worst[place]):
+                worst[place] = finding
+        shown = max(found, key=_rank)
+        if shown.violated and (
+            counterexample is None or _rank(shown) > _rank(counterexample.finding)
+        ):
+            counterexample = part.counterexample(shown)
     findings = tuple(worst[place] for place in sorted(worst))
-    violations = sorted((f for f in findings if f.violated), key=_rank)
-    shown = violations[-1] if violations else None
-    counterexample = parts[shown.trial // batch].counterexample(shown) if shown else None
-    guilty = sorted({finding.agent for finding in violations})
-    examined = min(part.time[-1] for part in parts)
+    agents = len(set(owner.tolist()))
     message = f"{trials} trials of {duration:g} s for each of {agents} agents, seed {seed}"
-    if not parts[0].has_storage:
+    if not has_storage:
         message += ", no storage function known"
-    if any(part.escaped for part in parts):
+    if escaped:
         message += f"; some ended at {examined:.4g} s, when an output had run away"
-    if counterexample is None:
-        status = NO_VIOLATION
-        message += "; this is no proof"
-    elif counterexample.confirmed:
-        status = VIOLATED
-        message = f"by agent{'s' * (len(guilty) > 1)} {', '.join(map(str, guilty))}; {message}"
-    else:
-        status = UNRESOLVED
-        message += (
-            f"; an excess of {counterexample.finding.excess:.3g} became"
-            f" {counterexample.repeated_excess:.3g} with a sixth of the step {timestep:g} s, which"
-            " does not resolve the plant's motion"
-        )
+    status, message = _verdict(message, findings, counterexample, timestep)
     return PassivityReport(
         status=status,
         message=message,
@@ -130,12 +120,31 @@ def examine(
         trials=trials,
         seed=seed,
         duration=duration,
-        examined=float(examined),
+        examined=examined,
         timestep=timestep,
-        storage=parts[0].has_storage,
+        storage=has_storage,
         findings=findings,
         counterexample=counterexample,
     )
+
+
+def _verdict(
+    done: str,
+    findings: tuple[Finding, ...],
+    counterexample: Counterexample | None,
+    timestep: float,
+) -> tuple[str, str]:
+    """Status and sentence, given what was done in words."""
+    if counterexample is None:
+        return NO_VIOLATION, f"{done}; this is no proof"
+    if not counterexample.confirmed:
+        return UNRESOLVED, (
+            f"{done}; an excess of {counterexample.finding.excess:.3g} became"
+            f" {counterexample.repeated_excess:.3g} with a sixth of the step {timestep:g} s, which"
+            " does not resolve the plant's motion"
+        )
+    guilty = sorted({finding.agent for finding in findings if finding.violated})
+    return VIOLATED, f"by agent{'s' * (len(guilty) > 1)} {', '.join(map(str, guilty))}; {done}"
 
 
 def _severity(finding: Finding) -> tuple[bool, float]:
@@ -145,6 +154,7 @@ def _severity(finding: Finding) -> tuple[bool, float]:
     return False, finding.excess
 
 
-def _rank(finding: Finding) -> tuple[int, tuple[bool, float]]:
-    """The last is shown: what refutes the plant before what refutes its storage function."""
-    return -CHECKS.index(finding.check), _severity(finding)
+def _rank(finding: Finding) -> tuple[bool, int, float]:
+    """The greatest is shown: what refutes the plant before what refutes its storage function."""
+    violated, share = _severity(finding)
+    return violated, -CHECKS.index(finding.check), share
