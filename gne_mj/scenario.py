@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from gne_mj.errors import InvalidInput, nearest
-from gne_mj.scenario_tables import Scenario, SystemTable
+from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
 
 __all__ = ["Scenario", "load_scenario", "parse_value", "run", "shipped"]
@@ -130,9 +130,7 @@ def _first(error: ValidationError) -> InvalidInput:
     if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
         # of "one number or a list of them" the user meant the list
         detail = details[1]
-    tags = {"velocity-synchronization", "osnr", "flexible-robot", "integrator", "pi-cascade",
-            "mixed", "mjcf-robot", "full", "partial", "distributed", "custom", "float", "list",
-            "literal"}  # fmt: skip
+    tags = union_tags() | {"float", "list", "literal"}
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})

@@ -289,6 +289,18 @@ def test_the_printed_condition_is_no_proof():
     assert least_coupling(slope, graph, np.arange(8)) == pytest.approx(100.86, rel=1e-4)
 
 
+def test_a_large_quadratic_form_is_found_by_iteration():
+    """24 agents: 552 unknowns; the greatest of all generalised eigenvalues, densely."""
+    slope = chain_slopes(24).game.pseudo_gradient_jacobian(np.full(24, V0))
+    graph = graphs.ring(24)
+    least = least_coupling(slope, graph, np.arange(24))
+    # c A + B is singular at the least gain: A = L (x) I and B the form at c = 0
+    form = quadratic_form(slope, np.arange(24), graph, 0.0)
+    added = quadratic_form(0 * slope, np.arange(24), graph, 1.0)
+    assert np.linalg.eigvalsh(least * (1 + 1e-6) * added + form)[0] > 0
+    assert np.linalg.eigvalsh(least * (1 - 1e-6) * added + form)[0] < 0
+
+
 class LinearGame:
     """The velocity game's F with a far boundary, for reference.partial_information."""
 

@@ -52,6 +52,12 @@ class Agents:
         """States of a channel."""
         return len(self.kind.STATES)
 
+    def repeated(self, copies: int) -> "Agents":
+        """The same agents ``copies`` times in a row."""
+        return Agents(
+            self.kind, np.tile(self.parameters, (copies, 1)), np.tile(self.input_limit, copies)
+        )
+
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""
         y = np.ascontiguousarray(y, dtype=np.float64)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gne_mj.controllers import FullyDistributed
 from gne_mj.system import System
-from gne_mj.theory.constants import BOUNDED, EXACT, Slopes, profiles
+from gne_mj.theory.constants import BOUNDED, EXACT, Slopes, positive_definite, profiles
 from gne_mj.theory.gain import Gain, types
 
 MET, ASSUMED, UNKNOWN, FAILS = "met", "assumed", "unknown", "not met"
@@ -41,7 +41,8 @@ def costs(system: System, slopes: Slopes) -> Assumption:
         status = FAILS if slopes.refuted and slopes.label == EXACT else UNKNOWN
         return Assumption(label, status, "convexity of the costs is not certain where mu is not")
     hessian = system.barrier.hessian(system.start)
-    if np.linalg.eigvalsh(hessian)[0] <= 1e-12 * np.max(np.abs(hessian)):
+    floor = 1e-12 * np.max(np.abs(hessian))
+    if not positive_definite(hessian - floor * np.eye(game.actions)):
         return Assumption(
             label, FAILS, "phi is not strictly convex: some actions are in no constraint's reach"
         )

@@ -99,7 +99,7 @@ class Slopes:
             return Constant(self.samples["mu"], SAMPLED)
         lower, upper = self._bounds
         radius = 0.5 * (upper - lower)
-        value = _monotonicity(0.5 * (lower + upper)) - np.linalg.norm(0.5 * (radius + radius.T), 2)
+        value = _monotonicity(0.5 * (lower + upper)) - np.linalg.norm(_symmetric(radius), 2)
         return self._constant(float(value), "mu")
 
     @cached_property
@@ -122,7 +122,10 @@ class Slopes:
         """Whether F is certainly strongly monotone over the set: mu > 0 beyond rounding."""
         if self.label == SAMPLED:
             return False
-        return self.mu.value > 1e-12 * float(np.max(np.abs(self._greatest)))
+        floor = 1e-12 * float(np.max(np.abs(self._greatest)))
+        if self.ends is None:
+            return self.mu.value > floor
+        return positive_definite(_symmetric(self.ends) - floor * np.eye(self.game.actions))
 
     @property
     def refuted(self) -> bool:
@@ -208,9 +211,22 @@ def profiles(
     return center + ways[:, None] * (ends - center)
 
 
+def positive_definite(matrices: NDArray[np.float64]) -> bool:
+    """Whether all symmetric matrices (..., m, m) are, by Cholesky's method."""
+    try:
+        np.linalg.cholesky(matrices)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _symmetric(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 0.5 * (slopes + np.swapaxes(slopes, -1, -2))
+
+
 def _monotonicity(slopes: NDArray[np.float64]) -> NDArray[np.floating]:
     """Least eigenvalue of the symmetric part of each matrix (..., m, m)."""
-    return np.linalg.eigvalsh(0.5 * (slopes + np.swapaxes(slopes, -1, -2)))[..., 0]
+    return np.linalg.eigvalsh(_symmetric(slopes))[..., 0]
 
 
 def _row_norms(game: Game, slopes: NDArray[np.float64]) -> NDArray[np.floating]:

@@ -17,12 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigvalsh
+from scipy.sparse.linalg import eigsh
 
 from gne_mj.graph import Graph
-from gne_mj.theory.constants import Slopes
+from gne_mj.theory.constants import Slopes, positive_definite
 
-# Greatest number of operations for the quadratic form's eigenvalues
+# Greatest number of operations for the quadratic form, and where iteration is quicker
 _WORK = 2e10
+_DENSE = 500
 
 
 @dataclass(frozen=True)
@@ -123,5 +125,16 @@ def least_coupling(slope: NDArray[np.float64], graph: Graph, owner: NDArray[np.i
     apart = np.einsum("ra,rb,rs->arbs", basis, basis, 0.5 * slope, optimize=True)
     apart = apart.reshape(size, size)
     needed = between @ cho_solve(factor, between.T) - (apart + apart.T)
-    greatest = eigvalsh(needed, subset_by_index=[size - 1, size - 1])[0]
-    return max(0.0, float(greatest))
+    return max(0.0, _greatest(needed))
+
+
+def _greatest(matrix: NDArray[np.float64]) -> float:
+    """The greatest eigenvalue of a symmetric matrix, rounded up where it is found by iteration."""
+    size = len(matrix)
+    if size > _DENSE:
+        start = np.random.default_rng(0).normal(size=size)
+        found = eigsh(matrix, k=1, which="LA", v0=start, return_eigenvectors=False)[0]
+        found += 1e-9 * abs(found)
+        if positive_definite(found * np.eye(size) - matrix):  # so that none was missed
+            return float(found)
+    return float(eigvalsh(matrix, subset_by_index=[size - 1, size - 1])[0])
