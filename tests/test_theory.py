@@ -744,7 +744,8 @@ def test_the_command_tells_the_papers_authors():
     for said in (
         "0.2679492 (exact)", "3.837972 (exact)", "2.828427 (exact)", "lambda_2 = 2.38907",
         "0.128076 (bounded", "any k > 0", "computes none", "the paper's definition has mu/2",
-        "c lambda_2 > 32.6848 (printed), 44.2923 (rigorous)", "unweighted graphs reach 5",
+        "c lambda_2 > 32.6848 (printed) or 44.2923 (rigorous)", "unweighted graphs reach 5",
+        "on the complete graph c > 1.38835 (exact form)",
     ):  # fmt: skip
         assert said in done.stdout, said
 

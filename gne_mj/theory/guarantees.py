@@ -8,6 +8,7 @@ import numpy as np
 
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.game import Box
+from gne_mj.graph import complete
 from gne_mj.system import Clock, System
 from gne_mj.theory import assumptions
 from gne_mj.theory.assumptions import Assumption
@@ -59,6 +60,19 @@ class Theorem:
         if not isinstance(law, PartialInformation):
             return None
         return coupling(self.slopes, law.graph, law.coupling)
+
+    @cached_property
+    def under_partial_information(self) -> tuple[str, Coupling] | None:
+        """What agents under another law would need under partial information (c = 1 is tried).
+
+        On the law's "own" graph or, without one, on the "complete" one.
+        """
+        law = self.system.law
+        if self.coupling is not None or self.system.game.agents == 1:
+            return None
+        own = law.graph is not None
+        graph = law.graph if law.graph is not None else complete(self.system.game.agents)
+        return "own" if own else "complete", coupling(self.slopes, graph, 1.0)
 
     @cached_property
     def gain(self) -> Gain | None:
@@ -179,7 +193,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "obstacles": list(theorem.obstacles),
             "continuous": theorem.continuous,
         },
-        constants=_constants(theorem.slopes),
+        constants=_constants(theorem),
         graph=None
         if law.graph is None
         else {
@@ -210,9 +224,11 @@ def certify(system: System, clock: Clock) -> Guarantees:
     )
 
 
-def _constants(slopes: Slopes) -> dict[str, Any]:
+def _constants(theorem: Theorem) -> dict[str, Any]:
+    slopes = theorem.slopes
     printed, rigorous = needed_connectivity(slopes)
     box = slopes.box
+    instead = theorem.under_partial_information
     return {
         **{name: asdict(getattr(slopes, name)) for name in ("mu", "theta_1", "theta_2")},
         "convention": CONVENTION,
@@ -223,6 +239,9 @@ def _constants(slopes: Slopes) -> dict[str, Any]:
         else "the box",
         "box": None if box is None else [bound.tolist() for bound in box],
         "c_lambda_2_needed": {"printed": printed, "rigorous": rigorous},
+        "under_partial_information": None
+        if instead is None
+        else {"graph": instead[0], **asdict(instead[1])},
     }
 
 

@@ -65,14 +65,20 @@ def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
             text += f"; sampled {constant['sampled']:.7g}"
         yield name, text + ")" + (f", {constants['convention']}" if name == "mu" else "")
     yield "domain", _domain(constants)
+    instead = constants["under_partial_information"]
     needed = constants["c_lambda_2_needed"]
-    if g["system"]["information"] != "partial" and needed["rigorous"] is not None:
-        yield (
-            "if partial",
-            f"partial information would need c lambda_2 > {needed['printed']:.6g} (printed),"
-            f" {needed['rigorous']:.6g} (rigorous); unweighted graphs reach"
-            f" {g['system']['agents']}",
+    if instead is not None and needed["rigorous"] is not None:
+        text = (
+            f"partial information would need c lambda_2 > {needed['printed']:.6g} (printed) or"
+            f" {needed['rigorous']:.6g} (rigorous), where unweighted graphs reach"
+            f" {g['system']['agents']}"
         )
+        if instead["quadratic"] is not None:
+            text += (
+                f"; on {'its own' if instead['graph'] == 'own' else 'the complete'} graph c > {_number(instead['quadratic']['least'])}"
+                f" ({instead['label']} form) is enough"
+            )
+        yield "if partial", text
 
 
 def _domain(constants: dict[str, Any]) -> str:
