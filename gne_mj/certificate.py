@@ -33,9 +33,9 @@ class Certificate:
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
-        lyapunov: V^{x*} over the run, and whether the theory claims that it never rises: for
-            full information in mode continuous (not by Euler's method, which is far from continuous
-            time), passive agents and no limit met.
+        lyapunov: V over the run (V^{x*}, and under partial information the estimates' part), and
+            whether the theory claims that it never rises (:class:`gne_mj.theory.Theorem`), for the
+            set-up and as long as no input limit is met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """

@@ -399,6 +399,29 @@ def test_measured_v_agrees_with_the_certificate(above):
         assert monitor[watch.STORAGE_RISE] > 1e6 * rounding
 
 
+@given(st.integers(0, 2**32 - 1), st.floats(0.2, 2.0))
+def test_certified_runs_stay_inside_and_v_never_rises(seed, tau):
+    """Integrators on a random graph, from random starts with estimates inside and outside."""
+    rng = np.random.default_rng(seed)
+    agents = int(rng.integers(2, 7))
+    game = velocity_game(agents, V0, rng.uniform(0.5, 3.0, agents))
+    graph = random_graph(agents, rng)
+    least = least_coupling(
+        game.pseudo_gradient_jacobian(np.zeros(agents)), graph, np.arange(agents)
+    )
+    law = PartialInformation(graph, 1.05 * least, tau)
+    y = V0 + np.cumsum(rng.uniform(-0.9, 0.9, agents) * game.gap_bounds)
+    memory = (y + rng.normal(size=(agents, agents))).ravel()
+    system = System("s", game, integrators(agents), law, 0.1, y[:, None], memory=memory)
+    assert Theorem(system).lyapunov
+    loop = system.closed_loop(clock(2e-4, 0.4))
+    loop.advance(1, 2000)
+    loop.finish()
+    monitor = loop.monitor
+    assert monitor[watch.EXIT] == watch.INSIDE
+    assert monitor[watch.STORAGE_RISE] <= 1e-9 * monitor[watch.STORAGE_START]
+
+
 # --------------------------------------------------------------------------------------- gain
 
 

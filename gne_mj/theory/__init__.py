@@ -2,7 +2,8 @@
 
 from gne_mj.theory.constants import Constant, Slopes
 from gne_mj.theory.epsilon import EpsilonSearch, search_epsilon
-from gne_mj.theory.guarantees import Guarantees, Theorem, certify
+from gne_mj.theory.guarantees import Guarantees, certify
+from gne_mj.theory.theorem import Theorem
 from gne_mj.theory.words import words
 
 __all__ = [

@@ -92,13 +92,24 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
     ends = slopes.ends
     if ends is not None and len(ends) * (graph.agents * slopes.game.actions) ** 3 <= _WORK:
         owner = slopes.game.agent_of_action
-        quadratic = condition(max(least_coupling(slope, graph, owner) for slope in ends), sure)
+        least = 0.0
+        for slope in ends:
+            least = least_coupling(slope, graph, owner, at_least=least)
+            if least == np.inf:
+                break
+        quadratic = condition(least, sure)
     return Coupling(
         gain, condition(printed, False), condition(rigorous, sure), quadratic, slopes.label
     )
 
 
-def least_coupling(slope: NDArray[np.float64], graph: Graph, owner: NDArray[np.int64]) -> float:
+def least_coupling(
+    slope: NDArray[np.float64],
+    graph: Graph,
+    owner: NDArray[np.int64],
+    *,
+    at_least: float = 0.0,
+) -> float:
     """The c above which the quadratic form with this dF/dy is positive definite.
 
     In the basis of consensus (first) and the Laplacian's other eigenvectors the form has the blocks
@@ -109,6 +120,7 @@ def least_coupling(slope: NDArray[np.float64], graph: Graph, owner: NDArray[np.i
         slope: dF/dy, (m, m).
         graph: of N >= 2 agents.
         owner: the agent that each action belongs to, (m,).
+        at_least: returned if nothing more is needed, which is quick to see.
     """
     agents, m = graph.agents, len(slope)
     values, vectors = np.linalg.eigh(graph.laplacian)
@@ -125,7 +137,9 @@ def least_coupling(slope: NDArray[np.float64], graph: Graph, owner: NDArray[np.i
     apart = np.einsum("ra,rb,rs->arbs", basis, basis, 0.5 * slope, optimize=True)
     apart = apart.reshape(size, size)
     needed = between @ cho_solve(factor, between.T) - (apart + apart.T)
-    return max(0.0, _greatest(needed))
+    if positive_definite(at_least * np.eye(size) - needed):
+        return at_least
+    return max(at_least, _greatest(needed))
 
 
 def _greatest(matrix: NDArray[np.float64]) -> float:

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
-from gne_mj.theory.guarantees import CERTIFIED, CONDITIONAL, Guarantees
+from gne_mj.theory.guarantees import Guarantees
+from gne_mj.theory.theorem import CONDITIONAL
 
 _WIDTH = 20
 
@@ -19,8 +20,9 @@ def words(guarantees: Guarantees) -> list[str]:
 
 def _what(system: dict[str, Any]) -> str:
     return (
-        f"{system['game']} of {system['agents']} {system['agent_type']}s, {system['information']}"
-        f" information, mode {system['mode']} ({system['engine']}, {system['integrator']})"
+        f"{system['game']}, {system['agents']} agents ({system['agent_type']}),"
+        f" {system['information']} information, mode {system['mode']} ({system['engine']},"
+        f" {system['integrator']})"
     )
 
 
@@ -48,11 +50,11 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
     yield "sampling", _periods(g)
-    for n, sentence in enumerate(guaranteed(g)):
+    for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
-    for n, sentence in enumerate(measured(g)):
+    for n, sentence in enumerate(g["measured"]):
         yield "only measured" if n == 0 else "", sentence
-    for n, sentence in enumerate(not_certified(g)):
+    for n, sentence in enumerate(g["not_certified"]):
         yield "not certified" if n == 0 else "", sentence
 
 
@@ -74,8 +76,9 @@ def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f" {g['system']['agents']}"
         )
         if instead["quadratic"] is not None:
+            graph = "its own graph" if instead["graph"] == "own" else "the complete graph"
             text += (
-                f"; on {'its own' if instead['graph'] == 'own' else 'the complete'} graph c > {_number(instead['quadratic']['least'])}"
+                f"; on {graph} c > {_number(instead['quadratic']['least'])}"
                 f" ({instead['label']} form) is enough"
             )
         yield "if partial", text
@@ -170,60 +173,6 @@ def _periods(g: dict[str, Any]) -> str:
         text += f". Estimates under {g['system']['integrator']}: steps up to {largest:.3g} s"
         text += f", here {periods['timestep']:g} s"
     return text
-
-
-def guaranteed(g: dict[str, Any]) -> list[str]:
-    """Sentences on what the theorem gives."""
-    bound = g["equilibrium"]
-    limit = f"an epsilon-vGNE with epsilon = p rho = {bound['p_rho']:g}"
-    if bound["p_rho_affine"] is not None:
-        limit += f" ({bound['p_rho_affine']:g} by the affine reading)"
-    limit += f", and p_i rho <= {bound['largest_own_p_rho']:g}"
-    as_long = ", as long as no input limit is met" if g["system"]["limited_inputs"] else ""
-    trust = [a["label"] for a in g["theorem"]["assumptions"] if a["status"] == "assumed"]
-    provided = f", provided {' and '.join(f'[{label}]' for label in trust)}" if trust else ""
-    if g["status"] == CERTIFIED:
-        return [
-            f"in continuous time every shared constraint holds for all time{as_long}{provided}",
-            f"y(t) tends to the penalised equilibrium, {limit}",
-            "the Lyapunov function never rises",
-        ]
-    if g["status"] == CONDITIONAL:
-        return [
-            "for all epsilon below some epsilon* > 0, in continuous time, every shared constraint"
-            f" holds for all time{as_long}{provided}",
-            f"for them the penalised equilibrium is exponentially stable, {limit}",
-        ]
-    if g["theorem"]["name"] is None:
-        return ["nothing"]
-    if not g["theorem"]["obstacles"]:
-        return ["nothing of this run; the same law in continuous time is covered by the theorem"]
-    return ["nothing"]
-
-
-def measured(g: dict[str, Any]) -> list[str]:
-    """Sentences on what a run tells beyond that."""
-    found = ["margins of all constraints, V and the distance to y*, at every integration step"]
-    if g["status"] == CERTIFIED:
-        found.append(
-            "the integrator follows continuous time up to its error, near the boundary too"
-        )
-    if g["status"] == CONDITIONAL:
-        found.append("whether the given epsilon is below epsilon*: from this start, by running")
-    return found
-
-
-def not_certified(g: dict[str, Any]) -> list[str]:
-    """Sentences on what cannot be certified, and why."""
-    found = list(g["theorem"]["obstacles"])
-    if not g["theorem"]["continuous"]:
-        what = "mode 'sampled'" if g["system"]["mode"] != "continuous" else "Euler's method"
-        found.append(f"{what}: every theorem is in continuous time, none covers this")
-    if g["status"] == CONDITIONAL:
-        found.append("that the given epsilon is small enough; and a Lyapunov function: V's decrease"
-                     " is claimed of the limit epsilon -> 0 only")  # fmt: skip
-    found.append("anything under pushes from outside, or inputs that saturate")
-    return found
 
 
 def _number(value: float | None, form: str = ".6g") -> str:

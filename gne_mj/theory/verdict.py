@@ -1,0 +1,80 @@
+"""The verdict in sentences: what is guaranteed, what only measured, what not certified."""
+
+from typing import Any
+
+import numpy as np
+
+from gne_mj.system import System
+from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
+
+
+def epsilon_bounds(system: System) -> dict[str, Any]:
+    """Bounds of the epsilon of the limit, an epsilon-vGNE [lemma:epsilon].
+
+    p rho, the same of two affine constraints a gap (None if there are none), and the greatest
+    p_i rho.
+    """
+    game = system.game
+    p_rho = game.constraints_count * system.rho
+    scalar_gaps = game.gap_bounds is not None and all(size == 1 for size in game.sizes)
+    return {
+        "p_rho": p_rho,
+        "p_rho_affine": 2 * p_rho if scalar_gaps else None,
+        "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
+    }
+
+
+def guaranteed(theorem: Theorem) -> list[str]:
+    """What the theorem gives."""
+    system = theorem.system
+    bound = epsilon_bounds(system)
+    limit = f"an epsilon-vGNE with epsilon = p rho = {bound['p_rho']:g}"
+    if bound["p_rho_affine"] is not None:
+        limit += f" ({bound['p_rho_affine']:g} by the affine reading)"
+    limit += f", and p_i rho <= {bound['largest_own_p_rho']:g}"
+    limited = np.any(np.isfinite(system.agents.input_limit))
+    as_long = ", as long as no input limit is met" if limited else ""
+    trust = [f"[{a.label}]" for a in theorem.assumptions if a.status == ASSUMED]
+    provided = f", provided {' and '.join(trust)}" if trust else ""
+    if theorem.status == CERTIFIED:
+        return [
+            f"in continuous time every shared constraint holds for all time{as_long}{provided}",
+            f"y(t) tends to the penalised equilibrium, {limit}",
+            "the Lyapunov function never rises",
+        ]
+    if theorem.status == CONDITIONAL:
+        return [
+            "for all epsilon below some epsilon* > 0, in continuous time, every shared constraint"
+            f" holds for all time{as_long}{provided}",
+            f"for them the penalised equilibrium is exponentially stable, {limit}",
+        ]
+    if not theorem.obstacles:
+        return ["nothing of this run; the same law in continuous time is covered by the theorem"]
+    return ["nothing"]
+
+
+def measured(theorem: Theorem) -> list[str]:
+    """What a run tells beyond that."""
+    found = ["margins of all constraints, V and the distance to y*, at every integration step"]
+    if theorem.status == CERTIFIED:
+        found.append("how closely the integrator follows continuous time, near the boundary too")
+    if theorem.status == CONDITIONAL:
+        found.append("whether the given epsilon is below epsilon*: from this start, by running")
+    return found
+
+
+def not_certified(theorem: Theorem) -> list[str]:
+    """What cannot be certified, and why."""
+    found = list(theorem.obstacles)
+    if not theorem.continuous:
+        sampled = theorem.system.mode != "continuous"
+        what = "mode 'sampled'" if sampled else "Euler's method"
+        found.append(f"{what}: every theorem is in continuous time, none covers this")
+    if theorem.status == CONDITIONAL:
+        found.append(
+            "that the given epsilon is small enough; and a Lyapunov function: V's decrease is"
+            " claimed of the limit epsilon -> 0 only"
+        )
+    found.append("anything under pushes from outside, or inputs that saturate")
+    return found
