@@ -1,6 +1,6 @@
 """A group of agents of one type: what has state, and knows nothing of games and controllers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -54,9 +54,16 @@ class Agents:
 
     def repeated(self, copies: int) -> "Agents":
         """The same agents ``copies`` times in a row."""
-        return Agents(
-            self.kind, np.tile(self.parameters, (copies, 1)), np.tile(self.input_limit, copies)
+        return replace(
+            self,
+            parameters=np.tile(self.parameters, (copies, 1)),
+            input_limit=np.tile(self.input_limit, copies),
         )
+
+    @property
+    def knows_storage(self) -> bool:
+        """Whether the type has a storage function; without one, ``storage`` is zero."""
+        return bool(getattr(self.kind, "KNOWS_STORAGE", True))
 
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""

@@ -5,7 +5,7 @@ of it; :mod:`gne_mj.passivity` examines them by experiment. Channel parameters: 
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("output", ""), ("position", ""))
 OUTPUT = 0
+KNOWS_STORAGE = False
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,10 @@ class MjcfRobots(Agents):
     """
 
     robots: tuple[RobotFile, ...] = ()
+
+    def repeated(self, copies: int) -> "MjcfRobots":
+        """See the base class."""
+        return replace(super().repeated(copies), robots=self.robots * copies)
 
 
 def mjcf_robots(robots: tuple[RobotFile, ...], input_limit: np.ndarray) -> MjcfRobots:
