@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,7 +52,7 @@ class Agents:
         """States of a channel."""
         return len(self.kind.STATES)
 
-    def repeated(self, copies: int) -> "Agents":
+    def repeated(self, copies: int) -> Self:
         """The same agents ``copies`` times in a row."""
         return replace(
             self,

@@ -7,6 +7,7 @@ of it; :mod:`gne_mj.passivity` examines them by experiment. Channel parameters: 
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class MjcfRobots(Agents):
 
     robots: tuple[RobotFile, ...] = ()
 
-    def repeated(self, copies: int) -> "MjcfRobots":
+    def repeated(self, copies: int) -> Self:
         """See the base class."""
         return replace(super().repeated(copies), robots=self.robots * copies)
 
