@@ -109,6 +109,9 @@ def draw_steps(path: Path, runs: int) -> None:
 
 
 def _finish(figure: plt.Figure, axes: plt.Axes, label: str, path: Path) -> None:
+    counts = sorted({int(x) for line in axes.lines for x in line.get_xdata()})
+    axes.set_xticks(counts, [str(count) for count in counts])
+    axes.minorticks_off()
     axes.set_xlabel("agents N, on a ring")
     axes.set_ylabel(label)
     axes.grid(which="major", alpha=0.25)
