@@ -115,10 +115,14 @@ def _first(error: ValidationError) -> InvalidInput:
     details = error.errors()
     detail = details[0]
     if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
-        # of "one number or a list of them" the user meant the list
-        detail = details[1]
-    tags = {"velocity-synchronization", "osnr", "flexible-robot", "integrator", "pi-cascade",
-            "full", "distributed", "float", "list", "literal"}  # fmt: skip
+        # of "one number, a list of them or a list of lists" the user meant what goes deepest
+        same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
+        detail = max(same[1:], key=lambda d: len(d["loc"]))
+    tags = {
+        "velocity-synchronization", "velocity-consensus", "osnr", "flexible-robot",
+        "planar-flexible-robot", "integrator", "pi-cascade", "full", "distributed", "float",
+        "list", "literal",
+    }  # fmt: skip
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})

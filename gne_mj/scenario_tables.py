@@ -6,7 +6,7 @@ object they describe.
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, Law
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
-from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.simulation import Simulation
@@ -25,6 +25,10 @@ from gne_mj.system import Clock, System
 
 # One number for all agents, or one each
 PerAgent = float | list[float]
+
+# Of what every entry of an action has: one number for all; where an action is a vector, one vector
+# for all agents or a list of them; else one number for each agent
+PerAction = float | list[float] | list[list[float]]
 
 # The paper gives no initial velocities, and from rest the first gap would lie on its bound.
 DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
@@ -69,6 +73,52 @@ class VelocityGame(_Table):
         return np.full(count, self.reference_velocity - 0.5 * first)
 
 
+class VelocityConsensusGame(_Table):
+    """Velocity vectors synchronised over any graph, some agents knowing the reference."""
+
+    type: Literal["velocity-consensus"]
+    reference_velocity: list[float] = Field([1.0, 1.0], description="v_0 in m/s")
+    edges: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or pairs of agents numbered from 1; of the game, not"
+              " of who hears whom")
+    )  # fmt: skip
+    leader_weight: PerAgent | None = Field(
+        None, description="w_i, positive for leaders and 0 for others; if left out agent 1 leads"
+    )
+    gap_bound: PerAgent = Field(3.0, description="in m/s, positive; one or one for each edge")
+    leader_gap_bound: PerAgent = Field(
+        3.0, description="to v_0 in m/s, positive; one or one for each leader"
+    )
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        given = self.leader_weight
+        weight = _per_agent("game.leader_weight", 0.0 if given is None else given, count)
+        if given is None:
+            weight[0] = 1.0
+        return velocity_consensus_game(
+            self._edges(count),
+            weight.tolist(),
+            self.reference_velocity,
+            self.gap_bound,
+            self.leader_gap_bound,
+        )
+
+    def _edges(self, count: int) -> list[tuple[int, int]]:
+        if not isinstance(self.edges, str):
+            return [(i - 1, j - 1) for i, j in self.edges]
+        try:
+            return list(graphs.NAMED[self.edges](count).edges)
+        except InvalidInput as error:
+            raise InvalidInput("game.edges", error.value, error.expected) from None
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """Everyone half a leader's bound below the reference, along the first axis."""
+        start = np.tile(np.array(self.reference_velocity), (count, 1))
+        start[:, 0] -= 0.5 * np.min(self.leader_gap_bound)
+        return start.ravel()
+
+
 class OsnrGame(_Table):
     """[eq:osnrGNE]; what is left out is taken from the ten-channel link."""
 
@@ -104,42 +154,66 @@ class OsnrGame(_Table):
 
 class _AgentsTable(_Table):
     count: int = Field(gt=0, description="N")
-    input_limit: PerAgent | None = Field(
-        None, description="greatest |u_i| that the actuators deliver; no limit if left out"
+    input_limit: PerAction | None = Field(
+        None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
 
-    def limits(self) -> NDArray[np.float64]:
-        """(N,) limits, infinite where none is given."""
+    def limits(self, dimension: int) -> NDArray[np.float64]:
+        """(m,) limits, infinite where none is given."""
         if self.input_limit is None:
-            return np.full(self.count, np.inf)
-        return _per_agent("agents.input_limit", self.input_limit, self.count, positive=True)
+            return np.full(self.count * dimension, np.inf)
+        limits = _per_action("agents.input_limit", self.input_limit, self.count, dimension)
+        if np.any(limits <= 0):
+            raise InvalidInput("agents.input_limit", self.input_limit, "it must be positive")
+        return limits
 
-    def columns(self, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
-        """(N, len(names)) parameters."""
+    def rows(self, dimension: int, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
+        """(m, len(names)) parameters, the same for all channels of an agent."""
         columns = [
             _per_agent(f"agents.{n}", getattr(self, n), self.count, positive=n in positive)
             for n in names
         ]
-        return np.column_stack(columns)
+        return np.repeat(np.column_stack(columns), dimension, axis=0)
 
 
-class RobotAgents(_AgentsTable):
+class _RobotTable(_AgentsTable):
     """[eq:MobileRobot]"""
 
-    type: Literal["flexible-robot"]
+    axes: ClassVar[int]
     main_mass: PerAgent = Field(1.0, description="M in kg, positive")
     appendage_mass: PerAgent = Field(1.0, description="m in kg, positive")
     stiffness: PerAgent = Field(1.0, description="linear part of psi in N/m")
     atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
     damping: PerAgent = Field(1.0, description="gamma in N s/m")
 
-    def build(self) -> Agents:
-        """The agents."""
+    def build(self, dimension: int) -> Agents:
+        """The agents, for actions of ``dimension`` entries."""
+        if dimension != self.axes:
+            raise InvalidInput(
+                "agents.type",
+                self.type,  # type: ignore[attr-defined]
+                f"it moves along {self.axes} {'axis' if self.axes == 1 else 'axes'}, and the game's"
+                f" actions have {dimension}",
+            )
         names = flexible_robot.PARAMETERS
-        table = self.columns(*names, positive=("main_mass", "appendage_mass"))
+        table = self.rows(dimension, *names, positive=("main_mass", "appendage_mass"))
         if np.any(table[:, 4] < 0):
             raise InvalidInput("agents.damping", self.damping, "no entry may be negative")
-        return Agents(flexible_robot, table, self.limits())
+        return Agents(flexible_robot, table, self.limits(dimension), dimension)
+
+
+class RobotAgents(_RobotTable):
+    """Robots on a lane."""
+
+    axes: ClassVar[int] = 1
+    type: Literal["flexible-robot"]
+
+
+class PlanarRobotAgents(_RobotTable):
+    """Robots in the plane, with the same masses, spring and damper along both axes."""
+
+    axes: ClassVar[int] = 2
+    type: Literal["planar-flexible-robot"]
 
 
 class IntegratorAgents(_AgentsTable):
@@ -147,9 +221,10 @@ class IntegratorAgents(_AgentsTable):
 
     type: Literal["integrator"]
 
-    def build(self) -> Agents:
-        """The agents."""
-        return Agents(integrator, np.zeros((self.count, 0)), self.limits())
+    def build(self, dimension: int) -> Agents:
+        """The agents, for actions of ``dimension`` entries."""
+        table = np.zeros((self.count * dimension, 0))
+        return Agents(integrator, table, self.limits(dimension), dimension)
 
 
 class PiCascadeAgents(_AgentsTable):
@@ -159,16 +234,16 @@ class PiCascadeAgents(_AgentsTable):
     decay_rate: PerAgent = Field(1.0, description="v in 1/s")
     integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
 
-    def build(self) -> Agents:
-        """The agents."""
-        table = self.columns(*pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
+    def build(self, dimension: int) -> Agents:
+        """The agents, for actions of ``dimension`` entries."""
+        table = self.rows(dimension, *pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
         if np.any(table[:, 1] >= table[:, 0]):
             raise InvalidInput(
                 "agents.integral_gain",
                 self.integral_gain,
                 "it must be below decay_rate (0 < k < v)",
             )
-        return Agents(pi_cascade, table, self.limits())
+        return Agents(pi_cascade, table, self.limits(dimension), dimension)
 
 
 class BarrierTable(_Table):
@@ -220,35 +295,38 @@ class PlantTable(_Table):
 class InitialTable(_Table):
     """The start; what is left out rests, relaxed, at the default actions."""
 
-    action: PerAgent | None = Field(None, description="y(0)")
-    extension: PerAgent | None = Field(None, description="robots: x1(0) in m")
-    appendage_velocity: PerAgent | None = Field(None, description="robots: x3(0) in m/s")
-    position: PerAgent | None = Field(None, description="robots: d(0) in m")
-    integral: PerAgent | None = Field(None, description="PI cascade: s(0)")
+    action: PerAction | None = Field(None, description="y(0)")
+    extension: PerAction | None = Field(None, description="robots: x1(0) in m")
+    appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
+    position: PerAction | None = Field(None, description="robots: d(0) in m")
+    integral: PerAction | None = Field(None, description="PI cascade: s(0)")
 
     def build(self, agents: Agents, default: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
-        count = agents.channels
-        y = default if self.action is None else _per_agent("initial.action", self.action, count)
+        shape = (agents.count, agents.dimension)
+        y = default if self.action is None else _per_action("initial.action", self.action, *shape)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
-        if agents.kind is flexible_robot:
-            state[:, names.index("position")] = -1.5 * np.arange(count)
+        if "position" in names:
+            state[:, names.index("position")] = _places(*shape)
         for key in ("extension", "appendage_velocity", "position", "integral"):
             given = getattr(self, key)
             if given is None:
                 continue
             if key not in names:
                 raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
-            state[:, names.index(key)] = _per_agent(f"initial.{key}", given, count)
+            state[:, names.index(key)] = _per_action(f"initial.{key}", given, *shape)
         return state
 
 
 class SystemTable(_Table):
     """One game with its agents."""
 
-    game: Annotated[VelocityGame | OsnrGame, Field(discriminator="type")]
-    agents: Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
+    game: Annotated[VelocityGame | VelocityConsensusGame | OsnrGame, Field(discriminator="type")]
+    agents: Annotated[
+        RobotAgents | PlanarRobotAgents | IntegratorAgents | PiCascadeAgents,
+        Field(discriminator="type"),
+    ]
     barrier: BarrierTable = BarrierTable()
     controller: Annotated[
         FullController | DistributedController, Field(discriminator="information")
@@ -261,7 +339,7 @@ class SystemTable(_Table):
         count = self.agents.count
         try:
             game = self.game.build(count)
-            agents = self.agents.build()
+            agents = self.agents.build(game.actions // count)
             law = self.controller.build(count)
             state = self.initial.build(agents, self.game.default_start(count))
         except InvalidInput as error:
@@ -347,6 +425,36 @@ class Scenario(_Table):
             seed=self.simulation.seed,
             source=self.model_dump_json(exclude_none=True),
         )
+
+
+def _places(count: int, dimension: int) -> NDArray[np.float64]:
+    """(m,) positions in m, 1.5 m apart: behind each other, or in the rows of a square."""
+    places = np.zeros((count, dimension))
+    number = np.arange(count)
+    side = count if dimension == 1 else int(np.ceil(np.sqrt(count)))
+    places[:, 0] = -1.5 * (number % side)
+    places[:, 1:2] = -1.5 * (number // side)[:, None]
+    return places.ravel()
+
+
+def _per_action(key: str, given: PerAction, count: int, dimension: int) -> NDArray[np.float64]:
+    """(m,) numbers, agent by agent."""
+    vectors: list[Any] = []
+    if isinstance(given, list):
+        if any(isinstance(entry, list) for entry in given):
+            vectors = given
+        elif dimension > 1:
+            vectors = [given] * count
+    if not vectors:
+        return np.repeat(_per_agent(key, given, count), dimension)  # type: ignore[arg-type]
+    if len(vectors) != count or any(len(vector) != dimension for vector in vectors):
+        raise InvalidInput(
+            key,
+            given,
+            f"it must be one number, one list of {dimension} for all agents, or a list of {count}"
+            " such lists",
+        )
+    return np.array(vectors, dtype=np.float64).ravel()
 
 
 def _per_agent(

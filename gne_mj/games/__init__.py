@@ -1,6 +1,7 @@
 """Games that come with the package."""
 
 from gne_mj.games.osnr import osnr_game, ten_channels
+from gne_mj.games.velocity_consensus import velocity_consensus_game
 from gne_mj.games.velocity_synchronization import velocity_game
 
-__all__ = ["osnr_game", "ten_channels", "velocity_game"]
+__all__ = ["osnr_game", "ten_channels", "velocity_consensus_game", "velocity_game"]
