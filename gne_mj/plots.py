@@ -175,10 +175,10 @@ def _lines(
 
 
 def _bounds(axes: "Axes", bounds: NDArray[np.float64], label: str | None) -> None:
-    """One line for a bound that all share; else each in its line's colour."""
-    if np.all(bounds == bounds[0]):
-        axes.axhline(bounds[0], color="black", linewidth=0.9, linestyle=(0, (4, 3)), label=label)
-        return
-    for number, bound in enumerate(bounds):
-        colour = _line_style(number)["color"]
-        axes.axhline(bound, color=colour, linewidth=0.9, linestyle=(0, (4, 3)))
+    """Each bound once: in black, or in its line's colour where it is one line's of several."""
+    values, first, counts = np.unique(bounds, return_index=True, return_counts=True)
+    for value, number, count in zip(values, first, counts, strict=True):
+        own = count == 1 and len(bounds) > 1
+        colour = _line_style(int(number))["color"] if own else "black"
+        axes.axhline(value, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), label=label)
+        label = None
