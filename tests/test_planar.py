@@ -5,7 +5,16 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from builders import clock, pi_cascades, relative_error, robot_state, run_loop
+from builders import (
+    clock,
+    pi_cascades,
+    random_consensus,
+    relative_error,
+    robot_state,
+    run_loop,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import reference
 from gne_mj import plots
@@ -95,6 +104,30 @@ def test_the_position_is_the_velocitys_integral(engine):
     travelled = np.trapezoid(states[:, :, 1], dx=0.005, axis=0)
     assert np.allclose(states[-1, :, 3] - states[0, :, 3], travelled, rtol=0, atol=1e-4)
     assert np.allclose(states[0], state, rtol=0, atol=1e-15)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_any_fleet_over_any_graph_stays_inside(seed):
+    """At every step: inside, V never rising; and what the monitor kept is what the samples show."""
+    draw = random_consensus(seed, 2, tightest=1.0)
+    rng, count = draw.rng, draw.oracle.agents
+    table = np.repeat(rng.uniform(0.5, 2.0, (count, len(flexible_robot.PARAMETERS))), 2, axis=0)
+    y = draw.interior(used=0.9)
+    state = robot_state(
+        y, extension=rng.uniform(-1, 1, 2 * count),
+        appendage=y + rng.uniform(-4, 4, 2 * count),
+    )  # fmt: skip
+    fleet_of = Agents(flexible_robot, table, np.full(2 * count, np.inf), dimension=2)
+    drawn = System("robots", draw.game, fleet_of, FullInformation(), RHO, state)
+    states, _, _, loop = run_loop(drawn, 0.002, 1500)
+    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    p = draw.oracle.p
+    worst = loop.monitor[watch.worst_at(p) : watch.worst_at(p) + p]
+    g = np.array([reference.constraints(draw.oracle, row) for row in states[:, :, 1]])
+    assert np.all(worst < 0)
+    assert np.allclose(worst, np.max(g, axis=0), rtol=0, atol=1e-13)
+    assert loop.monitor[watch.STORAGE_RISE] <= 1e-9 * max(1.0, loop.monitor[watch.STORAGE_START])
 
 
 def test_rk4_is_of_fourth_order_in_mujoco():
@@ -279,13 +312,13 @@ def build(changes):
 
 def test_one_number_one_vector_or_one_for_each():
     pairs = [[1.0, 0.5 + 0.1 * i] for i in range(6)]
-    for given, expected in (
+    for value, expected in (
         (0.75, np.full(12, 0.75)),
         ([1.0, 0.5], np.tile([1.0, 0.5], 6)),
         (pairs, np.ravel(pairs)),
     ):
-        built = build({"initial.action": given, "agents.input_limit": given,
-                       "initial.extension": given})  # fmt: skip
+        built = build({"initial.action": value, "agents.input_limit": value,
+                       "initial.extension": value})  # fmt: skip
         assert np.array_equal(built.start, expected)
         assert np.array_equal(built.state[:, 0], expected)
         assert np.array_equal(built.agents.input_limit, expected)

@@ -1,12 +1,10 @@
 """Velocity consensus with leaders over random graphs, against the slow oracle and by itself."""
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
-from builders import relative_error
+from builders import random_consensus, relative_error
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
@@ -22,43 +20,6 @@ seeds = st.integers(0, 2**32 - 1)
 dimensions = st.integers(1, 4)
 
 
-@dataclass
-class Drawn:
-    """A random game with an oracle of it, and a source of interior profiles."""
-
-    game: Any
-    oracle: Any
-    rng: Any
-
-    def interior(self):
-        """A profile whose gaps use up to all of their bounds, on a random way from v_0."""
-        oracle, rng = self.oracle, self.rng
-        away = rng.normal(size=(oracle.agents, oracle.d)) * rng.uniform(0.1, 3)
-        gaps = np.array([oracle.gap(k, (oracle.v0 + away).ravel()) for k in range(oracle.p)])
-        used = np.max(np.linalg.norm(gaps, axis=1) / oracle.delta)
-        return (oracle.v0 + away * rng.uniform(0.05, 0.99) / used).ravel()
-
-
-def drawn(seed, dimension):
-    """Any graph of up to seven agents, in one or more parts, each with one leader or more."""
-    rng = np.random.default_rng(seed)
-    agents = int(rng.integers(1, 8))
-    pairs = [(i, j) for i in range(agents) for j in range(i + 1, agents)]
-    edges = [pair[:: rng.choice([1, -1])] for pair in pairs if rng.random() < rng.random()]
-    part = list(range(agents))
-    for i, j in edges:
-        part = [part[j] if label == part[i] else label for label in part]
-    weight = np.where(rng.random(agents) < 0.3, rng.uniform(0.2, 2, agents), 0.0)
-    for label in set(part):
-        members = [i for i in range(agents) if part[i] == label]
-        if not np.any(weight[members] > 0):
-            weight[rng.choice(members)] = rng.uniform(0.2, 2)
-    leaders = int(np.sum(weight > 0))
-    v0, delta = rng.uniform(-3, 3, dimension), rng.uniform(0.3, 4, len(edges) + leaders)
-    game = velocity_consensus_game(edges, weight, v0, delta[: len(edges)], delta[len(edges) :])
-    return Drawn(game, reference.VelocityConsensusGame(v0, edges, weight, delta), rng)
-
-
 def assert_equal_to_rounding(got, expected):
     expected = np.asarray(expected)
     assert got.shape == expected.shape
@@ -68,7 +29,7 @@ def assert_equal_to_rounding(got, expected):
 
 @given(seed=seeds, dimension=dimensions)
 def test_values_equal_the_reference(seed, dimension):
-    draw = drawn(seed, dimension)
+    draw = random_consensus(seed, dimension)
     game, oracle = draw.game, draw.oracle
     assert (game.agents, game.actions) == (oracle.agents, oracle.N)
     assert game.constraints_count == len(game.constraint_names) == oracle.p
@@ -89,7 +50,7 @@ def test_values_equal_the_reference(seed, dimension):
 
 @given(seed=seeds, dimension=dimensions)
 def test_derivatives_equal_the_complex_step(seed, dimension):
-    draw = drawn(seed, dimension)
+    draw = random_consensus(seed, dimension)
     game, oracle, y = draw.game, draw.oracle, draw.interior()
     weights = draw.rng.uniform(-2, 2, oracle.p)
 
@@ -117,7 +78,7 @@ def test_derivatives_equal_the_complex_step(seed, dimension):
 @given(seed=seeds, dimension=dimensions)
 def test_what_the_game_says_of_itself(seed, dimension):
     """F is affine, symmetric and strongly monotone; index lists are the derivatives' sparsity."""
-    draw = drawn(seed, dimension)
+    draw = random_consensus(seed, dimension)
     game, y = draw.game, draw.interior()
     jacobian = game.pseudo_gradient_jacobian(y)
     assert game.affine
@@ -135,7 +96,7 @@ def test_what_the_game_says_of_itself(seed, dimension):
 @given(seed=seeds)
 def test_the_box_is_the_least_one(seed):
     """On a line (d = 1) the set is a polytope, whose extents linear programs tell."""
-    draw = drawn(seed, 1)
+    draw = random_consensus(seed, 1)
     oracle, (lower, upper) = draw.oracle, draw.game.box
     zero = np.zeros(oracle.N)
     rows = np.array([reference.complex_step_jacobian(lambda x, k=k: oracle.gap(k, x), zero)[0]
@@ -152,7 +113,7 @@ def test_the_box_is_the_least_one(seed):
 
 @given(seed=seeds, dimension=dimensions)
 def test_interior_profiles_are_in_the_box(seed, dimension):
-    draw = drawn(seed, dimension)
+    draw = random_consensus(seed, dimension)
     lower, upper = draw.game.box
     for _ in range(20):
         y = draw.interior()
@@ -161,7 +122,7 @@ def test_interior_profiles_are_in_the_box(seed, dimension):
 
 @given(seed=seeds, dimension=dimensions)
 def test_everyone_ends_at_the_reference(seed, dimension):
-    draw = drawn(seed, dimension)
+    draw = random_consensus(seed, dimension)
     expected = np.tile(draw.oracle.v0, draw.oracle.agents)
     start = draw.interior()
     for solve in (
