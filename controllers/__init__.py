@@ -3,5 +3,7 @@
 from gne_mj.controllers.full_information import FullInformation
 from gne_mj.controllers.fully_distributed import FullyDistributed
 from gne_mj.controllers.law import Law
+from gne_mj.controllers.partial_information import PartialInformation
+from gne_mj.controllers.plain_law import PlainLaw
 
-__all__ = ["FullInformation", "FullyDistributed", "Law"]
+__all__ = ["FullInformation", "FullyDistributed", "Law", "PartialInformation", "PlainLaw"]

@@ -5,9 +5,7 @@ A law's memory holds the estimates as N rows of length m: row i is agent i's ful
 own action and its neighbours receive that action in the same message.
 """
 
-import numpy as np
-
-from gne_mj.graph import Graph
+from gne_mj.controllers.settings import RATE
 from gne_mj.native import kernel
 
 
@@ -35,39 +33,40 @@ def add_disagreement(data, graph, y, memory, i, scale, out):
 
 
 @kernel
-def propagate_estimates(data, maps, y, memory, scratch):
-    """Replace the estimates by their exact solution over a period with the outputs held at y.
-
-    maps[j] (N, N) moves the errors of all agents' estimates of agent j (its own row and column
-    are zero); scratch has at least length N.
-    """
-    at = data.offsets
+def estimate_rates(problem, y, memory, out):
+    """Fill out (N m,) with -RATE S_i sum_j (**y**^i - **y**^j); own blocks: zero."""
+    at = problem.data.offsets
     agents = len(at) - 1
     m = at[agents]
-    for j in range(agents):
-        for r in range(at[j], at[j + 1]):
-            for i in range(agents):
-                total = 0.0
-                for other in range(agents):
-                    if other != j:
-                        total += maps[j, i, other] * (memory[other * m + r] - y[r])
-                scratch[i] = total
-            for i in range(agents):
-                if i != j:
-                    memory[i * m + r] = y[r] + scratch[i]
+    scale = -problem.settings[RATE]
+    for i in range(agents):
+        row = out[i * m : (i + 1) * m]
+        for r in range(m):
+            row[r] = 0.0
+        add_disagreement(problem.data, problem.graph, y, memory, i, scale, row)
 
 
-def estimate_propagators(graph: Graph, duration: float) -> np.ndarray:
-    """exp(-L_j duration) for each agent j, L_j the Laplacian without row and column j; (N, N, N).
+@kernel
+def own_profile(data, i, own_action, estimates, profile):
+    """Fill an agent's profile (y_i, **y**^i_-i) where its cost or its constraints read it.
 
-    The estimates of agent j's action obey d/ds e = -L_j e for their errors e, with s the time in
-    units of the estimates' time constant. Row and column j of the j-th map are zero.
+    Args:
+        data: the game's.
+        i: the agent.
+        own_action: (m_i,) what stands in its own block.
+        estimates: its row (m,).
+        profile: (m,), filled in the blocks of all agents in J_i or in a constraint with y_i.
     """
-    agents = graph.agents
-    maps = np.zeros((agents, agents, agents))
-    for j in range(agents):
-        others = np.delete(np.arange(agents), j)
-        values, vectors = np.linalg.eigh(graph.laplacian[np.ix_(others, others)])
-        decay = (vectors * np.exp(-values * duration)) @ vectors.T
-        maps[j][np.ix_(others, others)] = decay
-    return maps
+    at = data.offsets
+    for entry in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+        j = data.cost_index[entry]
+        for r in range(at[j], at[j + 1]):
+            profile[r] = estimates[r]
+    for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
+        k = data.own_index[entry]
+        for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
+            j = data.member_index[member]
+            for r in range(at[j], at[j + 1]):
+                profile[r] = estimates[r]
+    for r in range(len(own_action)):
+        profile[at[i] + r] = own_action[r]

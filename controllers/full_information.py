@@ -45,3 +45,9 @@ def rate(problem, y, memory, out):
 @kernel
 def propagate(problem, y, memory, scratch):
     """No memory to propagate."""
+
+
+@kernel
+def storage(problem, memory):
+    """No memory, no storage."""
+    return 0.0

@@ -13,15 +13,12 @@ from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.barrier import own_weights, weighted_gradient
-from gne_mj.controllers.estimates import (
-    add_disagreement,
-    estimate_propagators,
-    propagate_estimates,
-)
-from gne_mj.controllers.law import Law
+from gne_mj.controllers.estimates import estimate_rates, own_profile
+from gne_mj.controllers.law import Law, initial_estimates
+from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
@@ -60,17 +57,36 @@ class FullyDistributed(Law):
         numbers[GAIN], numbers[EPSILON] = self.gain, self.epsilon
         return numbers
 
-    def initial_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Estimates and z equal to y (m,)."""
-        return np.concatenate([np.tile(y, self.graph.agents), y])
+    @property
+    def estimate_rate(self) -> float:
+        """1 / epsilon."""
+        return 1.0 / self.epsilon
 
-    def propagators(self, period: float) -> NDArray[np.float64]:
-        """Maps of the estimates' errors, then the factor that remains of z - y; (N + 1, N, N)."""
-        agents = self.graph.agents
-        maps = np.zeros((agents + 1, agents, agents))
-        maps[:agents] = estimate_propagators(self.graph, period / self.epsilon)
-        maps[agents] = np.exp(-period / self.epsilon)
-        return maps
+    def initial_memory(
+        self,
+        y: NDArray[np.float64],
+        estimate: ArrayLike | None = None,
+        filtered: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """See the base class."""
+        z = np.asarray(y if filtered is None else filtered, dtype=np.float64)
+        if z.shape not in ((), y.shape):
+            raise InvalidInput(
+                "initial.filtered",
+                f"shape {z.shape}",
+                f"it must be one number or a list of {len(y)}",
+            )
+        estimates = initial_estimates(self.graph.agents, y, estimate)
+        return np.concatenate([estimates, np.broadcast_to(z, y.shape)])
+
+    def barrier_profiles(
+        self, game_actions: NDArray[np.int64], memory: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(z_i, **y**^i_-i) of all agents."""
+        agents, m = self.graph.agents, len(game_actions)
+        profiles = memory[: agents * m].reshape(agents, m).copy()
+        profiles[game_actions, np.arange(m)] = memory[agents * m :]
+        return profiles
 
 
 @kernel
@@ -104,8 +120,7 @@ def agent_action(game, data, settings, i, own_action, own_filter, estimates, wor
     """
     first = data.offsets[i]
     profile, weights = work.profile, work.own_weights
-    copy(estimates, profile)
-    copy(own_action, profile[first : first + len(u)])
+    own_profile(data, i, own_action, estimates, profile)
     for r in range(len(u)):
         u[r] = game.cost_gradient(data.parameters, i, first + r, profile)
     copy(own_filter, profile[first : first + len(u)])
@@ -121,32 +136,29 @@ def agent_action(game, data, settings, i, own_action, own_filter, estimates, wor
 @kernel
 def rate(problem, y, memory, out):
     """Fill out with the rates of estimates and z (own blocks of the estimates: zero)."""
-    data, graph, settings = problem.data, problem.graph, problem.settings
-    at = data.offsets
+    at = problem.data.offsets
     agents = len(at) - 1
     m = at[agents]
-    faster = 1.0 / settings[EPSILON]
-    for i in range(agents):
-        row = out[i * m : (i + 1) * m]
-        for r in range(m):
-            row[r] = 0.0
-        add_disagreement(data, graph, y, memory, i, -faster, row)
+    faster = 1.0 / problem.settings[EPSILON]
+    estimate_rates(problem, y, memory, out)
     for r in range(m):
         out[agents * m + r] = faster * (y[r] - memory[agents * m + r])
 
 
 @kernel
 def propagate(problem, y, memory, scratch):
-    """Move estimates and z over one control period with the outputs held at y.
-
-    problem.propagators is (N + 1, N, N): the estimates' maps, then in its last entry the factor
-    that remains of z - y.
-    """
+    """Move estimates and z over one control period with the outputs held at y."""
     data = problem.data
     agents = len(data.offsets) - 1
     m = data.offsets[agents]
-    propagate_estimates(data, problem.propagators, y, memory, scratch)
-    remaining = problem.propagators[agents, 0, 0]
+    propagate_estimates(data, problem.graph, problem.propagator, y, memory, scratch)
+    remaining = np.exp(-problem.propagator.numbers[1])
     for r in range(agents * m, agents * m + m):
         own = y[r - agents * m]
         memory[r] = own + remaining * (memory[r] - own)
+
+
+@kernel
+def storage(problem, memory):
+    """Nothing is claimed of the estimates."""
+    return 0.0

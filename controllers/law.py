@@ -1,13 +1,27 @@
-"""What a law is, seen from Python: its kernels, its numbers, and its memory at the start."""
+"""What a law is, seen from Python: its kernels, its numbers, and its memory at the start.
+
+The kernels of a law's module, each given the game's module or the loop's ``problem`` (see
+:mod:`gne_mj.loops.feedback`), are
+
+=====================================================  =======================================
+``action(game, problem, y, weights, memory, work, u)``  fills u; -1, or agent * p + constraint of
+                                                        the first estimate that is not inside
+``rate(problem, y, memory, out)``                       fills the memory's rate
+``propagate(problem, y, memory, scratch)``              the memory over a control period, y held
+``storage(problem, memory)``                            the memory's part of the Lyapunov function
+=====================================================  =======================================
+"""
 
 from abc import ABC, abstractmethod
 from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers import settings
+from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
+from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph, GraphData
 
 _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
@@ -16,17 +30,15 @@ _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
 class Law(ABC):
     """A feedback law of one information structure.
 
-    The mathematics is the kernels of its module: ``action`` (inputs from measurements and memory),
-    ``rate`` (of the memory, mode continuous) and ``propagate`` (the memory over a control period,
-    mode sampled).
-
     Attributes:
         information: name of the information structure.
         graph: over which agents communicate; None if they need not.
+        propagates: whether its memory can be propagated, as mode sampled needs.
     """
 
     information: ClassVar[str]
     graph: Graph | None = None
+    propagates: bool = True
 
     @property
     @abstractmethod
@@ -38,16 +50,68 @@ class Law(ABC):
         """The graph for native code; nobody hears anybody without one."""
         return self.graph.data if self.graph is not None else _NOBODY
 
+    @property
+    def estimate_rate(self) -> float:
+        """What multiplies the Laplacian in the estimates' dynamics, in 1/s; 0 without estimates."""
+        return 0.0
+
     def settings(self, rho: float) -> NDArray[np.float64]:
         """The law's numbers for native code (see :mod:`gne_mj.controllers.settings`)."""
         numbers = np.ones(settings.COUNT)
         numbers[settings.RHO] = rho
+        numbers[settings.RATE] = self.estimate_rate
         return numbers
 
-    def initial_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The memory at the start, everybody knowing the initial profile y (m,)."""
+    def initial_memory(
+        self,
+        y: NDArray[np.float64],
+        estimate: ArrayLike | None = None,
+        filtered: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """The memory at the start.
+
+        Args:
+            y: initial profile (m,).
+            estimate: what the agents take the actions to be: one number, a profile (m,) that all
+                hold, or one row for each agent (N, m); y if left out.
+            filtered: z(0), one number or (m,); y if left out.
+        """
+        if estimate is not None:
+            raise InvalidInput(
+                "initial.estimate", "given", f"the {self.information} law has no estimates"
+            )
+        if filtered is not None:
+            raise InvalidInput("initial.filtered", "given", f"the {self.information} law has no z")
         return np.zeros(0)
 
-    def propagators(self, period: float) -> NDArray[np.float64]:
+    def barrier_profiles(
+        self, game_actions: NDArray[np.int64], memory: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The profiles of their own at which agents evaluate the barrier, (N, m); none: (0, m).
+
+        Args:
+            game_actions: which agent each entry of a profile belongs to, (m,).
+            memory: the law's memory.
+        """
+        return np.zeros((0, len(game_actions)))
+
+    def propagator(self, period: float) -> Propagator:
         """What ``propagate`` needs for a control period in s."""
-        return np.zeros((0, 0, 0))
+        if self.graph is None:
+            return no_propagator()
+        return propagator(self.graph, self.estimate_rate * period)
+
+
+def initial_estimates(
+    agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
+) -> NDArray[np.float64]:
+    """All agents' estimates at the start, flat (N m,); see :meth:`Law.initial_memory`."""
+    given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
+    m = len(y)
+    if given.shape not in ((), (m,), (agents, m)):
+        raise InvalidInput(
+            "initial.estimate",
+            f"shape {given.shape}",
+            f"it must be one number, a list of {m}, or {agents} lists of {m}",
+        )
+    return np.broadcast_to(given, (agents, m)).astype(np.float64).ravel()

@@ -2,5 +2,8 @@
 
 RHO = 0  # barrier's penalty parameter rho
 GAIN = 1  # k of [eq:CenterFeedback]
-EPSILON = 2  # time constant of estimates and z in [eq:CenterFeedback], in s
-COUNT = 3
+EPSILON = 2  # time constant of z in [eq:CenterFeedback], in s
+COUPLING = 3  # c, on the Laplacian in the action of [eq:nonlinearPIFeedback]
+TIME_CONSTANT = 4  # tau of the estimates under partial information, in s
+RATE = 5  # estimates follow d/dt = -RATE times their disagreement, in 1/s
+COUNT = 6

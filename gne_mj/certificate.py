@@ -258,7 +258,7 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     agents = system.agents
     claimed = (
         system.mode == "continuous"
-        and system.law.information == "full"
+        and system.law.information in ("full", "partial")
         and system.integrator != "euler"
         and agents.kind.is_passive(agents.parameters)
         and bool(monitor[watch.STARTED])

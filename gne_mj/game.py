@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, source_key
+from gne_mj.plain import is_plain, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
@@ -56,7 +57,8 @@ class Game:
 
     Args:
         name: what the game is called in messages and files.
-        kernels: module of kernels, as in this module's table.
+        kernels: module of kernels, as in this module's table; or of plain Python functions of
+            the same names, which is slow and may lack the two second derivatives.
         parameters: q, flat.
         sizes: m_i of each agent.
         in_cost: for each agent the agents that appear in its cost.
@@ -93,6 +95,15 @@ class Game:
     agent_name: str = "agent"
     axes: tuple[str, ...] = ()
     quantities: tuple[Quantity, ...] = ()
+
+    def __post_init__(self) -> None:
+        if is_plain(self.kernels):
+            kernels, addresses, kept = plain_kernels(
+                self.kernels, np.asarray(self.parameters, dtype=np.float64)
+            )
+            object.__setattr__(self, "kernels", kernels)
+            object.__setattr__(self, "parameters", addresses)
+            object.__setattr__(self, "_kept", kept)
 
     @property
     def agents(self) -> int:
@@ -198,6 +209,7 @@ class Game:
         profile = self._profile(y)
         out = np.zeros((*profile.shape[:-1], width))
         native(self.data, profile.reshape(-1, self.actions), out.reshape(-1, width))  # type: ignore[operator]
+        raise_pending()
         return out
 
 

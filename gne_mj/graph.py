@@ -8,8 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import laplacian as csgraph_laplacian
+from scipy.sparse.linalg import eigsh
 
 from gne_mj.errors import InvalidInput
+
+# Up to this many agents eigenvalues come from dense matrices
+_DENSE = 300
 
 
 class GraphData(NamedTuple):
@@ -70,17 +75,34 @@ class Graph:
     @cached_property
     def laplacian(self) -> np.ndarray:
         """L = D - A, shape (N, N), dense and read-only."""
-        adjacency = self.adjacency.toarray()
-        matrix = np.diag(adjacency.sum(axis=1)) - adjacency
+        matrix = self.sparse_laplacian.toarray()
         matrix.flags.writeable = False
         return matrix
+
+    @cached_property
+    def sparse_laplacian(self) -> csr_array:
+        """L = D - A, shape (N, N), sparse."""
+        return csgraph_laplacian(self.adjacency).tocsr()
 
     @cached_property
     def algebraic_connectivity(self) -> float:
         """lambda_2 of the Laplacian (0 for a single agent)."""
         if self.agents == 1:
             return 0.0
-        return float(np.linalg.eigvalsh(self.laplacian)[1])
+        if self.agents <= _DENSE:
+            return float(np.linalg.eigvalsh(self.laplacian)[1])
+        # Inverse iteration about a point below zero, where L is regular.
+        near = eigsh(self.sparse_laplacian.tocsc(), k=2, sigma=-1e-4, return_eigenvectors=False)
+        return float(np.max(near))
+
+    @cached_property
+    def largest_eigenvalue(self) -> float:
+        """lambda_max of the Laplacian (0 for a single agent)."""
+        if self.agents == 1:
+            return 0.0
+        if self.agents <= _DENSE:
+            return float(np.linalg.eigvalsh(self.laplacian)[-1])
+        return float(eigsh(self.sparse_laplacian, k=1, return_eigenvectors=False)[0])
 
     @cached_property
     def data(self) -> GraphData:

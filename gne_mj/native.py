@@ -33,7 +33,14 @@ _LOOP: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
 def kernel(function: F) -> F:
     """Mark ``function`` as usable from native code (it stays an ordinary Python function)."""
-    return register_jitable(**_KERNEL)(function)
+    marked: F = register_jitable(**_KERNEL)(function)
+    marked.is_kernel = True  # type: ignore[attr-defined]
+    return marked
+
+
+def is_kernel(function: Any) -> bool:
+    """Whether a function was marked with :func:`kernel`."""
+    return bool(getattr(function, "is_kernel", False))
 
 
 def compiled(function: Callable[..., Any]) -> Any:

@@ -76,12 +76,25 @@ def _read(source: str | Path) -> dict[str, Any]:
             f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return _resolve(tomllib.loads(path.read_text(encoding="utf-8")), path.parent)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InvalidInput("scenario", str(source), f"it cannot be read: {reason}") from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidInput("scenario", str(source), f"it is not valid TOML: {error}") from None
+
+
+def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Make the names of a user's own files, which are relative to the scenario's, absolute."""
+    systems = tables.get("systems")
+    for system in systems.values() if isinstance(systems, dict) else ():
+        for table in system.values() if isinstance(system, dict) else ():
+            given = table.get("file") if isinstance(table, dict) else None
+            if isinstance(given, str):
+                table["file"] = str((folder / given).resolve())
+            elif isinstance(given, list):
+                table["file"] = [str((folder / str(name)).resolve()) for name in given]
+    return tables
 
 
 def _change(tables: dict[str, Any], key: str, value: Any) -> None:
@@ -120,8 +133,8 @@ def _first(error: ValidationError) -> InvalidInput:
         detail = max(same[1:], key=lambda d: len(d["loc"]))
     tags = {
         "velocity-synchronization", "velocity-consensus", "osnr", "flexible-robot",
-        "planar-flexible-robot", "integrator", "pi-cascade", "full", "distributed", "float",
-        "list", "literal",
+        "planar-flexible-robot", "integrator", "pi-cascade", "mixed", "mjcf-robot", "full",
+        "partial", "distributed", "custom", "float", "list", "literal",
     }  # fmt: skip
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]

@@ -5,7 +5,8 @@ object they describe.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -14,17 +15,22 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj import graph as graphs
-from gne_mj.controllers import FullInformation, FullyDistributed, Law
+from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
-from gne_mj.plants import flexible_robot, integrator, pi_cascade
+from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
+from gne_mj.user_files import load_game, load_law
 
 # One number for all agents, or one each
 PerAgent = float | list[float]
+
+# m_i, the entries of each agent's action
+Sizes = tuple[int, ...]
 
 # Of what every entry of an action has: one number for all; where an action is a vector, one vector
 # for all agents or a list of them; else one number for each agent
@@ -152,28 +158,44 @@ class OsnrGame(_Table):
         return np.full(count, 0.8 * limit / count)
 
 
+class CustomGame(_Table):
+    """A game of the user's own."""
+
+    type: Literal["custom"]
+    file: str = Field(description="Python file that defines game(count, ...)")
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        return load_game(self.file, count, self.parameters)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """There is none."""
+        raise InvalidInput("initial.action", None, "a custom game has no default start: give one")
+
+
 class _AgentsTable(_Table):
     count: int = Field(gt=0, description="N")
     input_limit: PerAction | None = Field(
         None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
 
-    def limits(self, dimension: int) -> NDArray[np.float64]:
+    def limits(self, sizes: Sizes) -> NDArray[np.float64]:
         """(m,) limits, infinite where none is given."""
         if self.input_limit is None:
-            return np.full(self.count * dimension, np.inf)
-        limits = _per_action("agents.input_limit", self.input_limit, self.count, dimension)
+            return np.full(sum(sizes), np.inf)
+        limits = _per_action("agents.input_limit", self.input_limit, sizes)
         if np.any(limits <= 0):
             raise InvalidInput("agents.input_limit", self.input_limit, "it must be positive")
         return limits
 
-    def rows(self, dimension: int, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
+    def rows(self, sizes: Sizes, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
         """(m, len(names)) parameters, the same for all channels of an agent."""
         columns = [
             _per_agent(f"agents.{n}", getattr(self, n), self.count, positive=n in positive)
             for n in names
         ]
-        return np.repeat(np.column_stack(columns), dimension, axis=0)
+        return np.repeat(np.column_stack(columns), sizes, axis=0)
 
 
 class _RobotTable(_AgentsTable):
@@ -186,20 +208,14 @@ class _RobotTable(_AgentsTable):
     atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
     damping: PerAgent = Field(1.0, description="gamma in N s/m")
 
-    def build(self, dimension: int) -> Agents:
-        """The agents, for actions of ``dimension`` entries."""
-        if dimension != self.axes:
-            raise InvalidInput(
-                "agents.type",
-                self.type,  # type: ignore[attr-defined]
-                f"it moves along {self.axes} {'axis' if self.axes == 1 else 'axes'}, and the game's"
-                f" actions have {dimension}",
-            )
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        _check_sizes(self.type, self.axes, sizes)  # type: ignore[attr-defined]
         names = flexible_robot.PARAMETERS
-        table = self.rows(dimension, *names, positive=("main_mass", "appendage_mass"))
+        table = self.rows(sizes, *names, positive=("main_mass", "appendage_mass"))
         if np.any(table[:, 4] < 0):
             raise InvalidInput("agents.damping", self.damping, "no entry may be negative")
-        return Agents(flexible_robot, table, self.limits(dimension), dimension)
+        return Agents(flexible_robot, table, self.limits(sizes), self.axes)
 
 
 class RobotAgents(_RobotTable):
@@ -221,10 +237,10 @@ class IntegratorAgents(_AgentsTable):
 
     type: Literal["integrator"]
 
-    def build(self, dimension: int) -> Agents:
-        """The agents, for actions of ``dimension`` entries."""
-        table = np.zeros((self.count * dimension, 0))
-        return Agents(integrator, table, self.limits(dimension), dimension)
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = np.zeros((sum(sizes), 0))
+        return Agents(integrator, table, self.limits(sizes), _dimension(sizes))
 
 
 class PiCascadeAgents(_AgentsTable):
@@ -234,16 +250,68 @@ class PiCascadeAgents(_AgentsTable):
     decay_rate: PerAgent = Field(1.0, description="v in 1/s")
     integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
 
-    def build(self, dimension: int) -> Agents:
-        """The agents, for actions of ``dimension`` entries."""
-        table = self.rows(dimension, *pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = self.rows(sizes, *pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
         if np.any(table[:, 1] >= table[:, 0]):
             raise InvalidInput(
                 "agents.integral_gain",
                 self.integral_gain,
                 "it must be below decay_rate (0 < k < v)",
             )
-        return Agents(pi_cascade, table, self.limits(dimension), dimension)
+        return Agents(pi_cascade, table, self.limits(sizes), _dimension(sizes))
+
+
+class MjcfAgents(_AgentsTable):
+    """Robots of the user's own."""
+
+    type: Literal["mjcf-robot"]
+    file: str | list[str] = Field(description="MJCF file, one for all or one each")
+    output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
+    input: str | list[str] = Field(description="actuator that u_i drives")
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of one entry each."""
+        _check_sizes(self.type, 1, sizes)
+        columns = []
+        for key in ("file", "output", "input"):
+            given = getattr(self, key)
+            each = [given] * self.count if isinstance(given, str) else given
+            if len(each) != self.count:
+                raise InvalidInput(
+                    f"agents.{key}", given, f"it must be one name or a list of {self.count}"
+                )
+            columns.append(each)
+        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
+        return mjcf_robots(robots, self.limits(sizes))
+
+
+class MixedAgents(_Table):
+    """Agents of several types."""
+
+    type: Literal["mixed"]
+    groups: list[
+        Annotated[
+            RobotAgents | PlanarRobotAgents | IntegratorAgents | PiCascadeAgents,
+            Field(discriminator="type"),
+        ]
+    ] = Field(min_length=1, description="tables of agents, one behind the other")
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return sum(group.count for group in self.groups)
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        first = np.cumsum([0, *(group.count for group in self.groups)])
+        return mixed.join(
+            [
+                group.build(sizes[start : start + group.count])
+                for start, group in zip(first[:-1], self.groups, strict=True)
+            ],
+            _dimension(sizes),
+        )
 
 
 class BarrierTable(_Table):
@@ -258,35 +326,73 @@ class FullController(_Table):
     information: Literal["full"]
     mode: Literal["continuous", "sampled"] = "continuous"
 
-    def build(self, count: int) -> Law:
+    def build(self, game: Game) -> Law:
         """The law."""
         return FullInformation()
 
 
-class DistributedController(_Table):
+class _NetworkController(_Table):
+    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
+    )
+
+    def network(self, count: int) -> graphs.Graph:
+        """The communication graph."""
+        if isinstance(self.graph, str):
+            return graphs.NAMED[self.graph](count)
+        return graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
+
+
+class PartialController(_NetworkController):
+    """[eq:nonlinearPIFeedback]"""
+
+    information: Literal["partial"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+    coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
+    time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        return PartialInformation(self.network(game.agents), self.coupling, self.time_constant)
+
+
+class DistributedController(_NetworkController):
     """[eq:CenterFeedback]"""
 
     information: Literal["distributed"]
     mode: Literal["continuous", "sampled"] = "continuous"
     epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
     gain: float = Field(1.0, gt=0, description="k")
-    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
-        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
-    )
 
-    def build(self, count: int) -> Law:
+    def build(self, game: Game) -> Law:
         """The law."""
-        if isinstance(self.graph, str):
-            graph = graphs.NAMED[self.graph](count)
-        else:
-            graph = graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
-        return FullyDistributed(graph, self.epsilon, self.gain)
+        return FullyDistributed(self.network(game.agents), self.epsilon, self.gain)
+
+
+class CustomController(_NetworkController):
+    """A law of the user's own."""
+
+    information: Literal["custom"]
+    mode: Literal["continuous", "sampled"] = "continuous"
+    file: str = Field(description="Python file that defines law(game, graph, ...) or action(...)")
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        law = load_law(self.file, game, self.network(game.agents), self.parameters)
+        if self.mode == "sampled" and not law.propagates:
+            raise InvalidInput(
+                "controller.mode", self.mode, "a plain law with a memory runs in mode 'continuous'"
+            )
+        return law
 
 
 class PlantTable(_Table):
     """What moves the agents."""
 
-    engine: Literal["mujoco", "ode"] = "ode"
+    engine: Literal["mujoco", "ode"] | None = Field(
+        None, description="'ode' if left out, but 'mujoco' for MJCF robots"
+    )
     integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
         None, description="in place of the simulation's"
     )
@@ -300,36 +406,49 @@ class InitialTable(_Table):
     appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
     position: PerAction | None = Field(None, description="robots: d(0) in m")
     integral: PerAction | None = Field(None, description="PI cascade: s(0)")
+    estimate: float | list[float] | list[list[float]] | None = Field(
+        None, description="one number, a profile that all agents hold, or one profile each; y(0)"
+    )
+    filtered: PerAction | None = Field(None, description="distributed law: z(0); y(0) if left out")
 
-    def build(self, agents: Agents, default: NDArray[np.float64]) -> NDArray[np.float64]:
+    def build(
+        self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
-        shape = (agents.count, agents.dimension)
-        y = default if self.action is None else _per_action("initial.action", self.action, *shape)
+        y = default() if self.action is None else _per_action("initial.action", self.action, sizes)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
-        if "position" in names:
-            state[:, names.index("position")] = _places(*shape)
+        if agents.kind is flexible_robot:
+            state[:, names.index("position")] = _places(sizes)
         for key in ("extension", "appendage_velocity", "position", "integral"):
             given = getattr(self, key)
             if given is None:
                 continue
             if key not in names:
                 raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
-            state[:, names.index(key)] = _per_action(f"initial.{key}", given, *shape)
+            state[:, names.index(key)] = _per_action(f"initial.{key}", given, sizes)
         return state
 
 
 class SystemTable(_Table):
     """One game with its agents."""
 
-    game: Annotated[VelocityGame | VelocityConsensusGame | OsnrGame, Field(discriminator="type")]
+    game: Annotated[
+        VelocityGame | VelocityConsensusGame | OsnrGame | CustomGame, Field(discriminator="type")
+    ]
     agents: Annotated[
-        RobotAgents | PlanarRobotAgents | IntegratorAgents | PiCascadeAgents,
+        RobotAgents
+        | PlanarRobotAgents
+        | IntegratorAgents
+        | PiCascadeAgents
+        | MixedAgents
+        | MjcfAgents,
         Field(discriminator="type"),
     ]
     barrier: BarrierTable = BarrierTable()
     controller: Annotated[
-        FullController | DistributedController, Field(discriminator="information")
+        FullController | PartialController | DistributedController | CustomController,
+        Field(discriminator="information"),
     ] = FullController(information="full")
     plant: PlantTable = PlantTable()
     initial: InitialTable = InitialTable()
@@ -339,9 +458,15 @@ class SystemTable(_Table):
         count = self.agents.count
         try:
             game = self.game.build(count)
-            agents = self.agents.build(game.actions // count)
-            law = self.controller.build(count)
-            state = self.initial.build(agents, self.game.default_start(count))
+            agents = self.agents.build(game.sizes)
+            law = self.controller.build(game)
+            state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
+            filtered = self.initial.filtered
+            memory = law.initial_memory(
+                state[:, agents.kind.OUTPUT],
+                self.initial.estimate,
+                None if filtered is None else _per_action("initial.filtered", filtered, game.sizes),
+            )
         except InvalidInput as error:
             raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
         return System(
@@ -351,8 +476,9 @@ class SystemTable(_Table):
             law=law,
             rho=self.barrier.rho,
             state=state,
+            memory=memory,
             mode=self.controller.mode,
-            engine=self.plant.engine,
+            engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
             integrator=self.plant.integrator or integrator_name,
         )
 
@@ -427,34 +553,52 @@ class Scenario(_Table):
         )
 
 
-def _places(count: int, dimension: int) -> NDArray[np.float64]:
+def _dimension(sizes: Sizes) -> int:
+    """Channels of each agent, where all have as many; else each channel is taken by itself."""
+    return sizes[0] if len(set(sizes)) == 1 else 1
+
+
+def _check_sizes(kind: str, axes: int, sizes: Sizes) -> None:
+    for size in sizes:
+        if size != axes:
+            raise InvalidInput(
+                "agents.type",
+                kind,
+                f"its agents act along {axes} {'axis' if axes == 1 else 'axes'}, and the game's"
+                f" actions have {size}",
+            )
+
+
+def _places(sizes: Sizes) -> NDArray[np.float64]:
     """(m,) positions in m, 1.5 m apart: behind each other, or in the rows of a square."""
+    count, dimension = len(sizes), max(sizes)
     places = np.zeros((count, dimension))
     number = np.arange(count)
     side = count if dimension == 1 else int(np.ceil(np.sqrt(count)))
     places[:, 0] = -1.5 * (number % side)
     places[:, 1:2] = -1.5 * (number // side)[:, None]
-    return places.ravel()
+    return places[np.arange(dimension) < np.array(sizes)[:, None]]
 
 
-def _per_action(key: str, given: PerAction, count: int, dimension: int) -> NDArray[np.float64]:
+def _per_action(key: str, given: PerAction, sizes: Sizes) -> NDArray[np.float64]:
     """(m,) numbers, agent by agent."""
+    count, dimension = len(sizes), _dimension(sizes)
     vectors: list[Any] = []
     if isinstance(given, list):
         if any(isinstance(entry, list) for entry in given):
             vectors = given
-        elif dimension > 1:
+        elif max(sizes) > 1:
             vectors = [given] * count
     if not vectors:
-        return np.repeat(_per_agent(key, given, count), dimension)  # type: ignore[arg-type]
-    if len(vectors) != count or any(len(vector) != dimension for vector in vectors):
+        return np.repeat(_per_agent(key, given, count), sizes)  # type: ignore[arg-type]
+    if tuple(map(len, vectors)) != tuple(sizes):
+        one = f"one list of {dimension} for all agents, or " if dimension > 1 else ""
         raise InvalidInput(
             key,
             given,
-            f"it must be one number, one list of {dimension} for all agents, or a list of {count}"
-            " such lists",
+            f"it must be one number, {one}a list of {count} lists, one for each agent",
         )
-    return np.array(vectors, dtype=np.float64).ravel()
+    return np.concatenate(vectors, dtype=np.float64)
 
 
 def _per_agent(

@@ -14,6 +14,7 @@ from gne_mj.certificate import certify_run
 from gne_mj.errors import InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
+from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import Trajectory
 
@@ -158,6 +159,7 @@ class _Run:
     def step(self) -> Snapshot:
         time = self.loop.time
         samples = self.loop.advance(1, 1) if self.inside else self.loop.finish()
+        raise_pending()
         if len(samples.input) == 0:  # it left the set in this very step
             samples = self.loop.finish()
         state = samples.state[0]
@@ -172,6 +174,7 @@ class _Run:
         started = real_time.perf_counter()
         first = self.clock.steps(self.loop.time)
         recorded = self.loop.advance(samples, every)
+        raise_pending()
         self.wall_time += real_time.perf_counter() - started
         steps = first + every * np.arange(len(recorded.input), dtype=np.float64)
         self._times.append(steps * self.clock.timestep)
@@ -182,6 +185,7 @@ class _Run:
         self._forget_last()
         self._times.append(np.array([self.loop.time]))
         self._samples.append(self.loop.finish())
+        raise_pending()
 
     def _forget_last(self) -> None:
         """Drop the last row if it is of the present time, as when a run goes on after its end."""

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import Law
-from gne_mj.controllers.settings import EPSILON
+from gne_mj.controllers.propagation import no_propagator
 from gne_mj.equilibrium import Equilibrium, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.game import Game
@@ -16,8 +17,14 @@ from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.loops.ode import Clock as LoopClock
+from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import METHODS, Channels
+
+if TYPE_CHECKING:
+    from gne_mj.plants.mjcf_fleet import MjcfPlant
+    from gne_mj.plants.mujoco import MujocoPlant
 
 # Largest step times rate of decay that a method is stable for, on the negative real axis
 STABLE = {"rk4": 2.785, "euler": 2.0}
@@ -69,6 +76,8 @@ class System:
         law: the feedback law.
         rho: the barrier's penalty parameter.
         state: (m, states) of the agents' channels at the start; the outputs strictly inside.
+        memory: of the law at the start; if left out, estimates and z equal y(0). Under the fully
+            distributed law all profiles at which agents evaluate the barrier must be inside.
         mode: "continuous" or "sampled".
         engine: "ode", or "mujoco" for flexible robots.
         integrator: "rk4" or "euler"; for engine "ode" and the fully distributed law in mode
@@ -88,6 +97,7 @@ class System:
     mode: str = "continuous"
     engine: str = "ode"
     integrator: str = "rk4"
+    memory: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     barrier: LogBarrier = field(init=False)
 
     def __post_init__(self) -> None:
@@ -127,47 +137,79 @@ class System:
                 names[worst],
                 value,
             )
+        if not len(self.memory):
+            object.__setattr__(self, "memory", self.law.initial_memory(self.start))
+        self._check_memory()
         self._check_engine()
+
+    def _check_memory(self) -> None:
+        if not np.all(np.isfinite(self.memory)):
+            raise InvalidInput(
+                f"systems.{self.name}.initial.estimate", "nan or inf", "every entry must be finite"
+            )
+        data = self.game.data
+        profiles = self.law.barrier_profiles(self.game.agent_of_action, self.memory)
+        for i, g in enumerate(self.game.constraints(profiles)):
+            own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
+            outside = own[~(g[own] < 0.0)]
+            if len(outside):
+                raise InfeasibleStart(
+                    f"systems.{self.name}.initial.estimate",
+                    f"initial estimates of agent {i + 1}",
+                    self.game.constraint_names[outside[0]],
+                    float(g[outside[0]]),
+                )
 
     def _check_engine(self) -> None:
         key = f"systems.{self.name}.plant"
-        static = self.law.graph is None
-        if self.engine == "mujoco" and self.agents.kind.NAME != "flexible robot":
+        own_model = isinstance(self.agents, MjcfRobots)
+        if self.engine == "mujoco" and not own_model and self.agents.kind is not flexible_robot:
             raise InvalidInput(
                 f"{key}.engine",
                 self.engine,
-                f"MuJoCo has models of flexible robots only; run {self.agents.kind.NAME}s on 'ode'",
+                f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
+                f" {self.agents.kind.NAME}s on 'ode'",
             )
+        if self.engine == "ode" and own_model:
+            raise InvalidInput(f"{key}.engine", self.engine, "MJCF robots run on 'mujoco'")
         if self.integrator == "rosenbrock" and (
-            static or self.mode != "continuous" or self.engine != "ode"
+            self.law.information != "distributed"
+            or self.mode != "continuous"
+            or self.engine != "ode"
         ):
             raise InvalidInput(
                 f"{key}.integrator",
                 self.integrator,
                 "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4'",
             )
-        if self.engine == "mujoco" and not static:
-            raise InvalidInput(
-                f"{key}.engine",
-                self.engine,
-                f"the {self.law.information} law runs on engine 'ode' only",
-            )
+
+    def largest_step(self) -> float:
+        """Largest step in s that the estimates allow under the integrator, mode continuous.
+
+        Explicit methods are stable for c lambda_max / tau (or lambda_max / epsilon) times the step
+        up to a constant of the method; lambda_max bounds the grounded Laplacians' eigenvalues.
+        """
+        law = self.law
+        if law.graph is None or law.estimate_rate == 0.0 or self.mode != "continuous":
+            return np.inf
+        if self.integrator == "rosenbrock":
+            return np.inf
+        # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
+        fastest = max(1.0, law.graph.largest_eigenvalue)
+        return STABLE[self.integrator] / (fastest * law.estimate_rate)
 
     def _check_step(self, clock: Clock) -> None:
-        """Explicit methods are unstable for estimates beyond a step of about 2 epsilon / lambda."""
-        law = self.law
-        if law.graph is None or self.mode != "continuous" or self.integrator == "rosenbrock":
-            return
-        fastest = max(1.0, float(np.linalg.eigvalsh(law.graph.laplacian)[-1]))
-        rate = fastest / law.settings(self.rho)[EPSILON]
-        largest = STABLE[self.integrator] / rate
+        largest = self.largest_step()
         if clock.timestep > largest:
+            others = "mode 'sampled' has no such limit"
+            if self.law.information == "distributed" and self.engine == "ode":
+                others = "integrator 'rosenbrock' and mode 'sampled' have no such limit"
             raise InvalidInput(
                 "simulation.timestep",
                 clock.timestep,
-                f"with epsilon = {law.settings(self.rho)[EPSILON]:g} s the estimates of"
-                f" '{self.name}' need at most {largest:.3g} s under '{self.integrator}';"
-                " integrator 'rosenbrock' and mode 'sampled' have no such limit",
+                f"the estimates of '{self.name}' follow each other at up to"
+                f" {STABLE[self.integrator] / largest:.4g} /s, which '{self.integrator}' can follow"
+                f" with steps of at most {largest:.3g} s; {others}",
             )
 
     @property
@@ -193,10 +235,11 @@ class System:
             graph=self.law.graph_data,
             settings=self.law.settings(self.rho),
             limit=self.agents.input_limit,
-            propagators=(
-                self.law.propagators(clock.control_period)
+            equilibrium=self.equilibrium.action,
+            propagator=(
+                self.law.propagator(clock.control_period)
                 if self.mode == "sampled"
-                else np.zeros((0, 0, 0))
+                else no_propagator()
             ),
         )
         laws, game = self.law.kernels, self.game.kernels
@@ -204,22 +247,41 @@ class System:
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
-            from gne_mj.plants.mujoco import MujocoPlant
 
-            plant = MujocoPlant(
-                self.agents, clock.timestep, self.integrator, userdata=room(self.game)
-            )
+            plant = self._mujoco_plant(clock.timestep, room(self.game, self.agents))
             plant.reset(self.state)
-            return MujocoLoop(plant, laws, game, problem, rest, mode, period)
+            return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
-        memory = self.law.initial_memory(self.start)
         kind = self.agents.kind
         if self.integrator == "rosenbrock" and self.law.graph is not None:
             from gne_mj.loops.rosenbrock import RosenbrockLoop
 
             return RosenbrockLoop(
                 kind, laws, game, problem, channels, self.law.graph, clock.timestep,
-                self.state, memory,
+                self.state, self.memory,
             )  # fmt: skip
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
-        return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, memory)
+        return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
+
+    def _mujoco_plant(self, timestep: float, userdata: int) -> "MujocoPlant | MjcfPlant":
+        from gne_mj.plants.mjcf_fleet import MjcfPlant
+        from gne_mj.plants.mujoco import MujocoPlant
+
+        memory = len(self.memory)
+        if not isinstance(self.agents, MjcfRobots):
+            return MujocoPlant(
+                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
+            )
+        plant = MjcfPlant(self.agents, timestep, self.integrator, userdata=userdata, memory=memory)
+        if (
+            not plant.measures_every_stage
+            and self.mode == "continuous"
+            and (self.integrator != "euler")
+        ):
+            raise InvalidInput(
+                f"systems.{self.name}.agents.output",
+                [robot.output for robot in self.agents.robots],
+                "a tendon's or actuator's sensor is read once a step: use mode 'sampled', or"
+                " integrator 'euler', or name a joint",
+            )
+        return plant

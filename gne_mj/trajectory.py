@@ -190,11 +190,12 @@ def _dataset(
             estimates,
             {**unit, "long_name": "what each agent takes the actions to be"},
         )
-        variables["filtered_action"] = (
-            ("time", axis),
-            samples.memory[:, game.agents * m :],
-            {**unit, "long_name": "z"},
-        )
+        if samples.memory.shape[1] > game.agents * m:
+            variables["filtered_action"] = (
+                ("time", axis),
+                samples.memory[:, game.agents * m :],
+                {**unit, "long_name": "z"},
+            )
     numbers = np.arange(1, game.agents + 1)
     coordinates: dict[str, Any] = {
         "time": ("time", time, {"units": "s"}),

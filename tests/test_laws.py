@@ -22,6 +22,7 @@ from builders import (
 import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
+from gne_mj.controllers.propagation import no_propagator
 from gne_mj.errors import InvalidInput
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
@@ -62,7 +63,8 @@ NETWORKS = [
 
 def problem_of(game, law, limit=np.inf):
     bounds = np.full(game.actions, limit)
-    return Problem(game.data, law.graph_data, law.settings(RHO), bounds, np.zeros((0, 0, 0)))
+    settings, y = law.settings(RHO), np.zeros(game.actions)
+    return Problem(game.data, law.graph_data, settings, bounds, y, no_propagator())
 
 
 def loop_at(game, law, y, memory, h=1.0):
@@ -184,7 +186,7 @@ def act(game, law, y, estimates, z):
     )
     unknown = np.full(game.constraints_count, np.nan)
     problem = problem_of(game, law)
-    code = action(problem, y, unknown, memory, work(len(y), len(unknown)), u)
+    code = action(problem, y, unknown, memory, work(len(y), len(unknown), game.agents), u)
     rate(problem, y, memory, rates)
     return code, u, rates[: len(y) ** 2].reshape(len(y), -1), rates[len(y) ** 2 :]
 

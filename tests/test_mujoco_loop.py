@@ -1,6 +1,7 @@
 """The closed loop in MuJoCo against independent integrations of the ODE."""
 
 import ctypes
+from itertools import chain, repeat
 
 import mujoco
 import numpy as np
@@ -213,7 +214,7 @@ def test_a_reset_simulation_is_not_started():
     loop.advance(5, 1)
     mujoco.mj_resetData(loop.plant.model, loop.plant.data)
     assert loop.monitor[watch.STARTED] == 0.0
-    with callbacks(control=loop._control, passive=loop._passive):
+    with callbacks(control=loop._control, passive=loop.plant.passive):
         mujoco.mj_step(loop.plant.model, loop.plant.data)
     assert np.all(loop.plant.data.ctrl == 0.0)
 
@@ -224,7 +225,7 @@ def test_a_copy_of_the_data_goes_on_by_itself():
     loop.advance(10, 1)
     model, copy = loop.plant.model, mujoco.MjData(loop.plant.model)
     mujoco.mj_copyData(copy, model, loop.plant.data)
-    with callbacks(control=loop._control, passive=loop._passive):
+    with callbacks(control=loop._control, passive=loop.plant.passive):
         for _ in range(20):
             mujoco.mj_step(model, copy)
     loop.advance(20, 1)
@@ -236,7 +237,7 @@ def test_wrong_offsets_are_refused(monkeypatch):
 
     right = native_mujoco._find
     native_mujoco.offsets.cache_clear()
-    shift = iter([0, 1, 0, 0, 0, 0])
+    shift = chain([0, 1], repeat(0))
     monkeypatch.setattr(native_mujoco, "_find", lambda s, w: right(s, w) + next(shift))
     with pytest.raises(EngineError, match="elsewhere than expected"):
         native_mujoco.offsets()

@@ -118,7 +118,12 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
     y, z = powers(1), np.diag(estimates).copy()
     memory = np.concatenate([estimates.ravel(), z])
     problem = Problem(
-        game.data, law.graph_data, law.settings(RHO), np.full(10, np.inf), law.propagators(period)
+        game.data,
+        law.graph_data,
+        law.settings(RHO),
+        np.full(10, np.inf),
+        np.zeros(10),
+        law.propagator(period),
     )
     channels = Channels(np.zeros((10, 0)), np.zeros((10, 1)))
     loop_clock = Clock(period / substeps, substeps, SAMPLED, RK4)

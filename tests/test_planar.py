@@ -352,7 +352,7 @@ def test_defaults_of_a_game_of_ones_own():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"initial.action": [1.0, 0.5, 0.0]}, ["initial.action", "one list of 2", "list of 6"]),
+        ({"initial.action": [1.0, 0.5, 0.0]}, ["initial.action", "one list of 2", "6 lists"]),
         ({"initial.action": [[1.0, 0.5]] * 5}, ["initial.action", "list of 6"]),
         ({"initial.action": [[1.0]] * 6}, ["initial.action", "one list of 2"]),
         ({"initial.action": [[1.0, "a"]] * 6}, ["initial.action.0.1", "'a'", "valid number"]),

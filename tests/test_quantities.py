@@ -12,6 +12,7 @@ from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.quantity import Quantity
+from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import System
 from gne_mj.trajectory import Trajectory
@@ -106,6 +107,42 @@ def test_names_of_axes_are_the_games(trajectory):
     assert [panel.get_ylabel() for panel in panels] == [
         "place $y_{i,east}$ (km)", "place $y_{i,north}$ (km)"
     ]  # fmt: skip
+
+
+FILE = """
+from test_quantities import LENGTH, game as coupled
+
+def game(count):
+    return coupled(LENGTH)
+"""
+
+
+def test_a_file_of_ones_own_with_actions_of_unequal_sizes(tmp_path):
+    (tmp_path / "coupled.py").write_text(FILE)
+    tables = {
+        "simulation": {"duration": 0.5, "timestep": 0.01},
+        "recording": {"period": 0.1},
+        "systems": {
+            "points": {
+                "game": {"type": "custom", "file": str(tmp_path / "coupled.py")},
+                "agents": {"type": "integrator", "count": 3, "input_limit": [[9, 8], [7], [6]]},
+                "barrier": {"rho": 0.05},
+                "initial": {"action": [[0.5, -0.4], [0.3], [0.2]]},
+            }
+        },
+    }
+    built = load_scenario(tables).simulation_object()
+    assert built.systems[0].agents.input_limit.tolist() == [9, 8, 7, 6]
+    done = built.run()
+    assert np.array_equal(done["points"]["action"], simulate(game(LENGTH))["points"]["action"])
+    assert set(plots.draw(done)) == {"points-places", "points-squared-length"}
+    for wrong in ([0.5, -0.4, 0.3, 0.2], [[0.5], [-0.4, 0.3], [0.2]], [[0.5, -0.4], [0.3]]):
+        tables["systems"]["points"]["initial"]["action"] = wrong
+        with pytest.raises(InvalidInput, match=r"initial\.action: .* a list of 3 lists"):
+            load_scenario(tables).simulation_object()
+    tables["systems"]["points"]["agents"] = {"type": "flexible-robot", "count": 3}
+    with pytest.raises(InvalidInput, match=r"agents\.type: .*1 axis, and .* actions have 2"):
+        load_scenario(tables).simulation_object()
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from scipy.integrate import solve_ivp
 import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
+from gne_mj.errors import InfeasibleStart
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops import monitor as watch
@@ -278,12 +279,10 @@ def test_the_true_profile_leaves():
     assert time > 0.0
 
 
-def test_a_start_with_an_estimate_outside():
+def test_a_start_with_an_estimate_outside_is_refused():
     law = Misled(graphs.line(3), 1e-2, 1.0, estimates=((0.2,) * 3, (0.2, 0.2, 0.9), (0.2,) * 3))
-    loop = channels(integrators(3), 0, law=law).closed_loop(clock(0.01))
-    assert len(loop.advance(5, 1).input) == 0
-    assert exit_of(loop) == (watch.ESTIMATE_LEFT, 1, 3, 0.0)
-    assert np.all(np.isnan(loop.finish().input))
+    with pytest.raises(InfeasibleStart, match=r"initial estimates of agent 2 .*'total power'"):
+        channels(integrators(3), 0, law=law)
 
 
 def test_close_to_the_boundary():

@@ -1,9 +1,9 @@
 """A law that is wrong on purpose: agents ignore the constraint that they share with a follower."""
 
-from gne_mj.controllers.full_information import propagate, rate
+from gne_mj.controllers.full_information import propagate, rate, storage
 from gne_mj.native import kernel
 
-__all__ = ["action", "propagate", "rate"]
+__all__ = ["action", "propagate", "rate", "storage"]
 
 
 @kernel

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gne_mj.barrier import evaluate_constraints
+from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import RHO
 from gne_mj.game import GameData
 from gne_mj.graph import GraphData
@@ -22,7 +23,8 @@ class Problem(NamedTuple):
     graph: GraphData
     settings: np.ndarray  # the law's numbers, see gne_mj.controllers.settings
     limit: np.ndarray  # (m,) greatest |u| that the actuators deliver
-    propagators: np.ndarray  # exact maps of the law's memory over a control period
+    equilibrium: np.ndarray  # (m,) y*, from which storage is measured
+    propagator: Propagator  # exact motion of the law's memory over a control period
 
 
 class Work(NamedTuple):
@@ -35,11 +37,21 @@ class Work(NamedTuple):
     profile: np.ndarray  # (m,) an agent's own profile
     y: np.ndarray  # (m,) outputs
     u: np.ndarray  # (m,) inputs at a stage
+    held: np.ndarray  # (m,) outputs at the last control instant, mode sampled
+    stands: np.ndarray  # (1,) the step that the law's memory belongs to, mode sampled
+    scratch: np.ndarray  # for the propagation of estimates
 
 
-def work(actions: int, constraints: int) -> Work:
+@kernel
+def work_sizes(actions, constraints, agents):
+    """Lengths of the arrays of :class:`Work`, in its order."""
+    m, p = actions, constraints
+    return p, p, p, m, m, m, m, m, 1, scratch_length(agents)
+
+
+def work(actions: int, constraints: int, agents: int) -> Work:
     """Fresh scratch arrays."""
-    return Work(*(np.zeros(size) for size in (*(constraints,) * 3, *(actions,) * 4)))
+    return Work(*(np.zeros(size) for size in work_sizes(actions, constraints, agents)))
 
 
 @kernel

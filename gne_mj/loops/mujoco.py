@@ -2,41 +2,43 @@
 
 MuJoCo evaluates control at every stage of its integrator. The callback counts these evaluations
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
-(:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. What it keeps
-from call to call lies in mjData's ``userdata``, which is part of MuJoCo's state:
-[mark, address of the table, arctangents of the springs, step, stage, monitor, input held, scratch].
+(:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. The law's memory
+is in ``act``: in mode `continuous` MuJoCo's integrator moves it, by the rates that a second
+callback gives; in mode `sampled` the first one propagates it. What else is kept from call to call
+lies in ``userdata``; both are part of MuJoCo's state. userdata holds
+[mark, address of the table, the fleet's own, step, stage, monitor, input held, scratch arrays, flat
+state at the step's start, flat state at a later stage].
 """
 
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.controllers.propagation import Propagator
 from gne_mj.errors import EngineError
 from gne_mj.game import Game, GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import Problem, Work
-from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, look, stored
+from gne_mj.loops.feedback import Problem, Work, work_sizes
+from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, look
 from gne_mj.native import callback, compiled, copy, kernel, source_key
-from gne_mj.plants import flexible_robot
+from gne_mj.plants.agents import Agents
 from gne_mj.plants.mujoco import (
-    ACTUATOR,
-    ARCTANGENTS,
-    ATAN,
-    PLACES,
-    PLACES_COUNT,
+    MEMORY,
+    NA,
+    NU,
+    NUSERDATA,
     PLANT_TABLE,
+    ROOM,
     SIZES,
     STAGES,
-    MujocoPlant,
-    gather,
-    passive_callback,
 )
 from gne_mj.plants.native_mujoco import (
+    ACTIVATION,
     CALLBACK,
     LOOP_MARK,
     USERDATA_HEADER,
@@ -54,19 +56,27 @@ from gne_mj.plants.native_mujoco import (
 )
 from gne_mj.plants.ode import Channels
 
-# Behind the plant's arrays: the game's (as in GameData), the graph's, then these
+if TYPE_CHECKING:
+    from gne_mj.plants.mjcf_fleet import MjcfPlant
+    from gne_mj.plants.mujoco import MujocoPlant
+
+# Behind the plant's arrays: the game's (as in GameData), the graph's, the propagator's, the rest
 GAME = PLANT_TABLE
 GRAPH = GAME + len(GameData._fields)
-SETTINGS, LIMIT, PROPAGATORS, PARAMETERS, REST, STEP, CLOCK = range(GRAPH + 2, GRAPH + 9)
+PROPAGATOR = GRAPH + len(GraphData._fields)
+SETTINGS, LIMIT, EQUILIBRIUM, PARAMETERS, REST, STEP, CLOCK = range(PROPAGATOR + 3, PROPAGATOR + 10)
 
-# Entries of userdata behind the plant's m arctangents
-STEP_NOW, STAGE_NOW, MONITOR = range(ARCTANGENTS, ARCTANGENTS + 3)
+# Entries of userdata behind the fleet's own
+STEP_NOW, STAGE_NOW, MONITOR = range(3)
 
 
 @kernel
-def userdata_length(m, p, states):
-    """Entries of userdata that the callback needs: the list at the top of this module."""
-    return 2 + watch.length(m, p) + m + 3 * p + 4 * m + m * states
+def room_needed(m, p, agents, states):
+    """Entries of userdata that a loop needs behind the fleet's own."""
+    total = MONITOR + watch.length(m, p) + m + 2 * m * states
+    for size in work_sizes(m, p, agents):
+        total += size
+    return total
 
 
 @kernel
@@ -83,8 +93,21 @@ def problem_in(table):
         integers(table, GAME + 7),
     )
     graph = GraphData(integers(table, GRAPH), integers(table, GRAPH + 1))
-    nothing = floats(table, PROPAGATORS).reshape((0, 0, 0))
-    return Problem(data, graph, floats(table, SETTINGS), floats(table, LIMIT), nothing)
+    agents = len(data.offsets) - 1
+    maps = floats(table, PROPAGATOR)
+    propagator = Propagator(
+        maps.reshape((len(maps) // (agents * agents), agents, agents)),
+        floats(table, PROPAGATOR + 1),
+        floats(table, PROPAGATOR + 2),
+    )
+    return Problem(
+        data,
+        graph,
+        floats(table, SETTINGS),
+        floats(table, LIMIT),
+        floats(table, EQUILIBRIUM),
+        propagator,
+    )
 
 
 @kernel
@@ -96,45 +119,51 @@ def channels_in(table, m, states):
 
 
 @kernel
-def parts_of(userdata, m, p, states):
-    """The views into userdata: monitor, input held, scratch, flat state."""
-    at = MONITOR + m + watch.length(m, p)
-    monitor = userdata[MONITOR + m : at]
+def parts_of(userdata, start, m, p, agents, states):
+    """The views into userdata: monitor, input held, scratch, flat states at the start and now."""
+    at = start + MONITOR + watch.length(m, p)
+    monitor = userdata[start + MONITOR : at]
     u = userdata[at : at + m]
     at += m
-    g = userdata[at : at + p]
-    weights, own = userdata[at + p : at + 2 * p], userdata[at + 2 * p : at + 3 * p]
-    at += 3 * p
+    n0, n1, n2, n3, n4, n5, n6, n7, n8, n9 = work_sizes(m, p, agents)
+    a1 = at + n0
+    a2 = a1 + n1
+    a3 = a2 + n2
+    a4 = a3 + n3
+    a5 = a4 + n4
+    a6 = a5 + n5
+    a7 = a6 + n6
+    a8 = a7 + n7
+    a9 = a8 + n8
+    end = a9 + n9
     work = Work(
-        g,
-        weights,
-        own,
-        userdata[at : at + m],
-        userdata[at + m : at + 2 * m],
-        userdata[at + 2 * m : at + 3 * m],
-        userdata[at + 3 * m : at + 4 * m],
+        userdata[at:a1],
+        userdata[a1:a2],
+        userdata[a2:a3],
+        userdata[a3:a4],
+        userdata[a4:a5],
+        userdata[a5:a6],
+        userdata[a6:a7],
+        userdata[a7:a8],
+        userdata[a8:a9],
+        userdata[a9:end],
     )
-    at += 4 * m
-    return monitor, u, work, userdata[at : at + m * states]
-
-
-@kernel
-def stored_given(channels, state, userdata):
-    """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
-    total = 0.0
-    for r in range(len(channels.rest)):
-        x = state[4 * r : 4 * r + 4]
-        total += flexible_robot.storage_given(
-            channels.parameters[r], x, channels.rest[r], userdata[ARCTANGENTS + r]
-        )
-    return total
+    size = m * states
+    return monitor, u, work, userdata[end : end + size], userdata[end + size : end + 2 * size]
 
 
 @cache
-def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any]:
-    """The control callback, the native loop and its last observation, for a law and a game."""
-    agent = flexible_robot
-    source = source_key(agent, law, game)
+def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, ...]:
+    """The callbacks for control and memory, the native loop and its last observation.
+
+    Args:
+        at: where MuJoCo keeps what.
+        fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
+        law, game: modules of kernels.
+    """
+    agent = fleet.AGENT
+    states = len(agent.STATES)
+    source = source_key(fleet, agent, law, game)
 
     def control(model, data):
         _ = source
@@ -143,136 +172,187 @@ def build(at: Offsets, law: ModuleType, game: ModuleType) -> tuple[Any, Any, Any
         if table <= 0:
             return
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        ctrl = field(struct, at.ctrl, sizes[2])
-        userdata = field(struct, at.userdata, sizes[3])
-        places = integers(table, PLACES)
-        m, p, states = len(places) // PLACES_COUNT, steps[0], len(agent.STATES)
-        stages, period, mode = steps[1], steps[2], steps[3]
-        monitor, u, work, state = parts_of(userdata, m, p, states)
-        step, stage = np.int64(userdata[STEP_NOW + m]), np.int64(userdata[STAGE_NOW + m])
+        m, p, agents = steps[0], steps[1], steps[2]
+        stages, period, mode = steps[3], steps[4], steps[5]
+        ctrl = field(struct, at.ctrl, sizes[NU])
+        userdata = field(struct, at.userdata, sizes[NUSERDATA])
+        start = sizes[ROOM]
+        monitor, u, work, state, later = parts_of(userdata, start, m, p, agents, states)
+        step, stage = np.int64(userdata[start + STEP_NOW]), np.int64(userdata[start + STAGE_NOW])
         last = stage + 1 == stages
-        userdata[STEP_NOW + m] = step + 1 if last else step
-        userdata[STAGE_NOW + m] = 0 if last else stage + 1
+        userdata[start + STEP_NOW] = step + 1 if last else step
+        userdata[start + STAGE_NOW] = 0 if last else stage + 1
         if stage > 0 and mode != CONTINUOUS:
             return
         h = floats(table, CLOCK)[0]
         time = step * h
         if stage > 0:
             time += h if stage == 3 else 0.5 * h
-        gather(at, struct, table, state)
+            state = later
+        fleet.gather(at, struct, table, state)
         channels = channels_in(table, m, states)
-        storage = stored_given(channels, state, userdata) if stage == 0 else 0.0
+        storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
         acts = monitor[watch.EXIT] == watch.INSIDE and look(
             agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
-            stage, storage, state, u, monitor, work,
+            stage, storage, state, field(struct, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor,
+            work,
         )  # fmt: skip
         for r in range(m):
-            ctrl[places[r * PLACES_COUNT + ACTUATOR]] = work.u[r] if acts else 0.0
+            ctrl[fleet.actuator_of(table, r)] = work.u[r] if acts else 0.0
 
-    def advance(mj_step, model, data, qpos, qvel, userdata, m, p, every, before, states, inputs):
+    def remember(model, data, actuator):
         _ = source
-        monitor, u, _work, _state = parts_of(userdata, m, p, len(agent.STATES))
+        struct = address_of(data)
+        table = table_of(at, address_of(model), struct)
+        if table <= 0:
+            return 0.0
+        sizes, steps = integers(table, SIZES), integers(table, STEP)
+        rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
+        if steps[5] != CONTINUOUS:
+            for r in range(len(rates)):
+                rates[r] = 0.0
+            return 0.0
+        userdata = field(struct, at.userdata, sizes[NUSERDATA])
+        _monitor, _u, work, _state, _later = parts_of(
+            userdata, sizes[ROOM], steps[0], steps[1], steps[2], states
+        )
+        memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
+        law.rate(problem_in(table), work.y, memory, rates)
+        return 0.0
+
+    def advance(
+        mj_step, model, data, qpos, qvel, act, userdata, start, m, p, agents, restores, every,
+        before, samples_state, samples_u, samples_memory,
+    ):  # fmt: skip
+        _ = source
+        monitor, u, _work, state, _later = parts_of(userdata, start, m, p, agents, states)
+        nq, nv = len(qpos), len(qvel)
         done = 0
-        for sample in range(len(inputs)):
+        for sample in range(len(samples_u)):
             for substep in range(every):
-                copy(qpos, before[0])
-                copy(qvel, before[1])
+                copy(qpos, before[:nq])
+                copy(qvel, before[nq : nq + nv])
+                if restores:
+                    copy(act, before[nq + nv :])
                 call(mj_step, model, data)
-                if monitor[watch.EXIT] != watch.INSIDE:
-                    copy(before[0], qpos)
-                    copy(before[1], qvel)
-                    # a step that began inside has its row, even if a later stage left
-                    if substep == 0 and monitor[watch.EXIT_STAGE] > 0:
-                        copy(u, inputs[sample])
-                        copy(before[0], states[sample, 0])
-                        copy(before[1], states[sample, 1])
+                left = monitor[watch.EXIT] != watch.INSIDE
+                if left:
+                    copy(before[:nq], qpos)
+                    copy(before[nq : nq + nv], qvel)
+                    if restores:
+                        copy(before[nq + nv :], act)
+                    if substep > 0:
                         return sample + 1, done
-                    return sample + (substep > 0), done
+                    # a step that began inside has its row, even if a later stage left
+                    if monitor[watch.EXIT_STAGE] == 0:
+                        return sample, done
                 if substep == 0:
-                    copy(u, inputs[sample])
-                    copy(before[0], states[sample, 0])
-                    copy(before[1], states[sample, 1])
+                    copy(u, samples_u[sample])
+                    copy(state, samples_state[sample])
+                    copy(before[nq + nv :] if restores else act, samples_memory[sample])
+                if left:
+                    return sample + 1, done
                 done += 1
-        return len(inputs), done
+        return len(samples_u), done
 
     def finish(model, data, step):
         _ = source
         table = table_of(at, model, data)
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m, p, states = len(floats(table, ATAN)), steps[0], len(agent.STATES)
-        userdata = field(data, at.userdata, sizes[3])
-        monitor, u, work, state = parts_of(userdata, m, p, states)
-        gather(at, data, table, state)
+        m = steps[0]
+        userdata = field(data, at.userdata, sizes[NUSERDATA])
+        monitor, u, work, state, _later = parts_of(
+            userdata, sizes[ROOM], m, steps[1], steps[2], states
+        )
+        fleet.gather(at, data, table, state)
         channels = channels_in(table, m, states)
+        # the agents' storage as the ODE loop has it: the fleet's own figures are of the last step
+        storage = 0.0
+        for r in range(m):
+            x = state[r * states : (r + 1) * states]
+            storage += agent.storage(channels.parameters[r], x, channels.rest[r])
         return begin_step(
             agent, law, game, problem_in(table), channels,
-            Clock(floats(table, CLOCK)[0], steps[2], steps[3], 0), step,
-            stored(agent, channels, state), state, u, monitor, work,
+            Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0), step, storage, state,
+            field(data, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor, work,
         )  # fmt: skip
 
     return (
         callback(CALLBACK, control),
+        callback(ACTIVATION, remember),
         compiled(advance),
         compiled(finish),
     )
 
 
-def room(game: Game) -> int:
+def room(game: Game, agents: Agents) -> int:
     """How many entries of userdata a plant must leave for this game's loop."""
-    return int(userdata_length(game.actions, game.constraints_count, len(flexible_robot.STATES)))
+    return int(room_needed(game.actions, game.constraints_count, game.agents, agents.states))
 
 
 class MujocoLoop(ClosedLoop):
-    """The closed loop of a fleet in MuJoCo, under a static law.
+    """The closed loop of a fleet in MuJoCo.
 
     Args:
-        plant: the fleet, reset to its start and with :func:`room` in its userdata.
+        plant: the fleet, reset to its start, with :func:`room` in its userdata and for the memory.
         law, game: modules of kernels.
         problem: what the law reads.
         rest: (m, states) equilibrium, from which V is measured.
         mode: CONTINUOUS or SAMPLED of :mod:`gne_mj.loops.ode`.
         period: steps per control period, mode sampled.
+        memory: the law's, at the start.
     """
 
     def __init__(
         self,
-        plant: MujocoPlant,
+        plant: "MujocoPlant | MjcfPlant",
         law: ModuleType,
         game: ModuleType,
         problem: Problem,
         rest: NDArray[np.float64],
         mode: int,
         period: int,
+        memory: NDArray[np.float64],
     ) -> None:
         self.plant = plant
-        self._m = plant.agents.channels
-        self._p = len(problem.data.member_pointer) - 1
+        m = plant.agents.channels
+        p, agents = len(problem.data.member_pointer) - 1, len(problem.data.offsets) - 1
         at = offsets()
-        self._control, self._advance, self._finish = build(at, law, game)
-        self._passive = passive_callback(at)
-        stages = STAGES[plant.integrator]
+        self._control, self._remember, self._advance, self._finish = build(
+            at, plant.kernels, law, game
+        )
+        steps = [m, p, agents, STAGES[plant.integrator], period, mode]
         self._table = Table(
             [
                 *plant.table_arrays,
                 *problem.data,
                 *problem.graph,
+                *problem.propagator,
                 problem.settings,
                 problem.limit,
-                np.zeros(0),
+                problem.equilibrium,
                 np.ascontiguousarray(plant.agents.parameters),
                 np.ascontiguousarray(rest),
-                np.array([self._p, stages, period, mode], dtype=np.int64),
+                np.array(steps, dtype=np.int64),
                 np.array([plant.timestep]),
             ]
         )
         data = plant.data
         data.userdata[:] = 0.0
+        sizes = plant.table_arrays[SIZES]
+        self._memory = data.act[sizes[MEMORY] :]
+        self._memory[:] = memory
         self._step = 0
-        length = int(watch.length(self._m, self._p))
-        start = MONITOR + self._m
-        self.monitor = data.userdata[start : start + length]
-        self._u = data.userdata[start + length : start + length + self._m]
-        self._before = np.zeros((2, plant.model.nq))
+        self._start = int(sizes[ROOM])
+        self._sizes = (m, p, agents)
+        # in mode sampled the memory stands still but at control instants
+        restores = mode == CONTINUOUS and len(memory) > 0
+        kept = plant.model.nq + plant.model.nv + (len(memory) if restores else 0)
+        self._before = (restores, np.zeros(kept))
+        first = self._start + MONITOR
+        length = int(watch.length(m, p))
+        self.monitor = data.userdata[first : first + length]
+        self._u = data.userdata[first + length : first + length + m]
 
     @property
     def time(self) -> float:
@@ -283,28 +363,39 @@ class MujocoLoop(ClosedLoop):
         """See the base class."""
         if self.monitor[watch.EXIT] != watch.INSIDE:
             samples = 0
-        data = self.plant.data
-        rows, inputs = np.empty((samples, *self._before.shape)), np.empty((samples, self._m))
+        data, agents = self.plant.data, self.plant.agents
+        m = agents.channels
+        restores, before = self._before
+        recorded = (
+            np.empty((samples, m * agents.states)),
+            np.empty((samples, m)),
+            np.empty((samples, len(self._memory))),
+        )
         self._mark()
         # The callback counts steps and stages; a step that ended in an exit is not one of them.
-        data.userdata[STEP_NOW + self._m] = self._step
-        data.userdata[STAGE_NOW + self._m] = 0.0
-        with callbacks(control=self._control, passive=self._passive):
+        data.userdata[self._start + STEP_NOW] = self._step
+        data.userdata[self._start + STAGE_NOW] = 0.0
+        with callbacks(
+            control=self._control, passive=self.plant.passive, activation=self._remember
+        ):
             done, steps = self._advance(
                 step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
-                data.userdata, self._m, self._p, every, self._before, rows, inputs,
+                self._memory, data.userdata, self._start, *self._sizes, restores, every, before,
+                *recorded,
             )  # fmt: skip
         self._step += steps
         data.time = self.time
-        return self._samples(rows[:done], inputs[:done])
+        states, inputs, memories = (rows[:done] for rows in recorded)
+        return Samples(states.reshape(-1, m, agents.states), inputs, memories)
 
     def finish(self) -> Samples:
         """See the base class."""
         data = self.plant.data
+        state = self.plant.state  # first, since it brings a plant's sensors up to date
         self._mark()
         inside = self._finish(self.plant.model._address, data._address, self._step)
-        u = self._u if inside else np.full(self._m, np.nan)
-        return self._samples(np.stack([data.qpos, data.qvel])[None], u[None].copy())
+        u = self._u if inside else np.full_like(self._u, np.nan)
+        return Samples(state[None], u[None].copy(), self._memory[None].copy())
 
     def _mark(self) -> None:
         """Mark the data as this loop's: the plant's own step, or a reset, may have come between."""
@@ -313,8 +404,3 @@ class MujocoLoop(ClosedLoop):
                 "the loop's MuJoCo data was reset: make a new loop to start from there"
             )
         self.plant.data.userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
-
-    def _samples(self, rows: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
-        state = self.plant.states_of(rows[:, 0], rows[:, 1])
-        memory = np.empty((len(rows), 0))
-        return Samples(state=state, input=inputs, memory=memory)

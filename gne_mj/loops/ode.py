@@ -1,8 +1,9 @@
 """The fixed-step closed loop of ODE agents: any law, any agents, Runge-Kutta 4 or Euler.
 
 In mode `continuous` the law (and the rates of its memory) are evaluated at every stage of the
-integrator. In mode `sampled` the law is evaluated once per control period and held, and its memory
-moves exactly over the period with the outputs held at their values at the period's start.
+integrator. In mode `sampled` the law is evaluated once per control period and held; at the next
+control instant its memory first moves exactly over the period that has passed, with the outputs
+held at their values at the period's start.
 """
 
 from functools import cache
@@ -50,30 +51,36 @@ def stored(agent, channels, state):
 
 
 @kernel
-def begin_step(agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work):
+def begin_step(
+    agent, law, game, problem, channels, clock, step, storage, state, memory, u, monitor, work
+):
     """Measure, act and observe at the start of a step; u is changed. False if the run must end.
 
-    storage is V^{x*} now (see :func:`stored`).
+    storage is V^{x*} of the agents now (see :func:`stored`).
     """
     return look(
-        agent, law, game, problem, channels, clock, step * clock.h, step, 0, storage, state, u,
-        monitor, work,
+        agent, law, game, problem, channels, clock, step * clock.h, step, 0, storage, state,
+        memory, u, monitor, work,
     )  # fmt: skip
 
 
 @kernel
 def look(
-    agent, law, game, problem, channels, clock, time, step, stage, storage, state, u, monitor, work
-):
+    agent, law, game, problem, channels, clock, time, step, stage, storage, state, memory, u,
+    monitor, work,
+):  # fmt: skip
     """The same at any stage of a step: at a later one (mode continuous) only work.u is filled.
 
     One kernel for both keeps MuJoCo's callback small, which is most of its speed.
     """
-    m, states = channels.rest.shape
     y = work.y
-    measure(agent, state, states, y)
+    measure(agent, state, channels.rest.shape[1], y)
     if clock.mode == CONTINUOUS or step % clock.period == 0:
-        memory = state[m * states :]
+        if clock.mode != CONTINUOUS:
+            if work.stands[0] < step:  # a control period has passed
+                law.propagate(problem, work.held, memory, work.scratch)
+                work.stands[0] = step
+            copy(y, work.held)
         if not feedback(law, game, problem, time, stage, y, memory, work, monitor, work.u):
             return False
     else:
@@ -82,6 +89,7 @@ def look(
         copy(u, work.u)
     if stage == 0:
         before = work.u if clock.mode == CONTINUOUS else u
+        storage += law.storage(problem, memory)
         watch.observe(monitor, time, y, work.g, work.demand, before, work.u, storage)
         copy(work.u, u)
     return True
@@ -148,13 +156,13 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
     ):  # fmt: skip
         _ = source
         m, states = channels.rest.shape
-        held_y = scratch[5]
+        memory = state[m * states :]
         for sample in range(len(samples_u)):
             for substep in range(every):
                 storage = stored(agent, channels, state)
                 if not begin_step(
-                    agent, law, game, problem, channels, clock, step, storage, state, u, monitor,
-                    work,
+                    agent, law, game, problem, channels, clock, step, storage, state, memory, u,
+                    monitor, work,
                 ):  # fmt: skip
                     return sample + (substep > 0), step
                 if substep == 0:
@@ -168,9 +176,6 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
                         return sample + 1, step
                     step += 1
                     continue
-                memory = state[m * states :]
-                if clock.mode == SAMPLED and step % clock.period == 0:
-                    copy(work.y, held_y)
                 if clock.mode == CONTINUOUS:
                     law.rate(problem, work.y, memory, scratch[0])
                 held_step(
@@ -181,17 +186,17 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
                     for r in range(len(memory)):
                         memory[r] += clock.h * scratch[0, r]
                 step += 1
-                if clock.mode == SAMPLED and step % clock.period == 0:
-                    law.propagate(problem, held_y[:m], memory, scratch[0])
         return len(samples_u), step
 
     @compiled
     def finish(problem, channels, clock, step, state, u, monitor, work):
         _ = source
+        m, states = channels.rest.shape
         storage = stored(agent, channels, state)
         return begin_step(
-            agent, law, game, problem, channels, clock, step, storage, state, u, monitor, work
-        )
+            agent, law, game, problem, channels, clock, step, storage, state, state[m * states :],
+            u, monitor, work,
+        )  # fmt: skip
 
     return advance, finish
 
@@ -226,8 +231,8 @@ class OdeLoop(ClosedLoop):
         self._state = np.concatenate([state.ravel(), memory])
         actions, constraints = len(state), len(problem.data.member_pointer) - 1
         self._u = np.zeros(actions)
-        self._work = work(actions, constraints)
-        self._scratch = np.zeros((6, max(len(self._state), actions, 5 * state.shape[1])))
+        self._work = work(actions, constraints, len(problem.data.offsets) - 1)
+        self._scratch = np.zeros((5, max(len(self._state), actions, 5 * state.shape[1])))
         self._step = 0
         self.monitor = np.zeros(watch.length(actions, constraints))
 

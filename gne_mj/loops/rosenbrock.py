@@ -353,7 +353,7 @@ class RosenbrockLoop(ClosedLoop):
         self._progress = np.zeros(COUNT)
         self._progress[NEXT] = min(h, float(problem.settings[EPSILON]))
         self._u = np.zeros(m)
-        self._work = work(m, constraints)
+        self._work = work(m, constraints, agents)
         dense = np.zeros((5, self._length))
         dense[:2] = self._state[: self._length]
         self._solver = Solver(

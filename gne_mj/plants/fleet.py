@@ -51,8 +51,8 @@ def compose(parameters: NDArray[np.float64], *, dimension: int = 1, decorated: b
         )
     place, robot_model, ends = MODELS[dimension]
     mjcf = _import_mjcf()
-    lane = mjcf.from_xml_string(_read(place))
-    robot_xml = _read(robot_model)
+    lane = mjcf.from_xml_string(read_model(place))
+    robot_xml = read_model(robot_model)
     if not decorated:
         lane.worldbody.light.clear()
         lane.worldbody.geom.clear()
@@ -74,16 +74,31 @@ def compose(parameters: NDArray[np.float64], *, dimension: int = 1, decorated: b
 
 
 def compile_model(
-    lane: Any, *, timestep: float, integrator: str, userdata: int = 0
+    lane: Any, *, timestep: float, integrator: str, userdata: int = 0, memory: int = 0
 ) -> mujoco.MjModel:
-    """Compile a composed fleet with its step in s, integrator and room for user data."""
+    """Compile a composed fleet.
+
+    Args:
+        lane: what :func:`compose` returned.
+        timestep: in s.
+        integrator: MuJoCo's name of it.
+        userdata: entries of mjData's ``userdata``.
+        memory: entries of ``act`` for a law's memory; an actuator without any force, ``memory``,
+            holds them, and its rates come from a callback.
+    """
+    if memory:
+        lane.actuator.add(
+            "general", name="memory", joint=lane.find_all("joint")[0], dyntype="user",
+            actdim=memory, gear=[0], gainprm=[0],
+        )  # fmt: skip
     lane.option.timestep = timestep
     lane.option.integrator = integrator
     lane.size.nuserdata = userdata
     return mujoco.MjModel.from_xml_string(lane.to_xml_string())
 
 
-def _read(name: str) -> str:
+def read_model(name: str) -> str:
+    """The text of a packaged MJCF file."""
     with as_file(files("gne_mj.models").joinpath(name)) as path:
         return path.read_text(encoding="utf-8")
 

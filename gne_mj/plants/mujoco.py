@@ -1,5 +1,6 @@
 """Flexible robots in MuJoCo: the fleet's model and data, its atan springs as native forces."""
 
+import sys
 from functools import cache
 from typing import Any
 
@@ -40,15 +41,22 @@ PLANT_TABLE = 3
 # A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
 MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
 
+# Entries of SIZES: lengths of mjData's arrays, and where a loop's part of userdata and the
+# memory's part of act begin
+NQ, NV, NU, NUSERDATA, NA, ROOM, MEMORY = range(7)
+
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
+
+# What a loop asks of a module of fleets: its agents' type, and the three kernels that follow
+AGENT = flexible_robot
 
 
 @kernel
 def gather(at, data, table, state):
     """Fill the flat state (m channels of flexible_robot.STATES) from mjData."""
     sizes = integers(table, SIZES)
-    qpos, qvel = field(data, at.qpos, sizes[0]), field(data, at.qvel, sizes[1])
+    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
     places = integers(table, PLACES)
     for r in range(len(places) // PLACES_COUNT):
         row = r * PLACES_COUNT
@@ -57,6 +65,24 @@ def gather(at, data, table, state):
         state[4 * r + 1] = qvel[places[row + MAIN_V]]
         state[4 * r + 2] = qvel[places[row + APPENDAGE_V]]
         state[4 * r + 3] = position
+
+
+@kernel
+def actuator_of(table, r):
+    """Which entry of ctrl is the input of channel r."""
+    return integers(table, PLACES)[r * PLACES_COUNT + ACTUATOR]
+
+
+@kernel
+def stored(channels, state, userdata):
+    """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
+    total = 0.0
+    for r in range(len(channels.rest)):
+        x = state[4 * r : 4 * r + 4]
+        total += flexible_robot.storage_given(
+            channels.parameters[r], x, channels.rest[r], userdata[ARCTANGENTS + r]
+        )
+    return total
 
 
 @cache
@@ -71,8 +97,8 @@ def passive_callback(at: Offsets) -> Any:
         if table == 0:
             return
         sizes = integers(table, SIZES)
-        qpos = field(struct, at.qpos, sizes[0])
-        force = field(struct, at.qfrc_passive, sizes[1])
+        qpos = field(struct, at.qpos, sizes[NQ])
+        force = field(struct, at.qfrc_passive, sizes[NV])
         places, coefficient = integers(table, PLACES), floats(table, ATAN)
         kept = field(struct, at.userdata, ARCTANGENTS + len(coefficient))
         for r in range(len(coefficient)):
@@ -111,9 +137,11 @@ class MujocoPlant(Plant):
         integrator: "rk4" or "euler". MuJoCo's implicit integrators drop the damping of a tendon
             between sibling bodies, and are not offered.
         userdata: room to leave in ``userdata`` behind what this plant needs itself.
+        memory: room for a law's memory in ``act``.
         decorated: keep what is for the eye only.
 
     Attributes:
+        kernels: the module that says how a loop reads and drives the fleet.
         model, data: MuJoCo's own. Step them through this class or a simulation: without its
             callbacks the springs lack their atan term.
     """
@@ -125,6 +153,7 @@ class MujocoPlant(Plant):
         integrator: str = "rk4",
         *,
         userdata: int = 0,
+        memory: int = 0,
         decorated: bool = True,
     ) -> None:
         if agents.kind is not flexible_robot:
@@ -134,11 +163,14 @@ class MujocoPlant(Plant):
                 f"only flexible robots have a model, not {agents.kind.NAME}s",
             )
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
+        self.kernels = sys.modules[__name__]
+        self.passive = passive_callback(offsets())
         self.model = compile_model(
             compose(agents.parameters, dimension=agents.dimension, decorated=decorated),
             timestep=timestep,
             integrator=INTEGRATORS[integrator],
             userdata=ARCTANGENTS + agents.channels + userdata,
+            memory=memory,
         )
         self.data = mujoco.MjData(self.model)
         self.table_arrays = self._table_arrays()
@@ -158,27 +190,24 @@ class MujocoPlant(Plant):
         self.places[:, MAIN_V] = [joint.dofadr[0] for joint in main]
         self.places[:, APPENDAGE_V] = [joint.dofadr[0] for joint in appendage]
         self.places[:, ACTUATOR] = [self.model.actuator(name).id for name in names("force")]
-        sizes = (self.model.nq, self.model.nv, self.model.nu, self.model.nuserdata)
+        model = self.model
+        room = ARCTANGENTS + self.agents.channels
+        sizes = (model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)
         return [
             self.places,
             np.ascontiguousarray(self.agents.parameters[:, 3]),
             np.array(sizes, dtype=np.int64),
         ]
 
-    def states_of(
-        self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """(..., m, states) from MuJoCo's positions (..., nq) and velocities (..., nv)."""
-        at = self.places.T
-        position = qpos[..., at[MAIN_Q]]
-        extension = position - qpos[..., at[APPENDAGE_Q]]
-        columns = (extension, qvel[..., at[MAIN_V]], qvel[..., at[APPENDAGE_V]], position)
-        return np.stack(columns, axis=-1)
-
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, states), a copy."""
-        return self.states_of(self.data.qpos, self.data.qvel)
+        at = self.places.T
+        qpos, qvel = self.data.qpos, self.data.qvel
+        position = qpos[at[MAIN_Q]]
+        extension = position - qpos[at[APPENDAGE_Q]]
+        columns = (extension, qvel[at[MAIN_V]], qvel[at[APPENDAGE_V]], position)
+        return np.stack(columns, axis=-1)
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class."""
@@ -194,5 +223,5 @@ class MujocoPlant(Plant):
         """See the base class."""
         self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
         self.data.ctrl[self.places[:, ACTUATOR]] = u
-        with callbacks(passive=passive_callback(offsets())):
+        with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)

@@ -27,7 +27,9 @@ from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
+ACTIVATION = types.float64(types.voidptr, types.voidptr, types.int32)
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+_DYNAMICS = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 _WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
@@ -43,7 +45,10 @@ class Offsets(NamedTuple):
     qpos: int
     qvel: int
     ctrl: int
+    act: int
+    act_dot: int
     qfrc_passive: int
+    sensordata: int
     userdata: int
     nuserdata: int  # in mjModel
 
@@ -58,10 +63,11 @@ def offsets() -> Offsets:
     size = 7919  # a number that no other size of the probe model has
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><size nuserdata="{size}"/><worldbody><body><joint name="j" type="slide"/>
-        <geom size="1"/></body></worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+        <geom size="1"/></body></worldbody><actuator><intvelocity joint="j"/></actuator>
+        <sensor><jointvel joint="j"/></sensor></mujoco>"""
     )
     data = mujoco.MjData(model)
-    names = ("qpos", "qvel", "ctrl", "qfrc_passive", "userdata")
+    names = [name for name in Offsets._fields if name != "nuserdata"]
     found = {name: _find(data._address, getattr(data, name).ctypes.data) for name in names}
     result = Offsets(**found, nuserdata=_find(model._address, size))
     read_back = _read_back()
@@ -248,7 +254,9 @@ _installed = threading.Lock()
 
 
 @contextmanager
-def callbacks(*, control: Any = None, passive: Any = None) -> Iterator[None]:
+def callbacks(
+    *, control: Any = None, passive: Any = None, activation: Any = None
+) -> Iterator[None]:
     """Install C callbacks (numba ``cfunc`` objects) for a while; always restores what was there.
 
     MuJoCo's warnings are silenced meanwhile: they would be written to a log file in the working
@@ -266,16 +274,19 @@ def callbacks(*, control: Any = None, passive: Any = None) -> Iterator[None]:
         before = (
             mujoco.get_mjcb_control(),
             mujoco.get_mjcb_passive(),
+            mujoco.get_mjcb_act_dyn(),
             mujoco.get_mju_user_warning(),
         )
         try:
             mujoco.set_mjcb_control(control and _FUNCTION(control.address))
             mujoco.set_mjcb_passive(passive and _FUNCTION(passive.address))
+            mujoco.set_mjcb_act_dyn(activation and _DYNAMICS(activation.address))
             mujoco.set_mju_user_warning(_WARNING(_silence().address))
             yield
         finally:
             mujoco.set_mjcb_control(before[0])
             mujoco.set_mjcb_passive(before[1])
-            mujoco.set_mju_user_warning(before[2])
+            mujoco.set_mjcb_act_dyn(before[2])
+            mujoco.set_mju_user_warning(before[3])
     finally:
         _installed.release()

@@ -6,8 +6,9 @@ import time
 import mujoco
 import numpy as np
 
-from gne_mj.controllers import FullInformation
+from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.games import velocity_game
+from gne_mj.graph import ring
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, compose
@@ -21,52 +22,69 @@ INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
 
 def rows(runs: int = 25) -> list[dict[str, str]]:
     """Medians over ``runs`` turns; microseconds per integration step."""
+    partial, distributed = PartialInformation(ring(5)), FullyDistributed(ring(5), 0.1)
     return [
         *_closed_loop(5, "euler", 20_000, runs, "<= 1.10"),
         *_closed_loop(200, "euler", 1_000, runs, "<= 1.10"),
         *_closed_loop(5, "rk4", 5_000, runs, ""),
+        *_closed_loop(5, "rk4", 5_000, runs, "<= 1.20", partial),
+        *_closed_loop(5, "euler", 20_000, runs, "<= 1.20", partial, "sampled"),
+        *_closed_loop(5, "rk4", 5_000, runs, "<= 1.20", distributed),
+        *_closed_loop(5, "euler", 20_000, runs, "<= 1.20", distributed, "sampled"),
+        *_closed_loop(200, "euler", 200, runs, "", PartialInformation(ring(200)), "sampled"),
+        *_closed_loop(200, "rk4", 200, runs, "", PartialInformation(ring(200))),
     ]
 
 
 def _closed_loop(
-    count: int, integrator: str, steps: int, runs: int, target: str
+    count: int,
+    integrator: str,
+    steps: int,
+    runs: int,
+    target: str,
+    law: Law | None = None,
+    mode: str = "continuous",
 ) -> list[dict[str, str]]:
+    law = law or FullInformation()
     table = np.ones((count, len(flexible_robot.PARAMETERS)))
     agents = Agents(flexible_robot, table, np.full(count, np.inf))
     y = 3.0 - np.linspace(0.0, 2.0, count)
     state = agents.equilibrium(y)
     system = System(
-        "robots", velocity_game(count, 3.0, 3.0), agents, FullInformation(), 0.1, state,
-        engine="mujoco", integrator=integrator,
+        "robots", velocity_game(count, 3.0, 3.0), agents, law, 0.1, state,
+        engine="mujoco", integrator=integrator, mode=mode,
     )  # fmt: skip
     clock = Clock(H * steps, H, H, H * 100)
-    # The same model as in the loop, and one without anything for the eye.
-    same = system.closed_loop(clock).plant.model
+    # The same model as in the loop, but for estimates, and one without anything for the eye.
+    same = compile_model(compose(table), timestep=H, integrator=INTEGRATORS[integrator])
     plain = compile_model(
         compose(table, decorated=False), timestep=H, integrator=INTEGRATORS[integrator]
     )
-    script = _Script(same, y)
     kinds = {
         "ours": lambda: _ours(system, clock, steps),
         "bare": lambda: _bare(same, state, steps),
         "bare, plain model": lambda: _bare(plain, state, steps),
-        "Python loop": lambda: script.run(steps // 20) * 20,
     }
+    if law.information == "full":
+        script = _Script(same, y)
+        kinds["Python loop"] = lambda: script.run(steps // 20) * 20
     times: dict[str, list[float]] = {name: [] for name in kinds}
     for measure in kinds.values():
         measure()  # warm
     for _ in range(runs):
         for name, measure in kinds.items():
             times[name].append(1e6 * measure() / steps)
-    what = f"{count} robots, {integrator}, full information, continuous: us per step"
+    what = f"{count} robots, {integrator}, {law.information} information, {mode}: us per step"
     ours = statistics.median(times["ours"])
     pairs = {
-        "bare": (target, "ours / bare mj_step of the same model"),
+        "bare": (target, "ours / bare mj_step of the same robots"),
         "bare, plain model": ("", "ours / bare mj_step without decoration"),
         "Python loop": (">= 4" if integrator == "euler" else "", "Python loop / ours"),
     }
     result = []
     for name, (goal, meaning) in pairs.items():
+        if name not in times:
+            continue
         other = statistics.median(times[name])
         ratios = [a / b for a, b in zip(times["ours"], times[name], strict=True)]
         ratio = statistics.median(ratios)

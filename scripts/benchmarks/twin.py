@@ -22,6 +22,7 @@ from scipy.integrate import solve_ivp
 
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
+from gne_mj.controllers.propagation import no_propagator
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.rosenbrock import RosenbrockLoop
@@ -49,7 +50,7 @@ class Twin:
         self.channels = Channels(numbers, np.zeros((N, self.states)))
         self.problem = Problem(
             self.game.data, self.graph.data, self.law.settings(RHO), np.full(N, np.inf),
-            np.zeros((0, 0, 0)),
+            np.zeros(N), no_propagator(),
         )  # fmt: skip
         self.memory = self.law.initial_memory(np.full(N, START))
         flat = np.concatenate([self.start.ravel(), self.memory])

@@ -1,0 +1,130 @@
+"""Partial information: costs at estimates, a measured barrier [eq:nonlinearPIFeedback].
+
+tau d/dt **y**^i_-i = -c S_i sum_j (**y**^i - **y**^j) over the neighbours j of agent i, and
+u_i = -dJ_i/dy_i(y_i, **y**^i_-i) - dphi/dy_i(y) - c R_i sum_j (**y**^i - **y**^j).
+The paper has c = tau = 1. The coupling gain c scales the Laplacian in both places. A small tau
+takes away the inertia that estimates add to the agents: each of them acts on agent j as tau more
+mass tied to it. The storage function is that of the agents plus tau/2 times the squared distance
+of all estimates from the equilibrium, and decreases as with tau = 1.
+
+The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`).
+"""
+
+import sys
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.barrier import weighted_gradient
+from gne_mj.controllers.estimates import estimate_rates, own_profile
+from gne_mj.controllers.law import Law, initial_estimates
+from gne_mj.controllers.propagation import propagate_estimates
+from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
+from gne_mj.errors import InvalidInput
+from gne_mj.graph import Graph
+from gne_mj.native import kernel
+
+
+@dataclass(frozen=True, eq=False)
+class PartialInformation(Law):
+    """Gradient play on estimates that consensus spreads, with a measured barrier.
+
+    Args:
+        graph: over which agents communicate.
+        coupling: c, positive.
+        time_constant: tau in s, positive.
+    """
+
+    information: ClassVar[str] = "partial"
+    graph: Graph = field()  # hides the base class's default
+    coupling: float = 1.0
+    time_constant: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key in ("coupling", "time_constant"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value > 0):
+                raise InvalidInput(f"controller.{key}", value, "it must be positive and finite")
+
+    @property
+    def kernels(self) -> ModuleType:
+        """This module."""
+        return sys.modules[__name__]
+
+    @property
+    def estimate_rate(self) -> float:
+        """c / tau."""
+        return self.coupling / self.time_constant
+
+    def settings(self, rho: float) -> NDArray[np.float64]:
+        """See the base class."""
+        numbers = super().settings(rho)
+        numbers[COUPLING], numbers[TIME_CONSTANT] = self.coupling, self.time_constant
+        return numbers
+
+    def initial_memory(
+        self,
+        y: NDArray[np.float64],
+        estimate: ArrayLike | None = None,
+        filtered: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """See the base class."""
+        super().initial_memory(y, filtered=filtered)
+        return initial_estimates(self.graph.agents, y, estimate)
+
+
+@kernel
+def action(game, problem, y, weights, memory, work, u):
+    """Fill u (m,) from the true barrier's weights (p,) and each agent's own profile."""
+    data = problem.data
+    at = data.offsets
+    agents = len(at) - 1
+    m = at[agents]
+    coupling = problem.settings[COUPLING]
+    for i in range(agents):
+        first, last = at[i], at[i + 1]
+        own_profile(data, i, y[first:last], memory[i * m : (i + 1) * m], work.profile)
+        for a in range(first, last):
+            u[a] = -game.cost_gradient(data.parameters, i, a, work.profile)
+            u[a] -= weighted_gradient(game, data, i, a, y, weights)
+            u[a] -= coupling * heard(problem.graph, m, y, memory, i, a)
+    return -1
+
+
+@kernel
+def heard(graph, m, y, memory, i, a):
+    """R_i sum_j (**y**^i - **y**^j): an own action less what the neighbours take it to be."""
+    total = 0.0
+    for entry in range(graph.pointer[i], graph.pointer[i + 1]):
+        total += y[a] - memory[graph.neighbour[entry] * m + a]
+    return total
+
+
+@kernel
+def rate(problem, y, memory, out):
+    """Fill out with the estimates' rates."""
+    estimate_rates(problem, y, memory, out)
+
+
+@kernel
+def propagate(problem, y, memory, scratch):
+    """Move the estimates over one control period with the outputs held at y."""
+    propagate_estimates(problem.data, problem.graph, problem.propagator, y, memory, scratch)
+
+
+@kernel
+def storage(problem, memory):
+    """tau / 2 times the squared distance of all estimates from the equilibrium."""
+    at, y = problem.data.offsets, problem.equilibrium
+    agents = len(at) - 1
+    m = at[agents]
+    total = 0.0
+    for i in range(agents):
+        for r in range(at[i]):
+            total += (memory[i * m + r] - y[r]) ** 2
+        for r in range(at[i + 1], m):
+            total += (memory[i * m + r] - y[r]) ** 2
+    return 0.5 * problem.settings[TIME_CONSTANT] * total

@@ -1,0 +1,114 @@
+"""A law of plain Python functions: slow, and all that a first try needs.
+
+The functions get NumPy arrays and the game as a Python object, and run in every loop and engine
+(see :mod:`gne_mj.plain` for how).
+"""
+
+import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.controllers.law import Law
+from gne_mj.controllers.settings import COUNT
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.native import kernel
+from gne_mj.plain import call_out, callable_address
+
+Array = NDArray[np.float64]
+
+# Entries of the settings behind the laws' numbers: addresses of the two functions
+_ACTION, _RATE = COUNT, COUNT + 1
+
+
+class PlainLaw(Law):
+    """A law given by plain functions.
+
+    Args:
+        game: what is played.
+        action: ``action(game, rho, y, memory)`` returns u, shape (m,).
+        rate: ``rate(game, rho, y, memory)`` returns the memory's rate; needed with a memory only.
+        memory: the memory at the start, as a function of y(0), or None for a static law.
+    """
+
+    information: ClassVar[str] = "custom"
+
+    def __init__(
+        self,
+        game: Game,
+        action: Callable[[Game, float, Array, Array], ArrayLike],
+        rate: Callable[[Game, float, Array, Array], ArrayLike] | None = None,
+        memory: Callable[[Array], ArrayLike] | None = None,
+    ) -> None:
+        if (rate is None) != (memory is None):
+            raise InvalidInput(
+                "controller.file",
+                "rate and initial_memory",
+                "a law with a memory has both of these functions, a static law none",
+            )
+        self._game, self._action, self._rate, self._memory = game, action, rate, memory
+        self.propagates = memory is None
+        self._kept: list[Any] = []
+
+    @property
+    def kernels(self) -> ModuleType:
+        """This module."""
+        return sys.modules[__name__]
+
+    def settings(self, rho: float) -> Array:
+        """See the base class; behind the numbers stand the functions' addresses."""
+
+        def fill(function: Callable[..., ArrayLike]) -> Callable[..., float]:
+            def filled(
+                a: int, b: int, c: int, scale: float, y: Array, memory: Array, out: Array
+            ) -> float:
+                out[:] = function(self._game, rho, y, memory)
+                return 0.0
+
+            return filled
+
+        functions = [fill(self._action), fill(self._rate or (lambda *_: 0.0))]
+        addresses, kept = zip(*(callable_address(function) for function in functions), strict=True)
+        self._kept.extend(kept)
+        return np.concatenate([super().settings(rho), addresses])
+
+    def initial_memory(
+        self, y: Array, estimate: ArrayLike | None = None, filtered: ArrayLike | None = None
+    ) -> Array:
+        """See the base class."""
+        super().initial_memory(y, estimate, filtered)
+        if self._memory is None:
+            return np.zeros(0)
+        return np.array(self._memory(y), dtype=np.float64).ravel()
+
+
+@kernel
+def action(game, problem, y, weights, memory, work, u):
+    """Fill u (m,) by the law's own function; not a number if that raised."""
+    address = np.int64(problem.settings[_ACTION])
+    failed = call_out(address, 0, 0, 0, 0.0, y, memory, u)
+    u[0] += failed  # zero, or not a number
+    return -1
+
+
+@kernel
+def rate(problem, y, memory, out):
+    """Fill out by the law's own function."""
+    if len(memory) > 0:
+        failed = call_out(np.int64(problem.settings[_RATE]), 0, 0, 0, 0.0, y, memory, out)
+        out[0] += failed
+
+
+@kernel
+def propagate(problem, y, memory, scratch):
+    """No exact propagation of an unknown memory: such laws run in mode continuous."""
+
+
+@kernel
+def storage(problem, memory):
+    """Nothing is claimed."""
+    return 0.0

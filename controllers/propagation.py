@@ -1,0 +1,170 @@
+"""Exact motion of the estimates over a control period in which all outputs are held.
+
+All agents' estimates of one entry of agent j's action differ from it by errors e (N,), e_j = 0,
+that obey d/dt e = -rate L_j e, with L_j the Laplacian without row and column j. So over a period
+e becomes exp(-L_j s) e with s = rate * period. For few agents these matrices are formed; for many
+the exponential acts through its Chebyshev series, which only needs products with the sparse
+Laplacian: work and memory grow with edges times agents.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ive
+
+from gne_mj.graph import Graph
+from gne_mj.native import kernel
+
+# Columns of estimates that move together, for vector instructions.
+BLOCK = 8
+# The series ends where what is left out is below this, relative to the error's size.
+_LEFT_OUT = 1e-17
+
+
+class Propagator(NamedTuple):
+    """exp(-L_j s) for all agents j, read-only: dense maps or a series, the other one empty."""
+
+    maps: np.ndarray  # (N, N, N), row and column j of the j-th are zero
+    coefficients: np.ndarray  # of the Chebyshev polynomials in 2 L_j / bound - 1
+    numbers: np.ndarray  # [bound on the spectrum of L_j, s]
+
+
+@kernel
+def scratch_length(agents):
+    """Entries that :func:`propagate_estimates` needs."""
+    return 4 * agents * BLOCK
+
+
+def no_propagator() -> Propagator:
+    """Of a law without estimates."""
+    return Propagator(np.zeros((0, 0, 0)), np.zeros(0), np.zeros(2))
+
+
+def propagator(graph: Graph, duration: float) -> Propagator:
+    """The exact maps over s = ``duration`` (rate times period), in the cheaper form."""
+    agents = graph.agents
+    degrees = np.diff(graph.data.pointer)
+    pairs = np.array(graph.edges, dtype=np.int64).reshape(-1, 2)
+    # Anderson and Morley's bound; L_j is a principal submatrix, so it holds for all j.
+    bound = float(np.max(degrees[pairs].sum(axis=1), initial=1))
+    coefficients = _series(0.5 * bound * duration)
+    numbers = np.array([bound, duration])
+    work = len(coefficients) * (agents + 2 * len(pairs))
+    if agents * agents <= work and agents <= 64:
+        return Propagator(_dense(graph, duration), np.zeros(0), numbers)
+    return Propagator(np.zeros((0, 0, 0)), coefficients, numbers)
+
+
+def _series(half: float) -> np.ndarray:
+    """Coefficients of exp(-half (1 + x)) in T_0(x), T_1(x), ... on [-1, 1]."""
+    terms = np.arange(30 + int(12 * half**0.5))  # they fall like exp(-k^2 / (2 half))
+    size = 2.0 * ive(terms, half)
+    size[0] *= 0.5
+    left_out = np.cumsum(size[::-1])[::-1]
+    keep = max(1, int(np.count_nonzero(left_out > _LEFT_OUT)))
+    return (size * (-1.0) ** terms)[:keep]
+
+
+def _dense(graph: Graph, duration: float) -> np.ndarray:
+    agents = graph.agents
+    maps = np.zeros((agents, agents, agents))
+    laplacian = graph.laplacian
+    for j in range(agents):
+        others = np.delete(np.arange(agents), j)
+        values, vectors = np.linalg.eigh(laplacian[np.ix_(others, others)])
+        decay = (vectors * np.exp(-values * duration)) @ vectors.T
+        maps[j][np.ix_(others, others)] = decay
+    return maps
+
+
+@kernel
+def propagate_estimates(data, graph, propagator, y, memory, scratch):
+    """Replace the estimates by their exact solution over the period, the outputs held at y.
+
+    scratch has :func:`scratch_length` entries.
+    """
+    if len(propagator.coefficients) == 0:
+        _apply_maps(data, propagator.maps, y, memory, scratch)
+    else:
+        _apply_series(data, graph, propagator, y, memory, scratch)
+
+
+@kernel
+def _apply_maps(data, maps, y, memory, scratch):
+    at = data.offsets
+    agents = len(at) - 1
+    m = at[agents]
+    for j in range(agents):
+        for r in range(at[j], at[j + 1]):
+            for i in range(agents):
+                total = 0.0
+                for other in range(agents):
+                    if other != j:
+                        total += maps[j, i, other] * (memory[other * m + r] - y[r])
+                scratch[i] = total
+            for i in range(agents):
+                if i != j:
+                    memory[i * m + r] = y[r] + scratch[i]
+
+
+@kernel
+def _apply_series(data, graph, propagator, y, memory, scratch):
+    """The series, summed by the polynomials' recurrence, a block of columns at a time."""
+    at = data.offsets
+    agents = len(at) - 1
+    m = at[agents]
+    coefficients, bound = propagator.coefficients, propagator.numbers[0]
+    size = agents * BLOCK
+    before = scratch[:size].reshape((agents, BLOCK))
+    now = scratch[size : 2 * size].reshape((agents, BLOCK))
+    after = scratch[2 * size : 3 * size].reshape((agents, BLOCK))
+    total = scratch[3 * size : 4 * size].reshape((agents, BLOCK))
+    owner = 0
+    for start in range(0, m, BLOCK):
+        count = min(BLOCK, m - start)
+        while at[owner + 1] <= start:
+            owner += 1
+        for i in range(agents):
+            for c in range(BLOCK):
+                now[i, c] = memory[i * m + start + c] - y[start + c] if c < count else 0.0
+        _clear_owners(at, owner, start, count, now)
+        for i in range(agents):
+            for c in range(BLOCK):
+                total[i, c] = coefficients[0] * now[i, c]
+        for term in range(1, len(coefficients)):
+            # T_1 = x T_0, and T_k+1 = 2 x T_k - T_k-1, with x = 2 L_j / bound - 1
+            scale = 1.0 if term == 1 else 2.0
+            coefficient = coefficients[term]
+            for i in range(agents):
+                first, last = graph.pointer[i], graph.pointer[i + 1]
+                diagonal = scale * (2.0 * (last - first) / bound - 1.0)
+                for c in range(BLOCK):
+                    after[i, c] = diagonal * now[i, c]
+                for entry in range(first, last):
+                    other = graph.neighbour[entry]
+                    for c in range(BLOCK):
+                        after[i, c] -= scale * 2.0 / bound * now[other, c]
+                if term > 1:
+                    for c in range(BLOCK):
+                        after[i, c] -= before[i, c]
+            _clear_owners(at, owner, start, count, after)
+            for i in range(agents):
+                for c in range(BLOCK):
+                    total[i, c] += coefficient * after[i, c]
+            spare = before
+            before, now, after = now, after, spare
+        for i in range(agents):
+            for c in range(count):
+                r = start + c
+                if not at[i] <= r < at[i + 1]:
+                    memory[i * m + r] = y[r] + total[i, c]
+
+
+@kernel
+def _clear_owners(at, owner, start, count, block):
+    """Zero the entries that are no estimates: an agent's of its own action."""
+    j = owner
+    for c in range(count):
+        while at[j + 1] <= start + c:
+            j += 1
+        block[j, c] = 0.0

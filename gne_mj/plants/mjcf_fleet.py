@@ -1,0 +1,232 @@
+"""Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
+
+import sys
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.errors import InvalidInput, nearest
+from gne_mj.native import kernel
+from gne_mj.plants import mjcf_robot
+from gne_mj.plants.base import Plant
+from gne_mj.plants.fleet import read_model
+from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
+from gne_mj.plants.mujoco import INTEGRATORS, NQ, NV, PLACES, SIZES, run_steps
+from gne_mj.plants.native_mujoco import (
+    PLANT_MARK,
+    USERDATA_HEADER,
+    Table,
+    callbacks,
+    field,
+    integers,
+    step_address,
+)
+
+# A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
+# one, the joint's entry of qpos or -1, the actuator's of ctrl
+OUTPUT_AT, POSITION_AT, ACTUATOR, PLACES_COUNT = range(4)
+SENSORDATA = 7  # one more entry of SIZES
+SPACING = 2.0  # m between robots, so that they do not touch
+
+AGENT = mjcf_robot
+
+
+@kernel
+def gather(at, data, table, state):
+    """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
+    sizes = integers(table, SIZES)
+    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
+    sensordata = field(data, at.sensordata, sizes[SENSORDATA])
+    places = integers(table, PLACES)
+    for r in range(len(places) // PLACES_COUNT):
+        source = places[r * PLACES_COUNT + OUTPUT_AT]
+        position = places[r * PLACES_COUNT + POSITION_AT]
+        state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
+        state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
+
+
+@kernel
+def actuator_of(table, r):
+    """Which entry of ctrl is the input of channel r."""
+    return integers(table, PLACES)[r * PLACES_COUNT + ACTUATOR]
+
+
+@kernel
+def stored(channels, state, userdata):
+    """Not known."""
+    return 0.0
+
+
+class MjcfPlant(Plant):
+    """A fleet of the user's own robots in MuJoCo.
+
+    Each file's bodies are attached to one world, side by side, with the first file's gravity and
+    flags; contacts are between a robot's own geoms and whatever its file brings along. A fleet
+    starts from the models' reference pose at the given outputs.
+
+    Args:
+        agents: which robots.
+        timestep: in s.
+        integrator: "rk4" or "euler".
+        userdata: room to leave in ``userdata`` behind what this plant needs itself.
+        memory: room for a law's memory in ``act``, behind what the robots have there.
+
+    Attributes:
+        kernels: the module that says how a loop reads and drives the fleet.
+        model, data: MuJoCo's own.
+
+    Raises:
+        InvalidInput: a file that MuJoCo cannot read, or a name that it does not have.
+    """
+
+    passive = None
+
+    def __init__(
+        self,
+        agents: MjcfRobots,
+        timestep: float,
+        integrator: str = "rk4",
+        *,
+        userdata: int = 0,
+        memory: int = 0,
+    ) -> None:
+        self.agents, self.timestep, self.integrator = agents, timestep, integrator
+        self.kernels = sys.modules[__name__]
+        world = _world(agents.robots)
+        world.option.timestep = timestep
+        world.option.integrator = getattr(
+            mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS[integrator].upper()}"
+        )
+        world.nuserdata = USERDATA_HEADER + userdata
+        if memory:
+            _add_memory(world, memory)
+        try:
+            self.model = world.compile()
+        except ValueError as error:
+            raise InvalidInput("agents.file", "...", f"MuJoCo must compile it: {error}") from None
+        self.data = mujoco.MjData(self.model)
+        self.places = np.array(
+            [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
+        )
+        model = self.model
+        sizes = (
+            model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
+            model.na - memory, model.nsensordata,
+        )  # fmt: skip
+        self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
+        self._table = Table(self.table_arrays)
+
+    @property
+    def measures_every_stage(self) -> bool:
+        """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
+        return bool(np.all(self.places[:, OUTPUT_AT] >= 0))
+
+    def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
+        model, prefix = self.model, f"robot_{i + 1}/"
+        joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + robot.output)
+        sensor = _named(model, mujoco.mjtObj.mjOBJ_SENSOR, prefix + robot.output)
+        actuator = _named(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input)
+        if actuator < 0:
+            names = _names(model, "actuator", prefix)
+            raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
+        if sensor >= 0:
+            kind = mujoco.mjtSensor(model.sensor_type[sensor])
+            if kind == mujoco.mjtSensor.mjSENS_JOINTVEL:
+                joint = int(model.sensor_objid[sensor])
+            elif kind in (
+                mujoco.mjtSensor.mjSENS_TENDONVEL,
+                mujoco.mjtSensor.mjSENS_ACTUATORVEL,
+            ):
+                return -1 - int(model.sensor_adr[sensor]), -1, actuator
+            else:
+                raise InvalidInput(
+                    "agents.output", robot.output, "a sensor must be jointvel, tendonvel or"
+                    " actuatorvel",
+                )  # fmt: skip
+        if joint < 0:
+            names = [*_names(model, "joint", prefix), *_names(model, "sensor", prefix)]
+            raise InvalidInput("agents.output", robot.output, nearest(robot.output, names))
+        if mujoco.mjtJoint(model.jnt_type[joint]) not in (
+            mujoco.mjtJoint.mjJNT_SLIDE,
+            mujoco.mjtJoint.mjJNT_HINGE,
+        ):
+            raise InvalidInput("agents.output", robot.output, "it must be a slide or a hinge joint")
+        return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint]), actuator
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """(m, 2), a copy: outputs and positions."""
+        if not self.measures_every_stage:
+            mujoco.mj_forward(self.model, self.data)  # sensors are of the last step's start
+        at, sensor = self.places[:, OUTPUT_AT], self.data.sensordata
+        output = [self.data.qvel[a] if a >= 0 else sensor[-1 - a] for a in at]
+        position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places[:, POSITION_AT]]
+        return np.column_stack([output, position])
+
+    def reset(self, state: ArrayLike) -> None:
+        """See the base class; of all joint velocities with these outputs the smallest are taken."""
+        state = np.asarray(state, dtype=np.float64)
+        mujoco.mj_resetData(self.model, self.data)
+        for at, position in zip(self.places[:, POSITION_AT], state[:, 1], strict=True):
+            if at >= 0:
+                self.data.qpos[at] = position
+        slopes = np.empty((len(state), self.model.nv))
+        for column in range(self.model.nv):
+            self.data.qvel[:] = 0.0
+            self.data.qvel[column] = 1.0
+            slopes[:, column] = self.state[:, 0]
+        self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, u: ArrayLike, steps: int = 1) -> None:
+        """See the base class."""
+        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
+        self.data.ctrl[self.places[:, ACTUATOR]] = u
+        with callbacks():
+            run_steps()(step_address(), self.model._address, self.data._address, steps)
+
+
+def _world(robots: tuple[RobotFile, ...]) -> Any:
+    world = mujoco.MjSpec.from_string(read_model("lane.xml"))
+    files: dict[Any, Any] = {}
+    for i, robot in enumerate(robots):
+        try:
+            files[robot.path] = spec = mujoco.MjSpec.from_file(str(robot.path))
+        except (ValueError, OSError) as error:
+            raise InvalidInput(
+                "agents.file", str(robot.path), f"MuJoCo must read it: {error}"
+            ) from None
+        if i == 0:
+            world.option.gravity = spec.option.gravity
+            world.option.disableflags = spec.option.disableflags
+            world.option.enableflags = spec.option.enableflags
+        for key in list(spec.keys):
+            spec.delete(key)
+        frame = world.worldbody.add_frame(pos=[0.0, SPACING * i, 0.0])
+        world.attach(spec, prefix=f"robot_{i + 1}/", frame=frame)
+    # a state that is not a number must be seen, not be reset
+    world.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    return world
+
+
+def _add_memory(world: Any, memory: int) -> None:
+    """An actuator without any force that holds a law's memory, last in ``act``."""
+    holder = world.add_actuator(name="memory")
+    holder.trntype = mujoco.mjtTrn.mjTRN_JOINT
+    holder.target = world.joints[0].name
+    holder.dyntype = mujoco.mjtDyn.mjDYN_USER
+    holder.actdim = memory
+    holder.gear = np.zeros(6)
+    holder.gainprm = np.zeros(10)
+
+
+def _named(model: mujoco.MjModel, kind: Any, name: str) -> int:
+    return int(mujoco.mj_name2id(model, kind, name))
+
+
+def _names(model: mujoco.MjModel, kind: str, prefix: str) -> list[str]:
+    count = {"joint": model.njnt, "sensor": model.nsensor, "actuator": model.nu}[kind]
+    names = [getattr(model, kind)(index).name for index in range(count)]
+    return [name.removeprefix(prefix) for name in names if name.startswith(prefix)]
