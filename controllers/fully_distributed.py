@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.barrier import own_weights, weighted_gradient
-from gne_mj.controllers.estimates import estimate_rates, own_profile
+from gne_mj.controllers.estimates import barrier_profile, estimate_rates, write_own_actions
 from gne_mj.controllers.law import Law, initial_estimates
 from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
-from gne_mj.native import copy, kernel
+from gne_mj.native import kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,36 +100,34 @@ def action(game, problem, y, weights, memory, work, u):
     agents = len(at) - 1
     m = at[agents]
     z = memory[agents * m :]
+    write_own_actions(data, y, memory)
     for i in range(agents):
         first, last = at[i], at[i + 1]
         outside = agent_action(
-            game, data, settings, i, y[first:last], z[first:last], memory[i * m : (i + 1) * m],
-            work, u[first:last],
-        )  # fmt: skip
+            game, data, settings, i, z[first:last], memory[i * m : (i + 1) * m], work, u[first:last]
+        )
         if outside >= 0:
             return i * len(weights) + outside
     return -1
 
 
 @kernel
-def agent_action(game, data, settings, i, own_action, own_filter, estimates, work, u):
-    """Action of agent i from what it has: y_i, z_i (m_i,) and its estimates (m,).
+def agent_action(game, data, settings, i, own_filter, own_row, work, u):
+    """Action of agent i from what it has: z_i (m_i,) and its row (m,), its own action in place.
 
     work.profile and work.own_weights are overwritten. Returns -1, or the constraint on or outside
     whose boundary the agent's filtered profile (z_i, **y**^i_-i) lies.
     """
     first = data.offsets[i]
     profile, weights = work.profile, work.own_weights
-    own_profile(data, i, own_action, estimates, profile)
-    for r in range(len(u)):
-        u[r] = game.cost_gradient(data.parameters, i, first + r, profile)
-    copy(own_filter, profile[first : first + len(u)])
+    barrier_profile(data, i, own_filter, own_row, profile)
     outside = own_weights(game, data, settings[RHO], i, profile, weights)
     if outside >= 0:
         return outside
     for r in range(len(u)):
+        cost = game.cost_gradient(data.parameters, i, first + r, own_row)
         barrier = weighted_gradient(game, data, i, first + r, profile, weights)
-        u[r] = -settings[GAIN] * (u[r] + barrier)
+        u[r] = -settings[GAIN] * (cost + barrier)
     return -1
 
 

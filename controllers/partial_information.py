@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.barrier import weighted_gradient
-from gne_mj.controllers.estimates import estimate_rates, own_profile
+from gne_mj.controllers.estimates import estimate_rates, write_own_actions
 from gne_mj.controllers.law import Law, initial_estimates
 from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
@@ -81,16 +81,15 @@ def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) from the true barrier's weights (p,) and each agent's own profile."""
     data = problem.data
     at = data.offsets
-    agents = len(at) - 1
-    m = at[agents]
+    agents, m = len(at) - 1, len(y)
     coupling = problem.settings[COUPLING]
+    write_own_actions(data, y, memory)
     for i in range(agents):
-        first, last = at[i], at[i + 1]
-        own_profile(data, i, y[first:last], memory[i * m : (i + 1) * m], work.profile)
-        for a in range(first, last):
-            u[a] = -game.cost_gradient(data.parameters, i, a, work.profile)
-            u[a] -= weighted_gradient(game, data, i, a, y, weights)
-            u[a] -= coupling * heard(problem.graph, m, y, memory, i, a)
+        profile = memory[i * m : (i + 1) * m]
+        for a in range(at[i], at[i + 1]):
+            cost = game.cost_gradient(data.parameters, i, a, profile)
+            barrier = weighted_gradient(game, data, i, a, y, weights)
+            u[a] = -cost - barrier - coupling * heard(problem.graph, m, y, memory, i, a)
     return -1
 
 

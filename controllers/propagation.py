@@ -15,16 +15,17 @@ from scipy.special import ive
 from gne_mj.graph import Graph
 from gne_mj.native import kernel
 
-# Columns of estimates that move together, for vector instructions.
-BLOCK = 8
-# The series ends where what is left out is below this, relative to the error's size.
-_LEFT_OUT = 1e-17
+# Columns of estimates that move together: rows long enough for vector instructions, and blocks
+# small enough for the cache.
+BLOCK = 64
+# The series ends where what is left out is below this, relative to the errors' size.
+_LEFT_OUT = 1e-15
 
 
 class Propagator(NamedTuple):
     """exp(-L_j s) for all agents j, read-only: dense maps or a series, the other one empty."""
 
-    maps: np.ndarray  # (N, N, N), row and column j of the j-th are zero
+    maps: np.ndarray  # (N, N, N), symmetric, row and column j of the j-th are zero
     coefficients: np.ndarray  # of the Chebyshev polynomials in 2 L_j / bound - 1
     numbers: np.ndarray  # [bound on the spectrum of L_j, s]
 
@@ -94,17 +95,19 @@ def _apply_maps(data, maps, y, memory, scratch):
     at = data.offsets
     agents = len(at) - 1
     m = at[agents]
+    result = scratch[:agents]
     for j in range(agents):
         for r in range(at[j], at[j + 1]):
             for i in range(agents):
-                total = 0.0
-                for other in range(agents):
-                    if other != j:
-                        total += maps[j, i, other] * (memory[other * m + r] - y[r])
-                scratch[i] = total
+                result[i] = y[r]
+            for other in range(agents):
+                if other != j:
+                    error = memory[other * m + r] - y[r]
+                    column = maps[j, other]  # the maps are symmetric
+                    for i in range(agents):
+                        result[i] += column[i] * error
             for i in range(agents):
-                if i != j:
-                    memory[i * m + r] = y[r] + scratch[i]
+                memory[i * m + r] = result[i]
 
 
 @kernel
@@ -114,57 +117,53 @@ def _apply_series(data, graph, propagator, y, memory, scratch):
     agents = len(at) - 1
     m = at[agents]
     coefficients, bound = propagator.coefficients, propagator.numbers[0]
-    size = agents * BLOCK
-    before = scratch[:size].reshape((agents, BLOCK))
-    now = scratch[size : 2 * size].reshape((agents, BLOCK))
-    after = scratch[2 * size : 3 * size].reshape((agents, BLOCK))
-    total = scratch[3 * size : 4 * size].reshape((agents, BLOCK))
-    owner = 0
     for start in range(0, m, BLOCK):
-        count = min(BLOCK, m - start)
-        while at[owner + 1] <= start:
-            owner += 1
+        w = min(BLOCK, m - start)
+        size = agents * w
+        before, now = scratch[:size], scratch[size : 2 * size]
+        after, total = scratch[2 * size : 3 * size], scratch[3 * size : 4 * size]
+        held = y[start : start + w]
         for i in range(agents):
-            for c in range(BLOCK):
-                now[i, c] = memory[i * m + start + c] - y[start + c] if c < count else 0.0
-        _clear_owners(at, owner, start, count, now)
-        for i in range(agents):
-            for c in range(BLOCK):
-                total[i, c] = coefficients[0] * now[i, c]
+            row, error = memory[i * m + start : i * m + start + w], now[i * w : (i + 1) * w]
+            for c in range(w):
+                error[c] = row[c] - held[c]
+        _clear_own(data, start, w, now)
+        for r in range(size):
+            total[r] = coefficients[0] * now[r]
         for term in range(1, len(coefficients)):
             # T_1 = x T_0, and T_k+1 = 2 x T_k - T_k-1, with x = 2 L_j / bound - 1
-            scale = 1.0 if term == 1 else 2.0
-            coefficient = coefficients[term]
+            scale = (2.0 if term == 1 else 4.0) / bound
             for i in range(agents):
                 first, last = graph.pointer[i], graph.pointer[i + 1]
-                diagonal = scale * (2.0 * (last - first) / bound - 1.0)
-                for c in range(BLOCK):
-                    after[i, c] = diagonal * now[i, c]
+                diagonal = scale * (last - first) - 0.5 * scale * bound
+                new, old = after[i * w : (i + 1) * w], before[i * w : (i + 1) * w]
+                own = now[i * w : (i + 1) * w]
+                if term == 1:
+                    for c in range(w):
+                        new[c] = diagonal * own[c]
+                else:
+                    for c in range(w):
+                        new[c] = diagonal * own[c] - old[c]
                 for entry in range(first, last):
-                    other = graph.neighbour[entry]
-                    for c in range(BLOCK):
-                        after[i, c] -= scale * 2.0 / bound * now[other, c]
-                if term > 1:
-                    for c in range(BLOCK):
-                        after[i, c] -= before[i, c]
-            _clear_owners(at, owner, start, count, after)
-            for i in range(agents):
-                for c in range(BLOCK):
-                    total[i, c] += coefficient * after[i, c]
+                    j = graph.neighbour[entry]
+                    other = now[j * w : (j + 1) * w]
+                    for c in range(w):
+                        new[c] -= scale * other[c]
+            _clear_own(data, start, w, after)
+            for r in range(size):
+                total[r] += coefficients[term] * after[r]
             spare = before
-            before, now, after = now, after, spare
+            before = now
+            now = after
+            after = spare
         for i in range(agents):
-            for c in range(count):
-                r = start + c
-                if not at[i] <= r < at[i + 1]:
-                    memory[i * m + r] = y[r] + total[i, c]
+            row, error = memory[i * m + start : i * m + start + w], total[i * w : (i + 1) * w]
+            for c in range(w):
+                row[c] = held[c] + error[c]
 
 
 @kernel
-def _clear_owners(at, owner, start, count, block):
+def _clear_own(data, start, w, block):
     """Zero the entries that are no estimates: an agent's of its own action."""
-    j = owner
-    for c in range(count):
-        while at[j + 1] <= start + c:
-            j += 1
-        block[j, c] = 0.0
+    for c in range(w):
+        block[data.owner[start + c] * w + c] = 0.0

@@ -101,6 +101,49 @@ def plot(
 
 
 @app.command()
+def passivity(
+    scenario: _SCENARIO,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="This one; all if left out.")
+    ] = None,
+    set_: _SET = None,
+    trials: Annotated[int, typer.Option("--trials", help="Trials for each agent.")] = 24,
+    seed: Annotated[int, typer.Option("--seed", help="Of the random inputs and states.")] = 0,
+    as_json: _JSON = False,
+) -> None:
+    """Look for violations of equilibrium-independent passivity in the plants of a scenario.
+
+    Trials last as long as the scenario, and use its step and half of it; input limits and the law
+    do not matter here. That no violation is found is no proof.
+    """
+    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.passivity import examine, plants_of
+    from gne_mj.scenario import load_scenario
+
+    loaded = load_scenario(scenario, _settings(set_))
+    if system is not None and system not in loaded.systems:
+        raise InvalidInput("--system", system, nearest(system, loaded.systems))
+    reports = {}
+    for name in loaded.systems if system is None else (system,):
+        with _preparing(as_json):
+            built = loaded.systems[name].build(name, loaded.simulation.integrator)
+            reports[name] = examine(
+                plants_of(built.agents, built.engine, built.integrator),
+                loaded.simulation.timestep,
+                duration=loaded.simulation.duration,
+                trials=trials,
+                seed=seed,
+                outputs=built.game.box or (-1.0, 1.0),
+                owners=built.game.agent_of_action,
+            )
+        if not as_json:
+            print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
+
+
+@app.command()
 def scenarios(
     name: Annotated[
         str | None, typer.Argument(help="Print this scenario's file, to start one of your own.")
@@ -173,18 +216,11 @@ def _simulate(
     replace: bool = False,
     figures: tuple[str, ...] = (),
 ) -> "Trajectory":
-    from gne_mj.errors import InvalidInput
-    from gne_mj.scenario import load_scenario, parse_value
+    from gne_mj.scenario import load_scenario
     from gne_mj.simulation import interruption
 
-    settings: dict[str, Any] = {}
-    for change in changes or []:
-        key, equals, value = change.partition("=")
-        if not (key and equals):
-            raise InvalidInput("--set", change, "it must read KEY=VALUE")
-        settings[key.strip()] = parse_value(value.strip())
     with _preparing(quiet):
-        simulation = load_scenario(scenario, settings).simulation_object()
+        simulation = load_scenario(scenario, _settings(changes)).simulation_object()
     # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
     with (
         interruption(),
@@ -201,6 +237,20 @@ def _simulate(
 
                 plots.save(trajectory, folder, figures)
     return trajectory
+
+
+def _settings(changes: list[str] | None) -> dict[str, Any]:
+    """What --set asks for: dotted keys to values."""
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import parse_value
+
+    settings: dict[str, Any] = {}
+    for change in changes or []:
+        key, equals, value = change.partition("=")
+        if not (key and equals):
+            raise InvalidInput("--set", change, "it must read KEY=VALUE")
+        settings[key.strip()] = parse_value(value.strip())
+    return settings
 
 
 @contextmanager

@@ -43,6 +43,7 @@ class GameData(NamedTuple):
 
     parameters: np.ndarray  # q, the game's own numbers
     offsets: np.ndarray  # (N + 1,) where each agent's action starts in a profile
+    owner: np.ndarray  # (m,) the agent that each entry of a profile belongs to
     cost_pointer: np.ndarray  # agent i -> the agents that appear in J_i (i itself first)
     cost_index: np.ndarray
     member_pointer: np.ndarray  # constraint l -> the agents that appear in g_l
@@ -131,6 +132,7 @@ class Game:
         arrays = (
             np.array(self.parameters, dtype=np.float64),
             np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64),
+            self.agent_of_action.astype(np.int64),
             *_compress(ordered),
             *_compress(self.in_constraint),
             *_compress(own),

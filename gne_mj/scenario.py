@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from gne_mj.errors import InvalidInput, nearest
-from gne_mj.scenario_tables import Scenario, SystemTable
+from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
 
 __all__ = ["Scenario", "load_scenario", "parse_value", "run", "shipped"]
@@ -131,11 +131,7 @@ def _first(error: ValidationError) -> InvalidInput:
         # of "one number, a list of them or a list of lists" the user meant what goes deepest
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
         detail = max(same[1:], key=lambda d: len(d["loc"]))
-    tags = {
-        "velocity-synchronization", "velocity-consensus", "osnr", "flexible-robot",
-        "planar-flexible-robot", "integrator", "pi-cascade", "mixed", "mjcf-robot", "full",
-        "partial", "distributed", "custom", "float", "list", "literal",
-    }  # fmt: skip
+    tags = union_tags() | {"float", "list", "literal"}
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})

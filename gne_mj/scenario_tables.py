@@ -7,7 +7,7 @@ object they describe.
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,13 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
-from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
+from gne_mj.games import (
+    cournot_game,
+    osnr_game,
+    ten_channels,
+    velocity_consensus_game,
+    velocity_game,
+)
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
@@ -156,6 +162,25 @@ class OsnrGame(_Table):
         """80% of the power limit, shared equally."""
         limit = self.total_power_limit or ten_channels()["total_power_limit"]
         return np.full(count, 0.8 * limit / count)
+
+
+class CournotGame(_Table):
+    """Firms of one product; what is left out has the published numbers for ``count`` firms."""
+
+    type: Literal["cournot"]
+    unit_cost: list[float] | None = Field(None, description="c_i; N (1 + (i - 1) / 2)")
+    demand_intercept: float | None = Field(None, description="D, price of an empty market; 60 N")
+    lower_bound: PerAgent = Field(7.0, description="least quantity of each firm")
+    upper_bound: PerAgent = Field(100.0, description="greatest quantity of each firm")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        return cournot_game(count, **self.model_dump(exclude={"type"}))
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """Every firm half way between its bounds."""
+        middle = 0.5 * (np.asarray(self.lower_bound) + np.asarray(self.upper_bound))
+        return np.broadcast_to(middle, (count,)).copy()
 
 
 class CustomGame(_Table):
@@ -434,7 +459,8 @@ class SystemTable(_Table):
     """One game with its agents."""
 
     game: Annotated[
-        VelocityGame | VelocityConsensusGame | OsnrGame | CustomGame, Field(discriminator="type")
+        VelocityGame | VelocityConsensusGame | OsnrGame | CournotGame | CustomGame,
+        Field(discriminator="type"),
     ]
     agents: Annotated[
         RobotAgents
@@ -612,3 +638,16 @@ def _per_agent(
     if positive and np.any(values <= 0):
         raise InvalidInput(key, given, "it must be positive")
     return np.broadcast_to(values, (count,)).copy()
+
+
+def union_tags() -> set[str]:
+    """What may stand in the keys that choose among tables, such as "osnr" in ``game.type``."""
+    tags: set[str] = set()
+    waiting: list[type[_Table]] = [_Table]
+    while waiting:
+        table = waiting.pop()
+        waiting.extend(table.__subclasses__())
+        for key in ("type", "information"):
+            if key in table.model_fields:
+                tags.update(get_args(table.model_fields[key].annotation))
+    return tags

@@ -248,7 +248,9 @@ class System:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
 
-            plant = self._mujoco_plant(clock.timestep, room(self.game, self.agents))
+            plant = self._mujoco_plant(
+                clock.timestep, *room(self.game, self.agents, len(self.memory), mode)
+            )
             plant.reset(self.state)
             return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
@@ -263,11 +265,12 @@ class System:
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
         return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
 
-    def _mujoco_plant(self, timestep: float, userdata: int) -> "MujocoPlant | MjcfPlant":
+    def _mujoco_plant(
+        self, timestep: float, userdata: int, memory: int
+    ) -> "MujocoPlant | MjcfPlant":
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
-        memory = len(self.memory)
         if not isinstance(self.agents, MjcfRobots):
             return MujocoPlant(
                 self.agents, timestep, self.integrator, userdata=userdata, memory=memory

@@ -194,6 +194,44 @@ class OsnrGame:
         return gradient
 
 
+class CournotGame:
+    """Cournot competition of Salehisadaghiani, Shi and Pavel.
+
+    J_i = cost_i y_i - y_i (intercept - sum_j y_j); constraints in this order: lower_i - y_i <= 0
+    for i = 0..N-1, then y_i - upper_i <= 0 for i = 0..N-1, so p = 2 N.
+
+    unit_cost, lower, upper: (N,) each. intercept: float, the price of an empty market.
+    """
+
+    def __init__(self, unit_cost, intercept, lower, upper):
+        self.unit_cost = np.array(unit_cost, dtype=float)
+        self.intercept = float(intercept)
+        self.lower = np.array(lower, dtype=float)
+        self.upper = np.array(upper, dtype=float)
+        self.N = len(self.unit_cost)
+        self.p = 2 * self.N
+
+    def cost(self, i, y):
+        """J_i(y), a scalar. y: (N,)."""
+        return self.unit_cost[i] * y[i] - y[i] * (self.intercept - sum(y))
+
+    def partial_gradient(self, i, y):
+        """dJ_i/dy_i at y, a scalar. y: (N,)."""
+        return self.unit_cost[i] - (self.intercept - sum(y)) + y[i]
+
+    def constraint(self, l, y):  # noqa: E741
+        """g_l(y), a scalar, negative inside. y: (N,)."""
+        if l < self.N:
+            return self.lower[l] - y[l]
+        return y[l - self.N] - self.upper[l - self.N]
+
+    def constraint_gradient(self, l, y):  # noqa: E741
+        """Full gradient of g_l at y: (N,). y: (N,)."""
+        gradient = np.zeros(self.N, dtype=np.asarray(y).dtype)
+        gradient[l % self.N] = -1 if l < self.N else 1
+        return gradient
+
+
 def constraints(game, y):
     """All g_l(y) [eq:GNE]: (p,). y: (N,)."""
     return np.array([game.constraint(l, y) for l in range(game.p)])  # noqa: E741

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import reference
 from gne_mj.barrier import LogBarrier
 from gne_mj.errors import InvalidInput
-from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_game
 
 RHO = 0.1
 PROFILES = 100
@@ -41,7 +41,19 @@ def osnr(rng, count):
     return osnr_game(**parameters), reference_osnr(parameters), interior
 
 
-any_game = pytest.mark.parametrize("build", [velocity, osnr])
+def cournot(rng, count):
+    costs, intercept = rng.uniform(1, 60, count), rng.uniform(10, 600)
+    lower = rng.uniform(-5, 10, count)
+    upper = lower + rng.uniform(1, 80, count)
+
+    def interior(rows):
+        return lower + rng.uniform(0.03, 0.97, (rows, count)) * (upper - lower)
+
+    game = cournot_game(count, costs, intercept, lower, upper)
+    return game, reference.CournotGame(costs, intercept, lower, upper), interior
+
+
+any_game = pytest.mark.parametrize("build", [velocity, osnr, cournot])
 sizes = st.integers(1, 8)
 seeds = st.integers(0, 2**32 - 1)
 

@@ -2,12 +2,12 @@
 
 MuJoCo evaluates control at every stage of its integrator. The callback counts these evaluations
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
-(:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. The law's memory
-is in ``act``: in mode `continuous` MuJoCo's integrator moves it, by the rates that a second
-callback gives; in mode `sampled` the first one propagates it. What else is kept from call to call
-lies in ``userdata``; both are part of MuJoCo's state. userdata holds
-[mark, address of the table, the fleet's own, step, stage, monitor, input held, scratch arrays, flat
-state at the step's start, flat state at a later stage].
+(:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. In that mode the
+law's memory is in ``act``, moved by MuJoCo's integrator at the rates that a second callback gives;
+in mode `sampled` it is in ``userdata``, where nothing but the law moves it. What else is kept from
+call to call is in ``userdata`` as well; both are part of MuJoCo's state. userdata holds [mark,
+address of the table, the fleet's own, step, stage, monitor, input held, scratch arrays, flat state
+at the step's start, flat state at a later stage, memory].
 """
 
 from functools import cache
@@ -91,6 +91,7 @@ def problem_in(table):
         integers(table, GAME + 5),
         integers(table, GAME + 6),
         integers(table, GAME + 7),
+        integers(table, GAME + 8),
     )
     graph = GraphData(integers(table, GRAPH), integers(table, GRAPH + 1))
     agents = len(data.offsets) - 1
@@ -120,7 +121,7 @@ def channels_in(table, m, states):
 
 @kernel
 def parts_of(userdata, start, m, p, agents, states):
-    """The views into userdata: monitor, input held, scratch, flat states at the start and now."""
+    """Views into userdata: monitor, input, scratch, flat states at the start and later, memory."""
     at = start + MONITOR + watch.length(m, p)
     monitor = userdata[start + MONITOR : at]
     u = userdata[at : at + m]
@@ -149,7 +150,9 @@ def parts_of(userdata, start, m, p, agents, states):
         userdata[a9:end],
     )
     size = m * states
-    return monitor, u, work, userdata[end : end + size], userdata[end + size : end + 2 * size]
+    memory = userdata[end + 2 * size :]
+    state, later = userdata[end : end + size], userdata[end + size : end + 2 * size]
+    return monitor, u, work, state, later, memory
 
 
 @cache
@@ -177,7 +180,9 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         ctrl = field(struct, at.ctrl, sizes[NU])
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
         start = sizes[ROOM]
-        monitor, u, work, state, later = parts_of(userdata, start, m, p, agents, states)
+        monitor, u, work, state, later, memory = parts_of(userdata, start, m, p, agents, states)
+        if mode == CONTINUOUS:
+            memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
         step, stage = np.int64(userdata[start + STEP_NOW]), np.int64(userdata[start + STAGE_NOW])
         last = stage + 1 == stages
         userdata[start + STEP_NOW] = step + 1 if last else step
@@ -194,8 +199,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
         acts = monitor[watch.EXIT] == watch.INSIDE and look(
             agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
-            stage, storage, state, field(struct, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor,
-            work,
+            stage, storage, state, memory, u, monitor, work,
         )  # fmt: skip
         for r in range(m):
             ctrl[fleet.actuator_of(table, r)] = work.u[r] if acts else 0.0
@@ -208,16 +212,10 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
             return 0.0
         sizes, steps = integers(table, SIZES), integers(table, STEP)
         rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
-        if steps[5] != CONTINUOUS:
-            for r in range(len(rates)):
-                rates[r] = 0.0
-            return 0.0
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
-        _monitor, _u, work, _state, _later = parts_of(
-            userdata, sizes[ROOM], steps[0], steps[1], steps[2], states
-        )
+        parts = parts_of(userdata, sizes[ROOM], steps[0], steps[1], steps[2], states)
         memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
-        law.rate(problem_in(table), work.y, memory, rates)
+        law.rate(problem_in(table), parts[2].y, memory, rates)
         return 0.0
 
     def advance(
@@ -225,7 +223,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         before, samples_state, samples_u, samples_memory,
     ):  # fmt: skip
         _ = source
-        monitor, u, _work, state, _later = parts_of(userdata, start, m, p, agents, states)
+        monitor, u, _work, state, _later, memory = parts_of(userdata, start, m, p, agents, states)
         nq, nv = len(qpos), len(qvel)
         done = 0
         for sample in range(len(samples_u)):
@@ -249,7 +247,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
                 if substep == 0:
                     copy(u, samples_u[sample])
                     copy(state, samples_state[sample])
-                    copy(before[nq + nv :] if restores else act, samples_memory[sample])
+                    copy(before[nq + nv :] if restores else memory, samples_memory[sample])
                 if left:
                     return sample + 1, done
                 done += 1
@@ -261,9 +259,11 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         sizes, steps = integers(table, SIZES), integers(table, STEP)
         m = steps[0]
         userdata = field(data, at.userdata, sizes[NUSERDATA])
-        monitor, u, work, state, _later = parts_of(
+        monitor, u, work, state, _later, memory = parts_of(
             userdata, sizes[ROOM], m, steps[1], steps[2], states
         )
+        if steps[5] == CONTINUOUS:
+            memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
         fleet.gather(at, data, table, state)
         channels = channels_in(table, m, states)
         # the agents' storage as the ODE loop has it: the fleet's own figures are of the last step
@@ -274,7 +274,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         return begin_step(
             agent, law, game, problem_in(table), channels,
             Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0), step, storage, state,
-            field(data, at.act, sizes[NA])[sizes[MEMORY] :], u, monitor, work,
+            memory, u, monitor, work,
         )  # fmt: skip
 
     return (
@@ -285,9 +285,16 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
     )
 
 
-def room(game: Game, agents: Agents) -> int:
-    """How many entries of userdata a plant must leave for this game's loop."""
-    return int(room_needed(game.actions, game.constraints_count, game.agents, agents.states))
+def room(game: Game, agents: Agents, memory: int, mode: int) -> tuple[int, int]:
+    """Entries of userdata, and of act, that a plant must leave for this game's loop.
+
+    Args:
+        game, agents: of the loop.
+        memory: length of the law's memory.
+        mode: CONTINUOUS or SAMPLED of :mod:`gne_mj.loops.ode`.
+    """
+    needed = room_needed(game.actions, game.constraints_count, game.agents, agents.states)
+    return (int(needed), memory) if mode == CONTINUOUS else (int(needed) + memory, 0)
 
 
 class MujocoLoop(ClosedLoop):
@@ -340,15 +347,15 @@ class MujocoLoop(ClosedLoop):
         data = plant.data
         data.userdata[:] = 0.0
         sizes = plant.table_arrays[SIZES]
-        self._memory = data.act[sizes[MEMORY] :]
-        self._memory[:] = memory
         self._step = 0
         self._start = int(sizes[ROOM])
         self._sizes = (m, p, agents)
-        # in mode sampled the memory stands still but at control instants
-        restores = mode == CONTINUOUS and len(memory) > 0
-        kept = plant.model.nq + plant.model.nv + (len(memory) if restores else 0)
-        self._before = (restores, np.zeros(kept))
+        moved = mode == CONTINUOUS and len(memory) > 0  # by the integrator
+        place = data.act if moved else data.userdata
+        self._memory = place[len(place) - len(memory) :]
+        self._memory[:] = memory
+        kept = plant.model.nq + plant.model.nv + (len(memory) if moved else 0)
+        self._before = (moved, np.zeros(kept))
         first = self._start + MONITOR
         length = int(watch.length(m, p))
         self.monitor = data.userdata[first : first + length]
@@ -375,9 +382,8 @@ class MujocoLoop(ClosedLoop):
         # The callback counts steps and stages; a step that ended in an exit is not one of them.
         data.userdata[self._start + STEP_NOW] = self._step
         data.userdata[self._start + STAGE_NOW] = 0.0
-        with callbacks(
-            control=self._control, passive=self.plant.passive, activation=self._remember
-        ):
+        remember = self._remember if restores else None
+        with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
             done, steps = self._advance(
                 step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
                 self._memory, data.userdata, self._start, *self._sizes, restores, every, before,

@@ -1,9 +1,9 @@
 """A group of agents of one type: what has state, and knows nothing of games and controllers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +64,19 @@ class Agents:
     def states(self) -> int:
         """States of a channel."""
         return len(self.kind.STATES)
+
+    def repeated(self, copies: int) -> Self:
+        """The same agents ``copies`` times in a row."""
+        return replace(
+            self,
+            parameters=np.tile(self.parameters, (copies, 1)),
+            input_limit=np.tile(self.input_limit, copies),
+        )
+
+    @property
+    def knows_storage(self) -> bool:
+        """Whether the type has a storage function; without one, ``storage`` is zero."""
+        return bool(getattr(self.kind, "KNOWS_STORAGE", True))
 
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""

@@ -1,0 +1,165 @@
+"""The examination of a plant: trials of all its channels, and the worst that they showed."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gne_mj.errors import InvalidInput
+from gne_mj.passivity.report import (
+    CHECKS,
+    NO_VIOLATION,
+    UNRESOLVED,
+    VIOLATED,
+    Counterexample,
+    Finding,
+    PassivityReport,
+)
+from gne_mj.passivity.trials import Build, Rest, Storage, Trials
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.base import Plant
+from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.plants.ode import OdePlant
+
+# Channels in one simulation, at most
+_CHANNELS = 512
+
+
+def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
+    """How to build copies of agents on an engine ("ode" or "mujoco"), for :func:`examine`.
+
+    The adaptive "rosenbrock" is for closed loops; plants alone are stepped by "rk4" then.
+    """
+    method = "rk4" if integrator == "rosenbrock" else integrator
+
+    def build(copies: int, timestep: float) -> Plant:
+        if engine == "ode":
+            return OdePlant(agents.repeated(copies), timestep, method)
+        # Late: MuJoCo is slow to import, and the twins do not need it.
+        from gne_mj.plants.mjcf_fleet import MjcfPlant
+        from gne_mj.plants.mujoco import MujocoPlant
+
+        fleet = agents.repeated(copies)
+        if isinstance(fleet, MjcfRobots):
+            return MjcfPlant(fleet, timestep, method)
+        return MujocoPlant(fleet, timestep, method, decorated=False)
+
+    return build
+
+
+def examine(
+    build: Build,
+    timestep: float,
+    *,
+    duration: float = 20.0,
+    trials: int = 24,
+    seed: int = 0,
+    outputs: tuple[ArrayLike, ArrayLike] = (-1.0, 1.0),
+    owners: ArrayLike | None = None,
+    equilibrium: Rest | None = None,
+    storage: Storage | Literal["agents"] | None = "agents",
+) -> PassivityReport:
+    """Look for a violation of equilibrium-independent passivity.
+
+    Args:
+        build: makes the plant; its channels must not act on each other. ``plants_of`` is one.
+        timestep: in s; half of it is used as well.
+        duration: of a trial in s.
+        trials: of every agent; 24 combine every kind of input with starts at rest and elsewhere.
+            More trials repeat the first ones and add to them.
+        seed: of the random numbers.
+        outputs: (lower, upper), one for all or one for each channel: the range of y*; amplitudes
+            and deviations are in proportion.
+        owners: (channels,) whose each channel is, numbered from 0; an agent each if left out.
+        equilibrium: the state and input that rest at y*; by default the agents' own, with u* = 0.
+        storage: V; by default the agents' own, where their type has one. Without one all trials
+            start at rest.
+
+    Raises:
+        InvalidInput: numbers that cannot be used, or a plant that does not rest at its equilibria.
+    """
+    for key, value, least in (("trials", trials, 1), ("seed", seed, 0)):
+        if value < least:
+            raise InvalidInput(key, value, f"it must be at least {least}")
+    if not (np.isfinite(timestep) and timestep > 0):
+        raise InvalidInput("timestep", timestep, "it must be positive and finite")
+    if not (np.isfinite(duration) and duration >= 40 * timestep):
+        raise InvalidInput("duration", duration, "it must be finite and at least 40 timesteps")
+    channels = build(1, timestep).agents.channels
+    owner = np.arange(channels) if owners is None else np.asarray(owners, dtype=np.int64)
+    if owner.shape != (channels,):
+        raise InvalidInput("owners", owners, f"it must list {channels} agents, one a channel")
+    lower, upper = (np.broadcast_to(np.asarray(b, dtype=np.float64), (channels,)) for b in outputs)
+    if not (np.all(np.isfinite(upper - lower)) and np.all(lower < upper)):
+        raise InvalidInput("outputs", outputs, "each lower one must be below the upper one")
+    worst: dict[tuple[int, int], Finding] = {}
+    counterexample, examined, escaped, has_storage = None, duration, False, False
+    batch = max(1, _CHANNELS // channels)
+    for first in range(0, trials, batch):
+        part = Trials(build, range(first, min(first + batch, trials)), timestep, duration, seed,
+                      (lower, upper), owner, equilibrium, storage)  # fmt: skip
+        examined = min(examined, float(part.time[-1]))
+        escaped, has_storage = escaped or part.escaped, part.has_storage
+        found = part.findings()
+        for finding in found:
+            place = (finding.channel, CHECKS.index(finding.check))
+            if place not in worst or _severity(finding) > _severity(worst[place]):
+                worst[place] = finding
+        shown = max(found, key=_rank)
+        if shown.violated and (
+            counterexample is None or _rank(shown) > _rank(counterexample.finding)
+        ):
+            counterexample = part.counterexample(shown)
+    findings = tuple(worst[place] for place in sorted(worst))
+    agents = len(set(owner.tolist()))
+    message = f"{trials} trials of {duration:g} s for each of {agents} agents, seed {seed}"
+    if not has_storage:
+        message += ", no storage function known"
+    if escaped:
+        message += f"; some ended at {examined:.4g} s, when an output had run away"
+    status, message = _verdict(message, findings, counterexample, timestep)
+    return PassivityReport(
+        status=status,
+        message=message,
+        agents=agents,
+        trials=trials,
+        seed=seed,
+        duration=duration,
+        examined=examined,
+        timestep=timestep,
+        storage=has_storage,
+        findings=findings,
+        counterexample=counterexample,
+    )
+
+
+def _verdict(
+    done: str,
+    findings: tuple[Finding, ...],
+    counterexample: Counterexample | None,
+    timestep: float,
+) -> tuple[str, str]:
+    """Status and sentence, given what was done in words."""
+    if counterexample is None:
+        return NO_VIOLATION, f"{done}; this is no proof"
+    if not counterexample.confirmed:
+        return UNRESOLVED, (
+            f"{done}; an excess of {counterexample.finding.excess:.3g} became"
+            f" {counterexample.repeated_excess:.3g} with a sixth of the step {timestep:g} s, which"
+            " does not resolve the plant's motion"
+        )
+    guilty = sorted({finding.agent for finding in findings if finding.violated})
+    return VIOLATED, f"by agent{'s' * (len(guilty) > 1)} {', '.join(map(str, guilty))}; {done}"
+
+
+def _severity(finding: Finding) -> tuple[bool, float]:
+    """Violations first, by their share of the energy exchanged; else by the bare excess."""
+    if finding.violated:
+        return True, (finding.excess - finding.error) / finding.exchanged
+    return False, finding.excess
+
+
+def _rank(finding: Finding) -> tuple[bool, int, float]:
+    """The greatest is shown: what refutes the plant before what refutes its storage function."""
+    violated, share = _severity(finding)
+    return violated, -CHECKS.index(finding.check), share

@@ -1,0 +1,276 @@
+"""Trials of a plant under exciting inputs, at two steps side by side, and their energy balance."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.passivity.excitation import COMBINATIONS, Excitation
+from gne_mj.passivity.report import CHECKS, Counterexample, Finding
+from gne_mj.plants.base import Plant
+
+# (copies, timestep in s) -> a plant with the channels of all agents, ``copies`` times in a row
+Build = Callable[[int, float], Plant]
+# y* (channels,) -> state (channels, states) and input (channels,) that rest there
+Rest = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+# (state, rest), each (channels, states) -> V of each channel (channels,)
+Storage = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+# Inputs held one after the other in a trial, at most
+_HOLDS = 2000
+# The step's error is taken as this many times the difference to half the step.
+_SAFETY = 2.0
+# A difference may vanish by chance: its greatest within so many holds counts from the start.
+_FIRST = 20
+# Roundings in V, relative to the squared range of the output; each step may round once more.
+_ROUNDINGS = 10
+# A trial ends where an output is this many times its range away: nothing passive gets there.
+_ESCAPED = 1e6
+
+
+class Trials:
+    """Some trials of all agents in one simulation, at two steps side by side.
+
+    Channels are numbered trial after trial. Arrays over time have shape (holds + 1, channels),
+    with a leading axis of 2 for the coarser and the finer step where both are kept.
+    """
+
+    def __init__(
+        self,
+        build: Build,
+        trials: range,
+        timestep: float,
+        duration: float,
+        seed: int,
+        outputs: tuple[NDArray[np.float64], NDArray[np.float64]],
+        owner: NDArray[np.int64],
+        equilibrium: Rest | None,
+        storage: Storage | Literal["agents"] | None,
+    ) -> None:
+        steps = round(duration / timestep)
+        self.substeps = 2 * max(1, -(-steps // (2 * _HOLDS)))
+        holds = steps // self.substeps
+        self.trials, self.timestep, self.owner = trials, timestep, owner
+        self.hold = self.substeps * timestep
+        self.plants = [build(len(trials), timestep), build(len(trials), 0.5 * timestep)]
+        self.build, self.storage = build, storage
+        self.has_storage = _storage(self.plants[0], storage) is not None
+        # Numbers of a trial depend on the seed and the trial alone.
+        generators = [np.random.default_rng([seed, trial]) for trial in trials]
+        lower, upper = outputs
+        width = upper - lower
+        self.width = np.tile(width, len(trials))
+        self.rest_output = np.concatenate([rng.uniform(lower, upper) for rng in generators])
+        if equilibrium is None:
+            self.rest_state = self.plants[0].agents.equilibrium(self.rest_output)
+            self.rest_input = np.zeros(len(self.rest_output))
+        else:
+            self.rest_state, self.rest_input = equilibrium(self.rest_output)
+        self._check_rest()
+        self.excitation = Excitation.join(
+            [
+                Excitation.draw(rng, trial, width, self.hold, holds * self.hold)
+                for rng, trial in zip(generators, trials, strict=True)
+            ]
+        )
+        self.at_rest = np.repeat(
+            [not self.has_storage or trial // COMBINATIONS % 2 == 0 for trial in trials],
+            len(self.owner),
+        )
+        shape = (len(owner), self.rest_state.shape[1])
+        deviation = np.concatenate(
+            [
+                rng.normal(size=shape)
+                * width[:, None]
+                * np.exp(rng.uniform(-3.5, 0.0, (shape[0], 1)))
+                for rng in generators
+            ]
+        )
+        self.initial_state = self.rest_state + np.where(self.at_rest[:, None], 0.0, deviation)
+        self._simulate(holds)
+
+    def _check_rest(self) -> None:
+        plant = self.plants[0]
+        plant.reset(self.rest_state)
+        plant.step(self.rest_input, self.substeps)
+        moved = np.abs(plant.output - self.rest_output)
+        if not np.all(moved <= 1e-9 * (np.abs(self.rest_output) + self.width)):
+            worst = int(np.argmax(np.where(np.isnan(moved), np.inf, moved)))
+            raise InvalidInput(
+                "equilibrium",
+                float(self.rest_output[worst]),
+                f"channel {worst % len(self.owner) + 1} must rest at this output, and after"
+                f" {self.hold:g} s under the input {self.rest_input[worst]:g} it is"
+                f" {moved[worst]:.3g} off",
+            )
+
+    def _simulate(self, holds: int) -> None:
+        channels = len(self.rest_output)
+        self.input = np.zeros((holds, channels))
+        supplied = np.zeros((2, holds + 1, channels))
+        stored = np.zeros((2, holds + 1, channels))
+        moved, gross = np.zeros((holds + 1, channels)), np.zeros((holds + 1, channels))
+        for plant in self.plants:
+            plant.reset(self.initial_state)
+        everyone = slice(None)
+        stored[:, 0] = self._stored(self.plants[1], everyone)
+        done = 0
+        for k in range(holds):
+            change = self.excitation.input(k * self.hold, self.plants[1].output - self.rest_output)
+            self.input[k] = self.rest_input + change
+            for level, plant in enumerate(self.plants):
+                integral, size = self._hold(plant, k, everyone, self.substeps << level)
+                supplied[level, k + 1] = supplied[level, k] + change * integral
+                stored[level, k + 1] = self._stored(plant, everyone)
+            moved[k + 1] = moved[k] + np.abs(supplied[1, k + 1] - supplied[1, k])
+            gross[k + 1] = gross[k] + np.abs(change) * size
+            away = [np.abs(plant.output - self.rest_output) for plant in self.plants]
+            # Not a number is away as well.
+            if not np.all(np.maximum(*away) <= _ESCAPED * self.width):
+                break
+            done = k + 1
+        self.time = self.hold * np.arange(done + 1)
+        self.supplied, self.stored = supplied[:, : done + 1], stored[:, : done + 1]
+        peak = np.maximum.accumulate(np.abs(self.stored[1]))
+        self.exchanged = moved[: done + 1] + peak
+        steps_taken = 2 * self.substeps * np.arange(done + 1)[:, None]
+        self.rounding = np.finfo(float).eps * (
+            steps_taken * (gross[: done + 1] + peak) + _ROUNDINGS * self.width**2
+        )
+        self.escaped = done < holds
+
+    def _hold(
+        self, plant: Plant, k: int, mine: slice, steps: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Integrals of y - y*, by Simpson's rule, and of |y| + |y*| while the k-th input is held.
+
+        The plant is one of the channels ``mine``, and takes this many steps.
+        """
+        u, rest = self.input[k, mine], self.rest_output[mine]
+        integral, size = np.zeros(len(u)), np.zeros(len(u))
+        for step in range(steps + 1):
+            if step:
+                plant.step(u)
+            weight = 1.0 if step in (0, steps) else 4.0 if step % 2 else 2.0
+            y = plant.output
+            integral += weight * (y - rest)
+            size += weight * (np.abs(y) + np.abs(rest))
+        third = self.hold / steps / 3.0
+        return third * integral, third * size
+
+    def _stored(self, plant: Plant, mine: slice) -> NDArray[np.float64]:
+        storage = _storage(plant, self.storage)
+        if storage is None:
+            return np.zeros(plant.agents.channels)
+        return storage(plant.state, self.rest_state[mine])
+
+    def findings(self) -> list[Finding]:
+        """The worst of each check for each channel."""
+        start = np.broadcast_to(0, self.supplied[1].shape)
+        extracted = np.where(self.at_rest, -self.supplied[1], -np.inf)
+        found = self._worst(CHECKS[0], extracted, _error(self.supplied), start)
+        if not self.has_storage:
+            return found
+        surplus = self.stored - self.supplied
+        least, since = _running_least(surplus[1])
+        # Both ends of the interval have the errors of both terms.
+        error = 2.0 * (_error(self.stored) + _error(self.supplied))
+        found += self._worst(CHECKS[1], surplus[1] - least, error, since)
+        found += self._worst(CHECKS[2], -self.stored[1], _error(self.stored), start)
+        return found
+
+    def _worst(
+        self,
+        check: str,
+        excess: NDArray[np.float64],
+        error: NDArray[np.float64],
+        since: NDArray[np.int64],
+    ) -> list[Finding]:
+        error = error + self.rounding
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (excess - error) / self.exchanged
+        violated = excess > error
+        found = []
+        for channel, agent in enumerate(self.owner):
+            mine = slice(channel, None, len(self.owner))
+            score = np.where(violated[:, mine], share[:, mine], -np.inf)
+            if not np.any(violated[:, mine]):
+                score = excess[:, mine]
+            if np.all(score == -np.inf):
+                continue  # no trial of this batch is of this check
+            k, trial = np.unravel_index(np.argmax(score), score.shape)
+            r = int(trial) * len(self.owner) + channel
+            found.append(
+                Finding(
+                    check=check,
+                    agent=int(agent) + 1,
+                    channel=channel + 1,
+                    trial=self.trials[int(trial)],
+                    excess=float(excess[k, r]) + 0.0,
+                    error=float(error[k, r]),
+                    exchanged=float(self.exchanged[k, r]),
+                    since=float(self.time[since[k, r]]),
+                    time=float(self.time[k]),
+                    rest_output=float(self.rest_output[r]),
+                )
+            )
+        return found
+
+    def counterexample(self, finding: Finding) -> Counterexample:
+        """The data of one of these trials' findings."""
+        r = (finding.trial - self.trials[0]) * len(self.owner) + finding.channel - 1
+        return Counterexample(
+            finding=finding,
+            repeated_excess=self._repeated(finding),
+            rest_state=self.rest_state[r].tolist(),
+            rest_input=float(self.rest_input[r]),
+            initial_state=self.initial_state[r].tolist(),
+            hold=self.hold,
+            timestep=0.5 * self.timestep,
+            input=self.input[: round(finding.time / self.hold), r].tolist(),
+        )
+
+    def _repeated(self, finding: Finding) -> float:
+        """The finding's excess once more, by a third of the finer step and the same inputs."""
+        first = (finding.trial - self.trials[0]) * len(self.owner)
+        mine = slice(first, first + len(self.owner))
+        channel = finding.channel - 1
+        since, end = round(finding.since / self.hold), round(finding.time / self.hold)
+        plant = self.build(1, self.timestep / 6.0)
+        plant.reset(self.initial_state[mine])
+        supplied = before = np.zeros(len(self.owner))
+        for k in range(end):
+            if k == since:
+                before = self._stored(plant, mine) - supplied
+            integral, _ = self._hold(plant, k, mine, 6 * self.substeps)
+            supplied = supplied + (self.input[k, mine] - self.rest_input[mine]) * integral
+        stored = self._stored(plant, mine)
+        excess = {
+            "energy extracted": -supplied,
+            "storage risen": stored - supplied - before,
+            "storage negative": -stored,
+        }
+        return float(excess[finding.check][channel])
+
+
+def _storage(plant: Plant, storage: Storage | Literal["agents"] | None) -> Storage | None:
+    """The storage function to check: the one given, or that of the plant's agents, if any."""
+    if storage != "agents":
+        return storage
+    return plant.agents.storage if plant.agents.knows_storage else None
+
+
+def _error(both: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Estimate of the finer one's error: the greatest difference so far, with some safety."""
+    difference = np.maximum.accumulate(np.abs(both[0] - both[1]))
+    error: NDArray[np.float64] = _SAFETY * np.maximum(difference, difference[:_FIRST].max(axis=0))
+    return error
+
+
+def _running_least(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The least value so far in each column, and its row."""
+    least = np.minimum.accumulate(values)
+    rows = np.where(values == least, np.arange(len(values))[:, None], 0)
+    return least, np.maximum.accumulate(rows)
