@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
-from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
 
@@ -28,7 +27,7 @@ class Certificate:
     Attributes:
         status: one of the statuses of the README, with its sentence in ``message``.
         worst_constraint: the least margin -g over all constraints and integration steps.
-        worst_gap: for velocity games, the gap that used most of its bound.
+        worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
@@ -200,9 +199,11 @@ def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] |
     gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
     index = int(np.argmax(gaps / bounds))
     return {
-        "agent": index + 1,
+        "name": system.game.constraint_names[index],
+        "index": index + 1,
         "gap": float(gaps[index]),
         "bound": float(bounds[index]),
+        "unit": system.game.action_unit,
         "time": float(when[index]),
         "each": gaps.tolist(),
     }
@@ -227,6 +228,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     game = system.game
+    affine = game.affine_constraints
     measured = None
     if game.agents <= EPSILON_AGENTS:
         try:
@@ -236,10 +238,8 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,
-        # The same set by affine constraints, two a gap, meets Assumption [asmp:cost] to the letter.
-        "p_rho_affine": (
-            2 * game.constraints_count * system.rho if game.kernels is velocity else None
-        ),
+        # The same set by affine constraints meets Assumption [asmp:cost] to the letter.
+        "p_rho_affine": None if affine is None else affine * system.rho,
         "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
     }
 

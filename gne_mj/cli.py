@@ -368,7 +368,8 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
     }
     if gap is not None:
         rows["widest gap"] = (
-            f"{gap['gap']:.6g} of {gap['bound']:g} m/s, agent {gap['agent']} at {gap['time']:.4g} s"
+            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
+            f" {gap['time']:.4g} s"
         )
     if epsilon["measured"] is not None:
         rows["epsilon"] = (

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import is_plain, plain_kernels, raise_pending
+from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -71,6 +72,11 @@ class Game:
         jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
             every entry of dF/dy over it, each (m, m).
         gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
+        affine_constraints: how many affine constraints describe the same set by the same barrier,
+            where the game's own are not affine; None if none do.
+        agent_name: what an agent is, e.g. "robot".
+        axes: names of the entries of an agent's action; "1", "2", ... if left out.
+        quantities: what follows from the actions and is recorded and drawn beside them.
     """
 
     name: str
@@ -86,6 +92,10 @@ class Game:
     box: Box | None = None
     jacobian_bounds: Callable[[Box], Box] | None = None
     gap_bounds: NDArray[np.float64] | None = None
+    affine_constraints: int | None = None
+    agent_name: str = "agent"
+    axes: tuple[str, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
         if is_plain(self.kernels):
@@ -140,6 +150,17 @@ class Game:
     def agent_of_action(self) -> NDArray[np.int64]:
         """Which agent each entry of a profile belongs to, shape (m,)."""
         return np.repeat(np.arange(self.agents), self.sizes)
+
+    @cached_property
+    def axis_of_action(self) -> tuple[str, ...]:
+        """Name of each entry of a profile among its agent's, length m."""
+        numbers = tuple(str(k + 1) for k in range(max(self.sizes)))
+        return tuple((self.axes or numbers)[k] for size in self.sizes for k in range(size))
+
+    def entries(self, quantity: Quantity) -> tuple[int, ...]:
+        """Shape of a quantity at one profile: (N,), (p,) or ()."""
+        shapes = {"agent": (self.agents,), "constraint": (self.constraints_count,)}
+        return shapes.get(quantity.each, ())
 
     def costs(self, y: ArrayLike) -> NDArray[np.float64]:
         """J_i(y) of each agent; y of shape (..., m), result (..., N)."""

@@ -125,6 +125,9 @@ class System:
             raise InvalidInput(
                 f"systems.{self.name}.initial", "nan or inf", "every entry must be finite"
             )
+        for quantity in self.game.quantities:  # wrong shapes are better found before a run
+            quantity.at(self.start[None], self.game.entries(quantity))
+            quantity.bounds(self.game.entries(quantity))
         worst, value = self.game.tightest(self.start)
         if not value < 0.0:
             names = self.game.constraint_names

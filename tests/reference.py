@@ -69,6 +69,74 @@ class VelocityGame:
         return gradient
 
 
+class VelocityConsensusGame:
+    """Velocity consensus with leaders, one entry of this oracle for each axis of each agent.
+
+    J_i = sum over neighbours |y_i - y_j|^2 + w_i |y_i - v0|^2; |y_i - y_j|^2 - delta^2 <= 0 along
+    every edge, then |y_i - v0|^2 - delta^2 <= 0 for every leader (w_i > 0).
+
+    v0: (d,), m/s. edges: pairs of agents. weight: (agents,). delta: (edges + leaders,), m/s.
+    N = agents * d scalar actions, agent by agent.
+    """
+
+    def __init__(self, v0, edges, weight, delta):
+        self.v0 = np.array(v0, dtype=float)
+        self.edges = [(int(i), int(j)) for i, j in edges]
+        self.weight = np.array(weight, dtype=float)
+        self.leaders = [i for i in range(len(weight)) if weight[i] > 0]
+        self.delta = np.array(delta, dtype=float)
+        self.d = len(self.v0)
+        self.agents = len(self.weight)
+        self.N = self.agents * self.d
+        self.p = len(self.edges) + len(self.leaders)
+
+    def velocity(self, i, y):
+        """y_i: (d,). y: (N,)."""
+        return y[i * self.d : (i + 1) * self.d]
+
+    def cost(self, i, y):
+        """J_i(y) of agent i, a scalar. y: (N,)."""
+        own = self.velocity(i, y)
+        total = self.weight[i] * np.sum((own - self.v0) ** 2)
+        for edge in self.edges:
+            if i in edge:
+                other = edge[1] if edge[0] == i else edge[0]
+                total = total + np.sum((own - self.velocity(other, y)) ** 2)
+        return total
+
+    def partial_gradient(self, a, y):
+        """dJ_i/dy_a of the agent i that entry a belongs to, a scalar. y: (N,)."""
+        i, k = divmod(a, self.d)
+        total = 2 * self.weight[i] * (y[a] - self.v0[k])
+        for edge in self.edges:
+            if i in edge:
+                other = edge[1] if edge[0] == i else edge[0]
+                total = total + 2 * (y[a] - y[other * self.d + k])
+        return total
+
+    def gap(self, l, y):  # noqa: E741
+        """y_i - y_j along edge l, then y_i - v0 of the leaders: (d,). y: (N,)."""
+        if l < len(self.edges):
+            i, j = self.edges[l]
+            return self.velocity(i, y) - self.velocity(j, y)
+        return self.velocity(self.leaders[l - len(self.edges)], y) - self.v0
+
+    def constraint(self, l, y):  # noqa: E741
+        """g_l(y), a scalar, negative inside. y: (N,)."""
+        return np.sum(self.gap(l, y) ** 2) - self.delta[l] ** 2
+
+    def constraint_gradient(self, l, y):  # noqa: E741
+        """Full gradient of g_l at y: (N,). y: (N,)."""
+        gradient = np.zeros((self.agents, self.d), dtype=np.asarray(y).dtype)
+        if l < len(self.edges):
+            i, j = self.edges[l]
+            gradient[j] = -2 * self.gap(l, y)
+        else:
+            i = self.leaders[l - len(self.edges)]
+        gradient[i] = 2 * self.gap(l, y)
+        return gradient.ravel()
+
+
 class OsnrGame:
     """Optical signal-to-noise ratio [eq:osnrGNE].
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
+from gne_mj.quantity import Quantity
 
 
 def osnr_game(
@@ -62,6 +63,13 @@ def osnr_game(
     if not (np.isfinite(total_power_limit) and total_power_limit > 0):
         raise InvalidInput("game.total_power_limit", total_power_limit, "it must be positive")
     everyone = list(range(agents))
+    total = Quantity(
+        name="total_power",
+        long_name="total power",
+        unit="mW",
+        values=lambda y: np.sum(y, axis=1),
+        bound=total_power_limit,
+    )
     return Game(
         name="OSNR",
         kernels=sys.modules[__name__],
@@ -75,6 +83,8 @@ def osnr_game(
         action_name="power",
         action_unit="mW",
         box=(np.zeros(agents), np.full(agents, total_power_limit)),
+        agent_name="channel",
+        quantities=(total,),
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
+from gne_mj.quantity import Quantity
 
 
 def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) -> Game:
@@ -28,6 +29,16 @@ def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) 
     if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
         raise InvalidInput("game.gap_bound", gap_bound, "every bound must be positive and finite")
     reach = np.cumsum(bounds)
+    gaps = Quantity(
+        name="gap",
+        long_name="velocity gap",
+        unit="m/s",
+        values=lambda y: np.diff(y, axis=1, prepend=reference_velocity),
+        each="agent",
+        symbol="y_i - y_{i-1}",
+        bound=bounds,
+        lower_bound=-bounds,
+    )
     predecessors = [[] if i == 0 else [i - 1] for i in range(agents)]
     return Game(
         name="velocity synchronisation",
@@ -42,6 +53,9 @@ def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) 
         affine=True,
         box=(reference_velocity - reach, reference_velocity + reach),
         gap_bounds=bounds,
+        affine_constraints=2 * agents,  # -delta_i <= gap_i <= delta_i
+        agent_name="robot",
+        quantities=(gaps,),
     )
 
 

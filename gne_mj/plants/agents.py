@@ -20,11 +20,13 @@ class Agents:
         kind: module that describes a channel (:mod:`gne_mj.plants.integrator` says how).
         parameters: (m, numbers of the type), one row a channel.
         input_limit: (m,) greatest |u| that the actuators deliver, infinite for no limit.
+        dimension: channels of each agent; all channels are numbered agent by agent.
     """
 
     kind: ModuleType
     parameters: NDArray[np.float64]
     input_limit: NDArray[np.float64]
+    dimension: int = 1
 
     def __post_init__(self) -> None:
         width = len(self.kind.PARAMETERS)
@@ -32,6 +34,12 @@ class Agents:
         if parameters.ndim != 2 or parameters.shape[1] != width:
             raise InvalidInput(
                 "agents.parameters", parameters.shape, f"its shape must be (channels, {width})"
+            )
+        if self.dimension < 1 or len(parameters) % self.dimension:
+            raise InvalidInput(
+                "agents.dimension",
+                self.dimension,
+                f"it must be positive and divide the {len(parameters)} channels",
             )
         limit = np.array(self.input_limit, dtype=np.float64)
         if limit.shape != parameters.shape[:1] or not np.all(limit > 0):
@@ -46,6 +54,11 @@ class Agents:
     def channels(self) -> int:
         """m."""
         return len(self.parameters)
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return self.channels // self.dimension
 
     @property
     def states(self) -> int:

@@ -2,8 +2,9 @@
 
 Every agent module describes one channel, that is one scalar output with its input; an agent with
 an action of m_i entries is m_i such channels. It defines PARAMETERS (their names), STATES (names
-and units), OUTPUT (which of them is y), ``is_passive`` (whether given parameters meet the theory's
-assumption), and the kernels below; x' is affine in u.
+and units; an empty unit stands for the action's), OUTPUT (which of them is y; the others are
+recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
+given parameters meet the theory's assumption), and the kernels below; x' is affine in u.
 """
 
 from gne_mj.native import kernel
@@ -12,6 +13,7 @@ NAME = "integrator"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)
 OUTPUT = 0
+INPUT_UNIT = ""
 
 
 def is_passive(parameters):

@@ -16,8 +16,9 @@ from gne_mj.plants.agents import Agents
 
 NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
-STATES = (("output", ""), ("position", ""))
+STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
+INPUT_UNIT = "the actuator's ctrl"
 KNOWS_STORAGE = False
 
 
