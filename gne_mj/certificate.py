@@ -10,6 +10,7 @@ from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equili
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
+from gne_mj.theory import Theorem
 
 SUCCESSES = ("converged", "completed")
 SETTLED = 0.02  # of the initial distance
@@ -255,15 +256,8 @@ def _settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> 
 
 def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
-    agents = system.agents
-    claimed = (
-        system.mode == "continuous"
-        and system.law.information in ("full", "partial")
-        and system.integrator != "euler"
-        and agents.kind.is_passive(agents.parameters)
-        and bool(monitor[watch.STARTED])
-        and not monitor[watch.SATURATED]
-    )
+    unhindered = bool(monitor[watch.STARTED]) and not monitor[watch.SATURATED]
+    claimed = unhindered and Theorem(system).lyapunov
     return {
         "claimed": claimed,
         "start": start,

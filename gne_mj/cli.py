@@ -31,6 +31,7 @@ _OUT = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder to write; must not exist.")
 ]
 _JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
+_PREPARING = "preparing (a first run compiles for a few seconds)"
 
 
 @app.command()
@@ -41,6 +42,46 @@ def run(scenario: _SCENARIO, set_: _SET = None, out: _OUT = None, as_json: _JSON
     if out is not None and not as_json:
         print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
     raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def certify(
+    scenario: _SCENARIO,
+    set_: _SET = None,
+    as_json: _JSON = False,
+    search: Annotated[
+        bool,
+        typer.Option(
+            "--search-epsilon", help="Find by trial runs the largest epsilon that stays inside."
+        ),
+    ] = False,
+) -> None:
+    """Tell what the theory guarantees for a scenario's systems, and what it does not."""
+    from dataclasses import asdict, replace
+
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import load_scenario
+    from gne_mj.theory import certify as examine
+    from gne_mj.theory import search_epsilon, words
+
+    loaded = load_scenario(scenario, _settings(set_))
+    clock = loaded.clock()
+    systems = loaded.system_objects()
+    reports = {system.name: examine(system, clock) for system in systems}
+    if search:
+        searched = [s for s in systems if reports[s.name].epsilon is not None]
+        if not searched:
+            raise InvalidInput("--search-epsilon", scenario, "no system has the distributed law")
+        for system in searched:
+            with _working(as_json, f"searching epsilon of {system.name}") as tell:
+                found = asdict(search_epsilon(system, clock, tell))
+            epsilon = {**(reports[system.name].epsilon or {}), "search": found}
+            reports[system.name] = replace(reports[system.name], epsilon=epsilon)
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    else:
+        for report in reports.values():
+            print("\n".join(words(report)))
 
 
 @app.command()
@@ -125,7 +166,7 @@ def passivity(
         raise InvalidInput("--system", system, nearest(system, loaded.systems))
     reports = {}
     for name in loaded.systems if system is None else (system,):
-        with _preparing(as_json):
+        with _working(as_json, _PREPARING):
             built = loaded.systems[name].build(name, loaded.simulation.integrator)
             reports[name] = examine(
                 plants_of(built.agents, built.engine, built.integrator),
@@ -219,7 +260,7 @@ def _simulate(
     from gne_mj.scenario import load_scenario
     from gne_mj.simulation import interruption
 
-    with _preparing(quiet):
+    with _working(quiet, _PREPARING):
         simulation = load_scenario(scenario, _settings(changes)).simulation_object()
     # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
     with (
@@ -306,15 +347,15 @@ def _replace(folder: Path, out: Path) -> None:
 
 
 @contextmanager
-def _preparing(quiet: bool) -> Iterator[None]:
-    """A word on a terminal's stderr while a first run compiles."""
+def _working(quiet: bool, what: str) -> Iterator[Any]:
+    """A word on a terminal's stderr meanwhile; what is handed out changes it."""
     if quiet or not sys.stderr.isatty():
-        yield
+        yield None
         return
     from rich.console import Console
 
-    with Console(stderr=True).status("preparing (a first run compiles for a few seconds)"):
-        yield
+    with Console(stderr=True).status(what) as status:
+        yield status.update
 
 
 @contextmanager

@@ -71,6 +71,8 @@ class Game:
         box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
         jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
             every entry of dF/dy over it, each (m, m).
+        row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
+            rows lies between the two that the bounds' entries make up.
         gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
         affine_constraints: how many affine constraints describe the same set by the same barrier,
             where the game's own are not affine; None if none do.
@@ -91,6 +93,7 @@ class Game:
     affine: bool = False
     box: Box | None = None
     jacobian_bounds: Callable[[Box], Box] | None = None
+    row_scaled: bool = False
     gap_bounds: NDArray[np.float64] | None = None
     affine_constraints: int | None = None
     agent_name: str = "agent"

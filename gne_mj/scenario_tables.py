@@ -560,6 +560,15 @@ class Scenario(_Table):
                 raise InvalidInput("recording.period", error.value, error.expected) from None
             raise
 
+    def system_objects(self) -> list[System]:
+        """The systems, checked.
+
+        Raises:
+            InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
+        """
+        integrator = self.simulation.integrator
+        return [table.build(name, integrator) for name, table in self.systems.items()]
+
     def simulation_object(self) -> Simulation:
         """The scenario, ready to run.
 
@@ -567,11 +576,8 @@ class Scenario(_Table):
             InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
         """
         clock = self.clock()
-        systems = [
-            table.build(name, self.simulation.integrator) for name, table in self.systems.items()
-        ]
         return Simulation(
-            systems,
+            self.system_objects(),
             clock,
             tolerance=self.simulation.tolerance,
             seed=self.simulation.seed,

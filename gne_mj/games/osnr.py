@@ -9,14 +9,15 @@ Parameters q = [N, P_0, a (N), b (N), c (N), n0 (N), Gamma (N x N, by rows, its 
 import json
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game import Box, Game
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 
@@ -85,7 +86,28 @@ def osnr_game(
         box=(np.zeros(agents), np.full(agents, total_power_limit)),
         agent_name="channel",
         quantities=(total,),
+        jacobian_bounds=partial(
+            _jacobian_bounds,
+            np.prod([columns["utility_weight"], columns["gain"]], axis=0),
+            np.asarray(columns["noise_power"]),
+            matrix + np.diag(columns["gain"]),
+        ),
+        row_scaled=True,
     )
+
+
+def _jacobian_bounds(
+    weight: NDArray[np.float64], noise: NDArray[np.float64], response: NDArray[np.float64], box: Box
+) -> Box:
+    """Bounds of dF/dy = diag(weight / received^2) response, received = noise + response y.
+
+    response >= 0, so that what is received is least and greatest at two corners of the box.
+    Without bounds (infinite) where it need not be positive.
+    """
+    least, most = noise + response @ box[0], noise + response @ box[1]
+    if np.any(least <= 0):
+        return np.full_like(response, -np.inf), np.full_like(response, np.inf)
+    return (weight / most**2)[:, None] * response, (weight / least**2)[:, None] * response
 
 
 def ten_channels() -> dict[str, Any]:

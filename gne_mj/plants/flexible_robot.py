@@ -40,6 +40,19 @@ def is_passive(parameters):
     )
 
 
+def energy_balance(parameters):
+    """As :func:`gne_mj.plants.integrator.energy_balance`, over extension and both velocities.
+
+    Only the damper dissipates, gamma (x2 - x3)^2: nothing in the extension.
+    """
+    main, appendage, stiffness, atan_coefficient, damping = parameters.T
+    storage, dissipation = np.zeros((2, len(parameters), 3, 3))
+    storage[:, 0, 0] = np.maximum(stiffness, stiffness + atan_coefficient)
+    storage[:, 1, 1], storage[:, 2, 2] = main, appendage
+    dissipation[:, 1:, 1:] = damping[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return storage, dissipation
+
+
 @kernel
 def pull(q, x):
     """Force of spring and damper on the appendage, in N (the main mass feels its opposite)."""

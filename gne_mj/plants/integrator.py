@@ -4,8 +4,11 @@ Every agent module describes one channel, that is one scalar output with its inp
 an action of m_i entries is m_i such channels. It defines PARAMETERS (their names), STATES (names
 and units; an empty unit stands for the action's), OUTPUT (which of them is y; the others are
 recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
-given parameters meet the theory's assumption), and the kernels below; x' is affine in u.
+given parameters meet the theory's assumption), and the kernels below; x' is affine in u. It may
+define ``energy_balance``, from which the theory's rates follow.
 """
+
+import numpy as np
 
 from gne_mj.native import kernel
 
@@ -19,6 +22,16 @@ INPUT_UNIT = ""
 def is_passive(parameters):
     """Always: y' = u meets Assumption [asmp:nonlinearPlant]."""
     return True
+
+
+def energy_balance(parameters):
+    """P and D, each (m, s, s), over the first s states, those that V depends on.
+
+    With e the deviation from the equilibrium x* = pi(y*), V^{x*} <= e'Pe/2 (here equal) and along
+    all motions dV^{x*}/dt = (y - y*) u - e'De.
+    """
+    ones = np.ones((len(parameters), 1, 1))
+    return ones, 0.0 * ones
 
 
 @kernel

@@ -23,6 +23,15 @@ def is_passive(parameters):
     return bool(np.all((parameters[:, 1] > 0) & (parameters[:, 1] < parameters[:, 0])))
 
 
+def energy_balance(parameters):
+    """As :func:`gne_mj.plants.integrator.energy_balance`: e'De = (v e_y - k e_s)^2 / (v - k)."""
+    v, k = parameters.T
+    r = k / (v - k)
+    storage = np.array([[1.0 + r, -r], [-r, r]])
+    dissipation = np.array([[v * v, -v * k], [-v * k, k * k]]) / (v - k)
+    return np.moveaxis(storage, -1, 0), np.moveaxis(dissipation, -1, 0)
+
+
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'."""

@@ -1,0 +1,110 @@
+"""The largest epsilon that keeps a start inside, by trial [lemma:centreInv].
+
+The theorem says that some epsilon* > 0 exists and computes none. Each trial runs the system for
+the clock's duration. Nothing assures that every epsilon below one that works works too.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gne_mj.controllers import FullyDistributed
+from gne_mj.errors import InvalidInput
+from gne_mj.loops import monitor as watch
+from gne_mj.system import Clock, System
+
+# How the bracket's ends may differ, as a factor
+PRECISION = 1.01
+# The search ends at this fraction of the given value, and at this many durations: with a larger
+# epsilon estimates hardly move in a trial
+LEAST, MOST = 2.0**-20, 10.0
+
+
+@dataclass(frozen=True)
+class EpsilonSearch:
+    """What the trials showed.
+
+    Attributes:
+        inside: the largest epsilon tried that kept all inside to the end; None if none did.
+        outside: the smallest one tried above it that did not; None if none was found.
+        trials: all pairs (epsilon, whether all stayed inside), in the order tried.
+        note: why the search ended where it did, if not at a bracket.
+    """
+
+    inside: float | None
+    outside: float | None
+    trials: tuple[tuple[float, bool], ...]
+    note: str | None = None
+
+
+def search_epsilon(
+    system: System, clock: Clock, progress: Callable[[str], None] | None = None
+) -> EpsilonSearch:
+    """Double or halve the system's epsilon until a bracket is found, then bisect its logarithm.
+
+    Args:
+        system: under the fully distributed law.
+        clock: duration and steps of every trial.
+        progress: called with a few words before every trial.
+
+    Raises:
+        InvalidInput: another law.
+    """
+    law = system.law
+    if not isinstance(law, FullyDistributed):
+        raise InvalidInput(
+            f"systems.{system.name}.controller.information",
+            law.information,
+            "only the distributed law has an epsilon",
+        )
+    trials: list[tuple[float, bool]] = []
+
+    def stays(epsilon: float) -> bool:
+        if progress is not None:
+            progress(f"{system.name}: trying epsilon = {epsilon:.4g} s")
+        trial = replace(system, law=replace(law, epsilon=epsilon))
+        stayed = _stays_inside(trial, clock)
+        trials.append((epsilon, stayed))
+        return stayed
+
+    note = None
+    factor = 2.0 if stays(law.epsilon) else 0.5
+    good = bad = epsilon = law.epsilon
+    while True:
+        following = factor * epsilon
+        if following < LEAST * law.epsilon or following > MOST * clock.duration:
+            note = f"{following:.4g} s was not tried"
+            break
+        try:
+            stayed = stays(following)
+        except InvalidInput as error:  # a step too long for a smaller epsilon
+            note = f"{following:.4g} s cannot be tried: {error.expected}"
+            break
+        epsilon *= factor
+        if stayed:
+            good = epsilon
+        else:
+            bad = epsilon
+        if stayed != (factor > 1.0):
+            break
+    while note is None and bad / good > PRECISION:
+        middle = float(np.sqrt(good * bad))
+        if stays(middle):
+            good = middle
+        else:
+            bad = middle
+    inside = max((tried for tried, stayed in trials if stayed), default=None)
+    outside = min(
+        (tried for tried, stayed in trials if not stayed and (inside is None or tried > inside)),
+        default=None,
+    )
+    return EpsilonSearch(inside, outside, tuple(trials), note)
+
+
+def _stays_inside(system: System, clock: Clock) -> bool:
+    loop = system.closed_loop(clock)
+    total = clock.steps(clock.duration)
+    loop.advance(1, total)
+    loop.finish()
+    return bool(loop.monitor[watch.EXIT] == watch.INSIDE)

@@ -1,0 +1,65 @@
+"""Rules of thumb for the period of an explicit law that is sampled and held.
+
+They are local and necessary at best: a run within them may still leave the set. With M the
+agents' effective masses (dy/dt jumps by u/M) and d the distance to a bound delta on a gap,
+
+- one push of the barrier must not throw an agent across: dt < delta M d / (2 rho);
+- the sampled linearisation must be stable: all eigenvalues of I - dt M^-1 (d2phi + dF/dy) within
+  the unit circle, dt < 2 / lambda_max for real ones.
+
+A gain k multiplies both forces; under partial information a coupling gain adds c times the number
+of neighbours to the second.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.controllers import FullyDistributed, PartialInformation
+from gne_mj.system import System
+
+Array = NDArray[np.float64]
+
+
+def mobility(system: System) -> Array | None:
+    """1/M of every channel: how much dy/dt jumps with u; None where the agents do not tell."""
+    kind = system.agents.kind
+    if not hasattr(kind, "rate"):
+        return None
+    found = np.empty(system.game.actions)
+    for r, (q, x) in enumerate(zip(system.agents.parameters, system.state, strict=True)):
+        at_rest, pushed = np.zeros(len(x)), np.zeros(len(x))
+        kind.rate(q, x, 0.0, at_rest)
+        kind.rate(q, x, 1.0, pushed)
+        found[r] = (pushed - at_rest)[kind.OUTPUT]
+    return found
+
+
+def push_period(system: System, y: Array) -> float | None:
+    """The first rule at a feasible profile y (m,), for games with bounds on gaps."""
+    bounds, inverse = system.game.gap_bounds, mobility(system)
+    if bounds is None or inverse is None:
+        return None
+    gaps = np.sqrt(np.maximum(system.game.constraints(y) + bounds**2, 0.0))
+    owner = system.game.agent_of_action
+    heaviest_push = np.array(
+        [np.max(inverse[np.isin(owner, list(members))]) for members in system.game.in_constraint]
+    )
+    gain = system.law.gain if isinstance(system.law, FullyDistributed) else 1.0
+    return float(np.min(bounds * (bounds - gaps) / (2.0 * system.rho * gain * heaviest_push)))
+
+
+def linear_period(system: System, y: Array) -> float | None:
+    """The second rule at a feasible profile y (m,)."""
+    inverse = mobility(system)
+    if inverse is None:
+        return None
+    game, law = system.game, system.law
+    matrix = system.barrier.hessian(y) + game.pseudo_gradient_jacobian(y)
+    if isinstance(law, FullyDistributed):
+        matrix *= law.gain
+    if isinstance(law, PartialInformation):
+        neighbours = np.diff(law.graph.data.pointer)[game.agent_of_action]
+        matrix += law.coupling * np.diag(neighbours)
+    values = np.linalg.eigvals(inverse[:, None] * matrix)
+    values = values[values.real > 0]
+    return float(np.min(2.0 * values.real / np.abs(values) ** 2, initial=np.inf))

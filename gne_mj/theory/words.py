@@ -1,0 +1,230 @@
+"""Guarantees in words."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from gne_mj.theory.guarantees import CERTIFIED, CONDITIONAL, Guarantees
+
+_WIDTH = 20
+
+
+def words(guarantees: Guarantees) -> list[str]:
+    """The report on one system, line by line."""
+    g = guarantees.to_dict()
+    lines = [f"\n{g['system']['name']}: {_what(g['system'])}"]
+    for key, text in _rows(g):
+        lines.append(f"  {key:{_WIDTH}} {text}")
+    return lines
+
+
+def _what(system: dict[str, Any]) -> str:
+    return (
+        f"{system['game']} of {system['agents']} {system['agent_type']}s, {system['information']}"
+        f" information, mode {system['mode']} ({system['engine']}, {system['integrator']})"
+    )
+
+
+def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "verdict", g["status"]
+    yield "theorem", g["theorem"]["name"] or "none: the law is none of the paper's"
+    for assumption in g["theorem"]["assumptions"]:
+        yield f"[{assumption['label']}]", f"{assumption['status']}: {assumption['why']}"
+    yield from _constants(g)
+    if g["graph"] is not None:
+        graph = g["graph"]
+        yield (
+            "graph",
+            f"lambda_2 = {graph['lambda_2']:.6g}, lambda_max = {graph['lambda_max']:.6g},"
+            f" {graph['edges']} edges",
+        )
+    if g["coupling"] is not None:
+        yield from _coupling(g["coupling"])
+    if g["gain"] is not None:
+        yield "gain k", _gain(g["gain"])
+    if g["epsilon"] is not None:
+        yield "epsilon", _epsilon(g["epsilon"], g["status"])
+    start = g["start"]
+    yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
+    if start["estimates"] is not None:
+        yield "estimates' start", _estimates(start["estimates"])
+    yield "sampling", _periods(g)
+    for n, sentence in enumerate(guaranteed(g)):
+        yield "guaranteed" if n == 0 else "", sentence
+    for n, sentence in enumerate(measured(g)):
+        yield "only measured" if n == 0 else "", sentence
+    for n, sentence in enumerate(not_certified(g)):
+        yield "not certified" if n == 0 else "", sentence
+
+
+def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    constants = g["constants"]
+    for name in ("mu", "theta_1", "theta_2"):
+        constant = constants[name]
+        text = f"{_number(constant['value'], '.7g')} ({constant['label']}"
+        if constant["label"] != "sampled" and constant["sampled"] is not None:
+            text += f"; sampled {constant['sampled']:.7g}"
+        yield name, text + ")" + (f", {constants['convention']}" if name == "mu" else "")
+    yield "domain", _domain(constants)
+    instead = constants["under_partial_information"]
+    needed = constants["c_lambda_2_needed"]
+    if instead is not None and needed["rigorous"] is not None:
+        text = (
+            f"partial information would need c lambda_2 > {needed['printed']:.6g} (printed) or"
+            f" {needed['rigorous']:.6g} (rigorous), where unweighted graphs reach"
+            f" {g['system']['agents']}"
+        )
+        if instead["quadratic"] is not None:
+            text += (
+                f"; on {'its own' if instead['graph'] == 'own' else 'the complete'} graph c > {_number(instead['quadratic']['least'])}"
+                f" ({instead['label']} form) is enough"
+            )
+        yield "if partial", text
+
+
+def _domain(constants: dict[str, Any]) -> str:
+    if constants["domain"] == "everywhere":
+        return "everywhere: F is affine"
+    if constants["box"] is None:
+        return f"{constants['domain']}; no bounds of the actions are known"
+    lower, upper = constants["box"]
+    box = f"a box within [{min(lower):.6g}, {max(upper):.6g}] that holds the feasible set"
+    return box + (" and the estimates' starts" if constants["domain"] == "the box" else "")
+
+
+def _coupling(coupling: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "coupling", f"c = {coupling['gain']:g}, tau = {coupling['time_constant']:g} s"
+    texts = {
+        "printed": "mu (c lambda_2 - theta_2) > theta_2^2; no proof, since theta_1 is missing",
+        "rigorous": "4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2",
+        "quadratic": f"-dV/dt's quadratic form positive definite ({coupling['label']})",
+    }
+    for name, text in texts.items():
+        condition = coupling[name]
+        if condition is None:
+            yield f"  {name}", f"not computed: {text}"
+            continue
+        least = _number(condition["least"])
+        holds = "holds" if condition["holds"] else "does not hold"
+        if name != "printed" and not condition["certified"]:
+            holds += " with constants that are not certain"
+        yield f"  {name}", f"{holds}, needs c > {least}: {text}"
+
+
+def _gain(gain: dict[str, Any]) -> str:
+    if gain["least"] is None:
+        return f"k = {gain['gain']:g}; no k* can be given"
+    least = "any k > 0" if gain["least"] == 0 else f"any k > {gain['least']:.6g}"
+    text = f"k = {gain['gain']:g}; {least} meets k >= beta/mu"
+    if gain["decay_rate"] is not None:
+        rates = ", ".join(f"{k:g}: {rate:.3g}" for k, rate in gain["rates"])
+        text += (
+            f". As epsilon -> 0, V falls at least by exp(-r t) with r = {gain['decay_rate']:.4g} /s"
+            f" (k: r is {rates}); alpha = {gain['alpha']:.4g} with beta = k mu"
+        )
+    return text
+
+
+def _epsilon(epsilon: dict[str, Any], status: str) -> str:
+    text = f"{epsilon['given']:g} s given"
+    if status == CONDITIONAL:
+        text += "; the theorem says that some epsilon* is small enough, and computes none"
+    search = epsilon["search"]
+    if search is None:
+        return text + " (--search-epsilon tries)"
+    inside, outside = search["inside"], search["outside"]
+    text += f". By {len(search['trials'])} trial runs from this start: "
+    text += "none stayed inside" if inside is None else f"{inside:.4g} s stays inside"
+    if outside is not None:
+        text += f", {outside:.4g} s does not"
+    text += "; values between and beyond those tried are not known"
+    return text + (f" ({search['note']})" if search["note"] else "")
+
+
+def _estimates(estimates: dict[str, Any]) -> str:
+    if "margin" in estimates:
+        side = "all inside" if estimates["margin"] > 0 else "not all inside"
+        return (
+            f"{side}, least margin {estimates['margin']:.6g} (agent {estimates['agent']},"
+            f" {estimates['constraint']})"
+        )
+    return (
+        f"at most {estimates['largest_distance_from_actions']:.6g} from y(0); they may be outside"
+    )
+
+
+def _periods(g: dict[str, Any]) -> str:
+    periods = g["periods"]
+    parts = []
+    for key, name in (("push", "one push"), ("linear", "linearisation")):
+        if periods[key]["start"] is not None:
+            parts.append(
+                f"{name} {periods[key]['start']:.3g} s at the start,"
+                f" {periods[key]['equilibrium']:.3g} s at y*"
+            )
+    text = "; ".join(parts) or "no rule known for these agents"
+    text = f"held inputs need periods below (heuristics): {text}"
+    if periods["control_period"] is not None:
+        text += f"; the period here is {periods['control_period']:g} s"
+    largest = periods["largest_timestep_for_estimates"]
+    if largest is not None:
+        text += f". Estimates under {g['system']['integrator']}: steps up to {largest:.3g} s"
+        text += f", here {periods['timestep']:g} s"
+    return text
+
+
+def guaranteed(g: dict[str, Any]) -> list[str]:
+    """Sentences on what the theorem gives."""
+    bound = g["equilibrium"]
+    limit = f"an epsilon-vGNE with epsilon = p rho = {bound['p_rho']:g}"
+    if bound["p_rho_affine"] is not None:
+        limit += f" ({bound['p_rho_affine']:g} by the affine reading)"
+    limit += f", and p_i rho <= {bound['largest_own_p_rho']:g}"
+    as_long = ", as long as no input limit is met" if g["system"]["limited_inputs"] else ""
+    trust = [a["label"] for a in g["theorem"]["assumptions"] if a["status"] == "assumed"]
+    provided = f", provided {' and '.join(f'[{label}]' for label in trust)}" if trust else ""
+    if g["status"] == CERTIFIED:
+        return [
+            f"in continuous time every shared constraint holds for all time{as_long}{provided}",
+            f"y(t) tends to the penalised equilibrium, {limit}",
+            "the Lyapunov function never rises",
+        ]
+    if g["status"] == CONDITIONAL:
+        return [
+            "for all epsilon below some epsilon* > 0, in continuous time, every shared constraint"
+            f" holds for all time{as_long}{provided}",
+            f"for them the penalised equilibrium is exponentially stable, {limit}",
+        ]
+    if g["theorem"]["name"] is None:
+        return ["nothing"]
+    if not g["theorem"]["obstacles"]:
+        return ["nothing of this run; the same law in continuous time is covered by the theorem"]
+    return ["nothing"]
+
+
+def measured(g: dict[str, Any]) -> list[str]:
+    """Sentences on what a run tells beyond that."""
+    found = ["margins of all constraints, V and the distance to y*, at every integration step"]
+    if g["status"] == CERTIFIED:
+        found.append(
+            "the integrator follows continuous time up to its error, near the boundary too"
+        )
+    if g["status"] == CONDITIONAL:
+        found.append("whether the given epsilon is below epsilon*: from this start, by running")
+    return found
+
+
+def not_certified(g: dict[str, Any]) -> list[str]:
+    """Sentences on what cannot be certified, and why."""
+    found = list(g["theorem"]["obstacles"])
+    if not g["theorem"]["continuous"]:
+        what = "mode 'sampled'" if g["system"]["mode"] != "continuous" else "Euler's method"
+        found.append(f"{what}: every theorem is in continuous time, none covers this")
+    if g["status"] == CONDITIONAL:
+        found.append("that the given epsilon is small enough; and a Lyapunov function: V's decrease"
+                     " is claimed of the limit epsilon -> 0 only")  # fmt: skip
+    found.append("anything under pushes from outside, or inputs that saturate")
+    return found
+
+
+def _number(value: float | None, form: str = ".6g") -> str:
+    return "infinite or unknown" if value is None else format(value, form)
