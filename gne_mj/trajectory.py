@@ -177,7 +177,7 @@ def _dataset(
     if game.kernels is velocity:
         ahead = np.concatenate([np.full((len(y), 1), game.parameters[0]), y[:, :-1]], axis=1)
         variables["gap"] = (("time", axis), y - ahead, {**unit, "long_name": "velocity gap"})
-        variables["gap_bound"] = ((axis,), game.parameters[1:].copy(), unit)
+        variables["gap_bound"] = ((axis,), game.gap_bounds, unit)
     if samples.memory.shape[1]:
         m = game.actions
         estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
