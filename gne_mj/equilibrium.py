@@ -23,8 +23,8 @@ from gne_mj.interior_point import Free, Iterate, Path, Work
 
 TOLERANCE = 1e-12
 FIRST_RHO, LAST_RHO = 1.0, 1e-11  # of the path to rho -> 0
-# lambda_l s_l within this share of rho at the end of a path to rho -> 0: there only its order counts
-LOOSE = 0.5
+# There only the order of lambda_l s_l counts, so that it may be off by half.
+TO_ZERO = Path(FIRST_RHO, LAST_RHO, TOLERANCE, 0.5)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,8 @@ def penalised_equilibrium(
         SolverError: the tolerance was not reached.
     """
     highest = start.rho if isinstance(start, Equilibrium) else FIRST_RHO
-    return _solver(game).follow(start, max(highest, rho), rho, tolerance, tolerance)
+    rho = float(rho)
+    return _solver(game).follow(start, Path(max(highest, rho), rho, tolerance, tolerance))
 
 
 def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibrium]:
@@ -96,7 +97,7 @@ def variational_equilibrium(
     """
     if isinstance(start, Equilibrium):
         rho = max(start.rho, last_rho)
-    return _solver(game).follow(start, rho, last_rho, TOLERANCE, LOOSE)
+    return _solver(game).follow(start, TO_ZERO._replace(rho=rho, last_rho=last_rho))
 
 
 def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
@@ -105,7 +106,7 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     Found by the same path, for this agent alone; y must be strictly inside. The multipliers are
     those of the agent's own problem, zero for constraints that do not contain its action.
     """
-    return _solver(game).respond(y, agent, agent + 1)[0]
+    return _solver(game).respond(y, agent)
 
 
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
@@ -114,7 +115,9 @@ def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     At the penalised equilibrium it is at most p_i * rho, with p_i the constraints that contain
     y_i, and so at most p * rho [lemma:epsilon].
     """
-    return np.maximum(_solver(game).respond(y, 0, game.agents)[1], 0.0)
+    solver, costs = _solver(game), game.costs(y)
+    least = [solver.cost(i, solver.respond(y, i).action) for i in range(game.agents)]
+    return np.maximum(costs - least, 0.0)
 
 
 _SOLVERS: WeakKeyDictionary[Game, "Solver"] = WeakKeyDictionary()
@@ -165,27 +168,22 @@ class Solver:
             pivots=np.zeros(m, dtype=np.int64),
         )
 
-    def follow(
-        self, start: Start, rho: float, last_rho: float, tolerance: float, spread: float
-    ) -> Equilibrium:
-        """The end of the path of penalised equilibria from ``rho`` to ``last_rho``.
+    def follow(self, start: Start, path: Path) -> Equilibrium:
+        """The end of a path of penalised equilibria.
 
         Args:
-            start: where to begin, best near the equilibrium at ``rho``.
-            rho: first penalty parameter.
-            last_rho: last one, at most ``rho``.
-            tolerance: on the residual, as :class:`Equilibrium` defines it.
-            spread: how far lambda_l s_l may be from last_rho, relative to it.
+            start: where to begin, best near the path's first equilibrium.
+            path: from which rho to which, and how accurately.
 
         Raises:
+            InvalidInput: a rho that is not positive and finite.
             InfeasibleStart: ``start`` is not strictly inside.
             SolverError: the tolerance was not reached.
         """
         known = isinstance(start, Equilibrium)
         y = self._profile(start.action if isinstance(start, Equilibrium) else start)
-        if not 0.0 < last_rho <= rho < np.inf:
-            raise InvalidInput("barrier.rho", last_rho, "it must be positive and finite")
-        path = Path(float(rho), float(last_rho), tolerance, spread)
+        if not 0.0 < path.last_rho <= path.rho < np.inf:
+            raise InvalidInput("barrier.rho", path.last_rho, "it must be positive and finite")
         with self._lock:
             self._point.y[:] = y
             if isinstance(start, Equilibrium):
@@ -196,35 +194,36 @@ class Solver:
             )  # fmt: skip
             if ended != method.CONVERGED:
                 self._fail(ended, y)
-            return self._result(last_rho, self._point.y.copy(), self._point.multipliers.copy())
+            return self._result(path.last_rho, self._point.y.copy(), self._point.multipliers.copy())
 
-    def respond(
-        self, y: ArrayLike, first: int, last: int
-    ) -> tuple[Equilibrium, NDArray[np.float64]]:
-        """Best responses to y of the agents from ``first`` to ``last - 1``, and what each gains.
-
-        Every agent minimises alone, from y and nothing else that this solver knows. Returned are
-        the last agent's response and J_i(y) - min J_i of all agents, zero for those not asked.
+    def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
+        """The best response of one agent, which minimises alone, from y and nothing else.
 
         Raises:
             InfeasibleStart: y is not strictly inside.
-            SolverError: a minimiser was not found.
+            SolverError: the minimiser was not found.
         """
         y = self._profile(y)
-        response, gains = y.copy(), np.zeros(len(self._data.offsets) - 1)
-        path = Path(FIRST_RHO, LAST_RHO, TOLERANCE, LOOSE)
+        data, point, position = self._data, self._point, self._nobody.position
+        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
+        alone = Free(self._nobody.agents[agent : agent + 1], own, position)
+        block = slice(data.offsets[agent], data.offsets[agent + 1])
         with self._lock:
-            self._nobody.position.fill(-1)
-            ended = self._native.respond(
-                self._data, self._nobody, self._half_band, path, first, last, y, self._point,
-                self._work, self._report, response, gains,
-            )  # fmt: skip
+            position[block] = np.arange(block.stop - block.start)
+            point.y[:] = y
+            ended = self._native.run(
+                data, alone, self._half_band, TO_ZERO, False, point, self._work, self._report
+            )
+            position[block] = -1
             if ended != method.CONVERGED:
                 self._fail(ended, y)
-            own = slice(*self._data.own_pointer[last - 1 : last + 1])
-            multipliers = np.zeros(len(self._point.slack))
-            multipliers[self._data.own_index[own]] = self._point.multipliers[: own.stop - own.start]
-            return self._result(LAST_RHO, response, multipliers), gains
+            multipliers = np.zeros(len(point.multipliers))
+            multipliers[own] = point.multipliers[: len(own)]
+            return self._result(LAST_RHO, point.y.copy(), multipliers)
+
+    def cost(self, agent: int, y: NDArray[np.float64]) -> float:
+        """J_i(y); y of shape (m,)."""
+        return float(self._native.cost(self._data, agent, y))
 
     def _profile(self, y: ArrayLike) -> NDArray[np.float64]:
         profile = np.ascontiguousarray(y, dtype=np.float64)

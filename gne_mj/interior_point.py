@@ -318,7 +318,10 @@ def begin(game, data, free, count, path, known, point, work):
     rho = max(path.last_rho, balance(count, constraints, free, path.rho, work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
-    evaluate(game, data, free, point, work)
+        for entry in range(work.row[k], work.row[k + 1]):
+            r = free.position[work.column[entry]]
+            work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
+            work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
     return rho
 
 
@@ -380,7 +383,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
 
 @cache
 def build(game: ModuleType) -> SimpleNamespace:
-    """``run`` and ``respond`` for a game's kernels, compiled at their first call."""
+    """``run`` and ``cost`` of a game's kernels, compiled at their first call."""
     source = source_key(game)
 
     @compiled
@@ -391,28 +394,9 @@ def build(game: ModuleType) -> SimpleNamespace:
         return follow(game, data, free, half_band, path, known, point, work, report)
 
     @compiled
-    def respond(data, free, half_band, path, first, last, y, point, work, report, response, gains):
-        """Best responses to y of agents ``first`` to ``last - 1``, one after the other.
-
-        Fills their entries of response (m,) and their gains[i] = J_i(y) - min J_i. free.position
-        must be -1 throughout.
-        """
+    def cost(data, i, y):
+        """J_i(y)."""
         _ = source
-        at = data.offsets
-        copy(y, point.y)
-        for i in range(first, last):
-            own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
-            alone = Free(free.agents[i : i + 1], own, free.position)
-            for a in range(at[i], at[i + 1]):
-                free.position[a] = a - at[i]
-            ended = run(data, alone, half_band, path, False, point, work, report)
-            gains[i] = game.cost(data.parameters, i, y) - game.cost(data.parameters, i, point.y)
-            for a in range(at[i], at[i + 1]):
-                response[a] = point.y[a]
-                point.y[a] = y[a]
-                free.position[a] = -1
-            if ended != CONVERGED:
-                return ended
-        return CONVERGED
+        return game.cost(data.parameters, i, y)
 
-    return SimpleNamespace(run=run, respond=respond)
+    return SimpleNamespace(run=run, cost=cost)

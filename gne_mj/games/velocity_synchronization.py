@@ -1,9 +1,9 @@
 """Velocity synchronisation with bounded gaps along a line of robots [eq:sensorNetGNE].
 
-J_i = (y_i - y_{i-1})^2 + w_i (y_i - v_i^d)^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2 with y_0 := v_0,
-velocities in m/s. The paper's game has no desired velocities v_i^d: w = 0. Its equilibrium is v_0
-whatever the bounds are; with w_i > 0 some of them can bind. The constraints are shared: g_{i+1}
-contains y_i too, so agent i feels its follower.
+J_i = (y_i - y_{i-1})^2 + w_i (y_i - v_i^d)^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, where
+y_0 := v_0; velocities in m/s. The constraints are shared: g_{i+1} contains y_i too, so agent i
+feels its follower. The paper's game has no desired velocities v_i^d (w = 0), and the equilibrium
+v_0 whatever the bounds are; with w_i > 0 some of them can bind.
 
 Parameters q = [v_0, delta_1, ..., delta_N, v_1^d, ..., v_N^d, w_1, ..., w_N].
 """
