@@ -1,4 +1,4 @@
-"""The paper's figures from a trajectory. Reads results only."""
+"""Figures: the paper's from a trajectory, and a path of equilibria. Reads results only."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gne_mj.solve import Solution
 from gne_mj.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -58,15 +59,33 @@ def save(
     return paths
 
 
-def _figure(
-    data: "xarray.Dataset", content: Callable[["Axes", "xarray.Dataset"], None], label: str
-) -> "Figure":
+def save_path(solution: Solution, file: Path) -> None:
+    """Draw how a path of equilibria nears the variational GNE as rho falls, in log scales."""
+    rho = np.array([point.equilibrium.rho for point in solution.path])
+    lines = {
+        "distance to the vGNE": [point.distance for point in solution.path],
+        "measured $\\epsilon$": [np.max(point.gains) for point in solution.path],
+        "$p\\rho$": solution.game.constraints_count * rho,
+    }
+    plt, style = _matplotlib()
+    with plt.rc_context(style):
+        figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
+        for index, (label, values) in enumerate(lines.items()):
+            axes.loglog(rho, values, color=_COLOURS[index], linestyle=_DASHES[index], label=label)
+        axes.set_xlabel("penalty parameter $\\rho$")
+        axes.legend()
+        figure.savefig(file, dpi=200)
+    plt.close(figure)
+
+
+def _matplotlib() -> tuple[Any, dict[str, Any]]:
+    """pyplot without a display, and the style of all figures."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    style: Any = {
+    return plt, {
         "font.size": 9,
         "font.family": "serif",
         "mathtext.fontset": "cm",
@@ -80,6 +99,12 @@ def _figure(
         "legend.fontsize": 7.5,
         "svg.hashsalt": "gne-mj",
     }
+
+
+def _figure(
+    data: "xarray.Dataset", content: Callable[["Axes", "xarray.Dataset"], None], label: str
+) -> "Figure":
+    plt, style = _matplotlib()
     with plt.rc_context(style):
         figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
         content(axes, data)

@@ -26,7 +26,10 @@ def velocity(rng, count):
 
 def desired_velocity(rng, count):
     _, plain, interior = velocity(rng, count)
-    desired, weight = rng.uniform(-5, 5, count), rng.uniform(0, 3, count) * rng.integers(0, 2, count)
+    desired, weight = (
+        rng.uniform(-5, 5, count),
+        rng.uniform(0, 3, count) * rng.integers(0, 2, count),
+    )
     game = velocity_game(count, plain.v0, plain.delta, desired, weight)
     return game, reference.VelocityGame(plain.v0, plain.delta, desired, weight), interior
 
@@ -329,9 +332,7 @@ def test_a_desired_velocity_of_no_weight_changes_no_bit():
         assert np.array_equal(other.pseudo_gradient(y), 2.0 * gap)
         assert np.array_equal(game.pseudo_gradient(y), 2.0 * gap)
         assert np.array_equal(game.costs(y), gap**2)
-        assert np.array_equal(
-            game.pseudo_gradient_jacobian(y), 2.0 * (np.eye(6) - np.eye(6, k=-1))
-        )
+        assert np.array_equal(game.pseudo_gradient_jacobian(y), 2.0 * (np.eye(6) - np.eye(6, k=-1)))
 
 
 def test_the_crosstalk_of_a_channel_with_itself_is_not_used():
