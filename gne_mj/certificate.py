@@ -15,8 +15,6 @@ from gne_mj.theory import Theorem
 SUCCESSES = ("converged", "completed")
 SETTLED = 0.02  # of the initial distance
 TAIL = 0.05  # of the run, over which "converged" must hold
-# Best responses cost a Newton solve for each agent: beyond this many they are left out.
-EPSILON_AGENTS = 50
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
 
@@ -219,7 +217,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        variational = variational_equilibrium(system.game, penalised.action)
+        variational = variational_equilibrium(system.game, penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
@@ -230,12 +228,10 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     game = system.game
     affine = game.affine_constraints
-    measured = None
-    if game.agents <= EPSILON_AGENTS:
-        try:
-            measured = float(np.max(measured_epsilon(game, equilibrium.action)))
-        except SolverError:
-            measured = None
+    try:
+        measured = float(np.max(measured_epsilon(game, equilibrium.action)))
+    except SolverError:
+        measured = None
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from gne_mj.simulation import Simulation
     from gne_mj.trajectory import Trajectory
 
 app = typer.Typer(
@@ -103,6 +104,55 @@ def paper(
         for figure in sorted(out.glob("*.png")):
             print(f"figure      {figure}")
     raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def solve(
+    scenario: _SCENARIO,
+    set_: _SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Solve this system only.")
+    ] = None,
+    rho: Annotated[
+        list[float] | None,
+        typer.Option("--rho", help="In place of the scenario's penalty; may be repeated."),
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option("--path", metavar="FROM:TO:COUNT", help="Equilibria over a range of rho."),
+    ] = None,
+    out: _OUT = None,
+    as_json: _JSON = False,
+) -> None:
+    """Compute a scenario's penalised and variational equilibria, without running it.
+
+    --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
+    """
+    from gne_mj import solve as solving
+    from gne_mj.errors import InvalidInput, nearest
+
+    rhos = [] if path is None else solving.parse_path(path)
+    simulation = _load(scenario, set_, quiet=as_json)
+    systems = [each for each in simulation.systems if system in (None, each.name)]
+    if not systems:
+        names = [each.name for each in simulation.systems]
+        raise InvalidInput("--system", system, nearest(str(system), names))
+    with _working(as_json, _PREPARING):
+        solutions = [solving.solve_system(each, rho or (), rhos) for each in systems]
+    report = json.dumps({each.name: each.to_dict() for each in solutions}, indent=2)
+    with _results(out, replace=False) as folder:
+        if folder is not None:
+            (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+            if path is not None:
+                from gne_mj import plots
+
+                for each in solutions:
+                    solving.write_path(each, folder / f"{each.name}-path.csv")
+                    plots.save_path(each, folder / f"{each.name}-path.png")
+    if as_json:
+        print(report)
+    else:
+        print("\n\n".join("\n".join(solving.summary(each)) for each in solutions))
 
 
 @app.command()
@@ -248,6 +298,13 @@ def _fail(message: str, status: str | None = None) -> None:
     sys.exit(2)
 
 
+def _load(scenario: str, changes: list[str] | None, *, quiet: bool) -> "Simulation":
+    from gne_mj.scenario import load_scenario
+
+    with _working(quiet, _PREPARING):
+        return load_scenario(scenario, _settings(changes)).simulation_object()
+
+
 def _simulate(
     scenario: str,
     changes: list[str] | None,
@@ -257,11 +314,9 @@ def _simulate(
     replace: bool = False,
     figures: tuple[str, ...] = (),
 ) -> "Trajectory":
-    from gne_mj.scenario import load_scenario
     from gne_mj.simulation import interruption
 
-    with _working(quiet, _PREPARING):
-        simulation = load_scenario(scenario, _settings(changes)).simulation_object()
+    simulation = _load(scenario, changes, quiet=quiet)
     # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
     with (
         interruption(),

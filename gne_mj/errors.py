@@ -48,6 +48,8 @@ class EngineError(GneError, RuntimeError):
 class SolverError(GneError, RuntimeError):
     """An iteration ended without reaching its tolerance; the numbers are attributes."""
 
+    status = "not_solved"
+
     def __init__(self, message: str, residual: float, iterations: int) -> None:
         self.residual, self.iterations = residual, iterations
         super().__init__(f"{message} (residual {residual:.3g} after {iterations} iterations)")

@@ -1,4 +1,6 @@
-"""Figures from a trajectory: the actions, and what the game derives from them. Reads results only.
+"""Figures: actions and derived quantities of a trajectory, and a path of equilibria.
+
+Reads results only.
 
 What is drawn follows from the trajectory alone, so a game of one's own is drawn like any other.
 """
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.solve import Solution
 from gne_mj.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -75,6 +78,29 @@ def save(
             paths.append(path)
         plt.close(figure)
     return paths
+
+
+def save_path(solution: Solution, file: Path) -> None:
+    """Draw how a path of equilibria nears the variational GNE as rho falls, in log scales."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    rho = np.array([point.equilibrium.rho for point in solution.path])
+    lines = {
+        "distance to the vGNE": [point.distance for point in solution.path],
+        "measured $\\epsilon$": [np.max(point.gains) for point in solution.path],
+        "$p\\rho$": solution.game.constraints_count * rho,
+    }
+    with plt.rc_context(_STYLE):
+        figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
+        for index, (label, values) in enumerate(lines.items()):
+            axes.loglog(rho, values, label=label, **_line_style(index))
+        axes.set_xlabel("penalty parameter $\\rho$")
+        axes.legend()
+        figure.savefig(file, dpi=200)
+    plt.close(figure)
 
 
 def _plural(noun: str) -> str:

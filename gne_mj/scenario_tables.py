@@ -71,11 +71,21 @@ class VelocityGame(_Table):
     type: Literal["velocity-synchronization"]
     reference_velocity: float = Field(3.0, description="v_0 in m/s")
     gap_bound: PerAgent = Field(3.0, description="delta_i in m/s, positive")
+    desired_velocity: PerAgent | None = Field(
+        None, description="v_i^d in m/s; the reference velocity if left out"
+    )
+    desired_weight: PerAgent = Field(0.0, description="w_i, not negative")
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
-        bound = _per_agent("game.gap_bound", self.gap_bound, count, positive=True)
-        return velocity_game(count, self.reference_velocity, bound)
+        desired = self.desired_velocity
+        return velocity_game(
+            count,
+            self.reference_velocity,
+            _per_agent("game.gap_bound", self.gap_bound, count, positive=True),
+            None if desired is None else _per_agent("game.desired_velocity", desired, count),
+            _per_agent("game.desired_weight", self.desired_weight, count),
+        )
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """The named start for five agents; else everyone half a bound below the reference."""

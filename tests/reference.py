@@ -31,14 +31,18 @@ COMPLEX_STEP = 1e-30
 class VelocityGame:
     """Velocity synchronisation [eq:sensorNetGNE]: a chain of followers behind a reference.
 
-    J_i = (y_i - y_{i-1})^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, with the reference v0 before
-    agent 0. The constraints are shared, so y_i occurs in constraints i and i + 1.
+    J_i = (y_i - y_{i-1})^2 + w_i (y_i - d_i)^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, with the
+    reference v0 before agent 0. The constraints are shared, so y_i occurs in constraints i and
+    i + 1.
 
-    v0: float, m/s. delta: (N,) bounds on the velocity gaps, m/s.
+    v0: float, m/s. delta: (N,) bounds on the velocity gaps, m/s. desired d: (N,), m/s, and
+    weight w: (N,), which the paper's game does not have.
     """
 
-    def __init__(self, v0, delta):
+    def __init__(self, v0, delta, desired=None, weight=None):
         self.v0 = float(v0)
+        self.desired = np.zeros(len(delta)) if desired is None else np.array(desired, dtype=float)
+        self.weight = np.zeros(len(delta)) if weight is None else np.array(weight, dtype=float)
         self.delta = np.array(delta, dtype=float)
         self.N = len(self.delta)
         self.p = self.N
@@ -50,11 +54,11 @@ class VelocityGame:
 
     def cost(self, i, y):
         """J_i(y) [eq:sensorNetGNE], a scalar. y: (N,)."""
-        return self.gap(i, y) ** 2
+        return self.gap(i, y) ** 2 + self.weight[i] * (y[i] - self.desired[i]) ** 2
 
     def partial_gradient(self, i, y):
         """dJ_i/dy_i at y [eq:sensorNetGNE], a scalar. y: (N,)."""
-        return 2 * self.gap(i, y)
+        return 2 * self.gap(i, y) + 2 * self.weight[i] * (y[i] - self.desired[i])
 
     def constraint(self, l, y):  # noqa: E741
         """g_l(y) [eq:sensorNetGNE], a scalar, negative inside. y: (N,)."""

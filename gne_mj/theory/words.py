@@ -74,8 +74,9 @@ def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f" {g['system']['agents']}"
         )
         if instead["quadratic"] is not None:
+            which = "its own" if instead["graph"] == "own" else "the complete"
             text += (
-                f"; on {'its own' if instead['graph'] == 'own' else 'the complete'} graph c > {_number(instead['quadratic']['least'])}"
+                f"; on {which} graph c > {_number(instead['quadratic']['least'])}"
                 f" ({instead['label']} form) is enough"
             )
         yield "if partial", text
