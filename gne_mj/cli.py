@@ -142,7 +142,10 @@ def _options(
 
 
 def main() -> None:
-    """Entry point: an error meant for the user is one sentence on stderr, and exit status 2."""
+    """Entry point: an error meant for the user is one sentence on stderr.
+
+    The exit status is 2, but 1 where a function of the user's own fails.
+    """
     try:
         app()
     except BrokenPipeError:
@@ -150,18 +153,19 @@ def main() -> None:
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:
-        from gne_mj.errors import GneError
+        from gne_mj.errors import GneError, UserCodeError
 
         if not isinstance(error, GneError):
             raise
-        _fail(str(error), getattr(error, "status", None))
+        code = 1 if isinstance(error, UserCodeError) else 2
+        _fail(str(error), getattr(error, "status", None), code)
 
 
-def _fail(message: str, status: str | None = None) -> None:
+def _fail(message: str, status: str | None = None, code: int = 2) -> None:
     if "--json" in sys.argv:
         print(json.dumps({"status": status or "invalid_input", "message": message}))
     print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def _simulate(

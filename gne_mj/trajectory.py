@@ -178,7 +178,13 @@ def _dataset(
         ahead = np.concatenate([np.full((len(y), 1), game.parameters[0]), y[:, :-1]], axis=1)
         variables["gap"] = (("time", axis), y - ahead, {**unit, "long_name": "velocity gap"})
         variables["gap_bound"] = ((axis,), game.parameters[1:].copy(), unit)
-    if samples.memory.shape[1]:
+    if samples.memory.shape[1] and system.law.information == "custom":
+        variables["memory"] = (
+            ("time", "memory_entry"),
+            samples.memory,
+            {"long_name": "the law's memory"},
+        )
+    elif samples.memory.shape[1]:
         m = game.actions
         estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
         owner = game.agent_of_action

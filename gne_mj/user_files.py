@@ -4,7 +4,8 @@ A game's file has ``game(count, **parameters)``, which returns a :class:`gne_mj.
 functions are plain ones or all kernels (see :mod:`gne_mj.game` for their names). A law's file has
 ``law(game, graph, **parameters)``, which returns a :class:`gne_mj.controllers.Law`, or the plain
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
-for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``.
+for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; all of them take
+the scenario's parameters too, by name.
 """
 
 import hashlib
@@ -20,6 +21,14 @@ from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import GneError, InvalidInput
 from gne_mj.game import Game
 from gne_mj.graph import Graph
+from gne_mj.plain import check_arguments
+
+# What the functions of a plain law are called, and take besides the scenario's parameters
+_LAW_FUNCTIONS = {
+    "action": ("game", "rho", "y", "memory"),
+    "rate": ("game", "rho", "y", "memory"),
+    "initial_memory": ("y",),
+}
 
 
 def load_game(path: str | Path, count: int, parameters: Mapping[str, Any]) -> Game:
@@ -63,12 +72,13 @@ def load_law(
         raise InvalidInput(
             "controller.file", str(path), "it must define law(game, graph, ...) or action(...)"
         )
-    functions = {
-        name: partial(getattr(module, name), **parameters)
-        for name in ("action", "rate")
-        if hasattr(module, name)
-    }
-    return PlainLaw(game, memory=getattr(module, "initial_memory", None), **functions)
+    functions = {}
+    for name, arguments in _LAW_FUNCTIONS.items():
+        if hasattr(module, name):
+            function = partial(getattr(module, name), **parameters)
+            check_arguments("controller.parameters", Path(path).name, function, name, arguments)
+            functions[name] = function
+    return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
 
 
 def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
