@@ -7,7 +7,7 @@ The functions get NumPy arrays and the game as a Python object, and run in every
 import sys
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,8 +34,6 @@ class PlainLaw(Law):
         rate: ``rate(game, rho, y, memory)`` returns the memory's rate; needed with a memory only.
         memory: the memory at the start, as a function of y(0), or None for a static law.
     """
-
-    information: ClassVar[str] = "custom"
 
     def __init__(
         self,

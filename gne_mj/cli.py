@@ -155,6 +155,11 @@ def main() -> None:
     except Exception as error:
         from gne_mj.errors import GneError, UserCodeError
 
+        if type(error).__module__.startswith("numba"):
+            from gne_mj.user_files import compiler_complaint
+
+            if (complaint := compiler_complaint(error)) is not None:
+                _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
             raise
         code = 1 if isinstance(error, UserCodeError) else 2
@@ -314,7 +319,9 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
         "settling time": "not settled" if settling is None else f"{settling:.4g} s",
         "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
         + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": ("never rose" if lyapunov["monotone"] else "rose")
+        "Lyapunov function": "not known of MJCF robots"
+        if not lyapunov["known"]
+        else ("never rose" if lyapunov["monotone"] else "rose")
         + f" (largest rise {lyapunov['largest_rise']:.2g}; "
         + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"

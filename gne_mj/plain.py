@@ -14,7 +14,7 @@ plain function only reads are handed to it read-only, and are valid during the c
 import ctypes
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -132,7 +132,7 @@ def is_plain(module: ModuleType) -> bool:
         if name not in found:
             if not natives and name in _OPTIONAL:
                 continue
-            raise InvalidInput("game.kernels", file, f"it must define {call_text(name, arguments)}")
+            raise InvalidInput("game.kernels", file, f"it must define {_call(name, arguments)}")
         if natives and name not in natives:
             raise InvalidInput(
                 "game.kernels",
@@ -145,19 +145,23 @@ def is_plain(module: ModuleType) -> bool:
 
 
 def check_arguments(
-    key: str, file: str, function: Any, name: str, arguments: tuple[str, ...]
+    key: str,
+    file: str,
+    function: Any,
+    name: str,
+    arguments: tuple[str, ...],
+    parameters: Iterable[str] = (),
 ) -> None:
-    """Refuse a user's function that cannot be called with these positional arguments."""
+    """Refuse a user's function that cannot take these arguments, and parameters by name."""
     try:
-        inspect.signature(function).bind(*arguments)
+        inspect.signature(function).bind(*arguments, **dict.fromkeys(parameters))
     except TypeError as error:
         raise InvalidInput(
-            key, file, f"its function must be {call_text(name, arguments)}: {error}"
+            key, file, f"it must define {_call(name, (*arguments, *parameters))}: {error}"
         ) from None
 
 
-def call_text(name: str, arguments: tuple[str, ...]) -> str:
-    """How a function is called, for messages."""
+def _call(name: str, arguments: tuple[str, ...]) -> str:
     return f"{name}({', '.join(arguments)})"
 
 

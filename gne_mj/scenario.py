@@ -127,12 +127,12 @@ def _first(error: ValidationError) -> InvalidInput:
     """The first of pydantic's complaints as one sentence."""
     details = error.errors()
     detail = details[0]
-    if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
-        # of "one number or a list of them" the user meant the list
+    if detail["loc"][-1] in ("float", "str") and isinstance(detail["input"], list):
+        # of "one or a list of them" the user meant the list
         detail = details[1]
     tags = {"velocity-synchronization", "osnr", "flexible-robot", "integrator", "pi-cascade",
-            "mixed", "mjcf-robot", "full", "partial", "distributed", "custom", "float", "list",
-            "literal"}  # fmt: skip
+            "mixed", "mjcf-robot", "full", "partial", "distributed", "custom", "float", "str",
+            "list", "literal"}  # fmt: skip
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})

@@ -16,6 +16,8 @@ from gne_mj.native import kernel
 
 def game(count, capacity, slope, weight, wanted):
     """The game of ``count`` vehicles; weight and wanted list one number for each."""
+    if not len(weight) == len(wanted) == count:
+        raise ValueError(f"weight and wanted must list {count} numbers each")
     everyone = list(range(count))
     return Game(
         name="charging",
