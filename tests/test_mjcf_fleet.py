@@ -151,7 +151,7 @@ GRAVITY = """
 
 def pendulums(folder):
     robots = []
-    for i, (angle, springref, length) in enumerate([("degree", 30, 1), ("radian", 0.4, 0.5)]):
+    for angle, springref, length in (("degree", 30, 1), ("radian", 0.4, 0.5)):
         path = folder / f"{angle}.xml"
         path.write_text(GRAVITY.format(angle=angle, springref=springref, length=length))
         robots.append(RobotFile(path, "roll", "drive"))

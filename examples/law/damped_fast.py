@@ -20,8 +20,6 @@ DAMPING, TAU, GAINS = COUNT, COUNT + 1, COUNT + 2
 class Damped(Law):
     """The law with its numbers."""
 
-    information = "custom"
-
     def __init__(self, gains, damping, tau):
         self.gains, self.damping, self.tau = gains, damping, tau
 
