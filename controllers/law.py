@@ -31,12 +31,12 @@ class Law(ABC):
     """A feedback law of one information structure.
 
     Attributes:
-        information: name of the information structure.
+        information: name of the information structure; "custom" if it is none of the paper's.
         graph: over which agents communicate; None if they need not.
         propagates: whether its memory can be propagated, as mode sampled needs.
     """
 
-    information: ClassVar[str]
+    information: ClassVar[str] = "custom"
     graph: Graph | None = None
     propagates: bool = True
 

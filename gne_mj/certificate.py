@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
+from gne_mj.plants import mjcf_robot
 from gne_mj.system import System
 from gne_mj.theory import Theorem
 
@@ -30,9 +31,9 @@ class Certificate:
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
-        lyapunov: V^{x*} over the run, and whether the theory claims that it never rises: for
-            full information in mode continuous (not by Euler's method, which is far from continuous
-            time), passive agents and no limit met.
+        lyapunov: V^{x*} over the run, whether it is known (not of MJCF robots), and whether the
+            theory claims that it never rises: for full information in mode continuous (not by
+            Euler's method, which is far from continuous time), passive agents and no limit met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """
@@ -256,6 +257,7 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     claimed = unhindered and Theorem(system).lyapunov
     return {
         "claimed": claimed,
+        "known": agents.kind is not mjcf_robot,
         "start": start,
         "final": float(monitor[watch.STORAGE]),
         "largest_rise": rise,

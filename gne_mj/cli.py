@@ -276,7 +276,10 @@ def _options(
 
 
 def main() -> None:
-    """Entry point: an error meant for the user is one sentence on stderr, and exit status 2."""
+    """Entry point: an error meant for the user is one sentence on stderr.
+
+    The exit status is 2, but 1 where a function of the user's own fails.
+    """
     try:
         app()
     except BrokenPipeError:
@@ -284,18 +287,24 @@ def main() -> None:
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:
-        from gne_mj.errors import GneError
+        from gne_mj.errors import GneError, UserCodeError
 
+        if type(error).__module__.startswith("numba"):
+            from gne_mj.user_files import compiler_complaint
+
+            if (complaint := compiler_complaint(error)) is not None:
+                _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
             raise
-        _fail(str(error), getattr(error, "status", None))
+        code = 1 if isinstance(error, UserCodeError) else 2
+        _fail(str(error), getattr(error, "status", None), code)
 
 
-def _fail(message: str, status: str | None = None) -> None:
+def _fail(message: str, status: str | None = None, code: int = 2) -> None:
     if "--json" in sys.argv:
         print(json.dumps({"status": status or "invalid_input", "message": message}))
     print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def _load(scenario: str, changes: list[str] | None, *, quiet: bool) -> "Simulation":
@@ -456,7 +465,9 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
         "settling time": "not settled" if settling is None else f"{settling:.4g} s",
         "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
         + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": ("never rose" if lyapunov["monotone"] else "rose")
+        "Lyapunov function": "not known of MJCF robots"
+        if not lyapunov["known"]
+        else ("never rose" if lyapunov["monotone"] else "rose")
         + f" (largest rise {lyapunov['largest_rise']:.2g}; "
         + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"

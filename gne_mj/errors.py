@@ -1,7 +1,11 @@
 """Errors that the package raises on purpose; each message is one sentence a user can act on."""
 
 import difflib
-from collections.abc import Iterable
+import traceback
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 
 class GneError(Exception):
@@ -39,6 +43,31 @@ class InfeasibleStart(GneError, ValueError):
             f" '{constraint}' has g = {value + 0.0:.6g} (margin {0.0 - value:.6g}); it must be"
             " negative"
         )
+
+
+class UserCodeError(GneError, RuntimeError):
+    """A function of the user's own raised, or returned something of no use; the cause is chained.
+
+    Args:
+        function: the user's.
+        error: what it raised, or a sentence about what it returned.
+    """
+
+    status = "user_code_failed"
+
+    def __init__(self, function: Callable[..., Any], error: Exception | str) -> None:
+        inner = function.func if isinstance(function, partial) else function
+        name = getattr(inner, "__name__", repr(inner))
+        code = getattr(inner, "__code__", None)
+        where = f"{name}: "
+        if code is not None:
+            line = code.co_firstlineno
+            if isinstance(error, Exception):  # the deepest line of the user's own file
+                lines = traceback.extract_tb(error.__traceback__)
+                line = next((f.lineno for f in lines[::-1] if f.filename == code.co_filename), line)
+            where = f"{Path(code.co_filename).name}, line {line}, in {name}: "
+        what = f"{type(error).__name__}: {error}" if isinstance(error, Exception) else error
+        super().__init__(where + " ".join(what.split()))
 
 
 class EngineError(GneError, RuntimeError):

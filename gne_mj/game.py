@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import is_plain, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
@@ -56,29 +57,35 @@ class GameData(NamedTuple):
 class Game:
     """A generalized game [eq:GNE].
 
-    Args:
-        name: what the game is called in messages and files.
-        kernels: module of kernels, as in this module's table; or of plain Python functions of
-            the same names, which is slow and may lack the two second derivatives.
-        parameters: q, flat.
-        sizes: m_i of each agent.
-        in_cost: for each agent the agents that appear in its cost.
-        in_constraint: for each constraint the agents that appear in it.
-        constraint_names: one name for each constraint, used in messages and files.
-        action_name: what an action is, e.g. "velocity".
-        action_unit: its unit.
-        affine: whether F is an affine map, so that its Jacobian is the same everywhere.
-        box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
-        jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
-            every entry of dF/dy over it, each (m, m).
-        row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
-            rows lies between the two that the bounds' entries make up.
-        gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
-        affine_constraints: how many affine constraints describe the same set by the same barrier,
-            where the game's own are not affine; None if none do.
-        agent_name: what an agent is, e.g. "robot".
-        axes: names of the entries of an agent's action; "1", "2", ... if left out.
-        quantities: what follows from the actions and is recorded and drawn beside them.
+        Args:
+            name: what the game is called in messages and files.
+            kernels: module of kernels, as in this module's table; or of plain Python functions of
+                the same names, which is slow and may lack the two second derivatives.
+            parameters: q, flat.
+            sizes: m_i of each agent.
+            in_cost: for each agent the agents that appear in its cost.
+            in_constraint: for each constraint the agents that appear in it.
+            constraint_names: one name for each constraint, used in messages and files.
+            action_name: what an action is, e.g. "velocity".
+            action_unit: its unit.
+            affine: whether F is an affine map, so that its Jacobian is the same everywhere.
+            box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
+            jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
+                every entry of dF/dy over it, each (m, m).
+            row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
+                rows lies between the two that the bounds' entries make up.
+            gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
+    <<<<<<< HEAD
+            affine_constraints: how many affine constraints describe the same set by the same barrier,
+                where the game's own are not affine; None if none do.
+            agent_name: what an agent is, e.g. "robot".
+            axes: names of the entries of an agent's action; "1", "2", ... if left out.
+            quantities: what follows from the actions and is recorded and drawn beside them.
+    =======
+
+        Raises:
+            InvalidInput: what does not fit together, before native code would read beyond an array.
+    >>>>>>> examples
     """
 
     name: str
@@ -101,6 +108,7 @@ class Game:
     quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
+        self._check()
         if is_plain(self.kernels):
             kernels, addresses, kept = plain_kernels(
                 self.kernels, np.asarray(self.parameters, dtype=np.float64)
@@ -108,6 +116,33 @@ class Game:
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
             object.__setattr__(self, "_kept", kept)
+
+    def _check(self) -> None:
+        count = len(self.sizes)
+        if not count or any(size < 1 for size in self.sizes):
+            raise InvalidInput("game.sizes", self.sizes, "it must list a positive size an agent")
+        if len(self.in_cost) != count:
+            raise InvalidInput(
+                "game.in_cost", f"{len(self.in_cost)} lists", f"there must be {count}, one an agent"
+            )
+        constraints = len(self.in_constraint)
+        if not constraints or len(self.constraint_names) != constraints:
+            raise InvalidInput(
+                "game.in_constraint",
+                f"{constraints} lists and {len(self.constraint_names)} constraint_names",
+                "there must be as many of both, and at least one",
+            )
+        for key in ("in_cost", "in_constraint"):
+            for members in getattr(self, key):
+                inside = min(members, default=0) >= 0 and max(members, default=0) < count
+                if not inside or len(set(members)) != len(members):
+                    raise InvalidInput(
+                        f"game.{key}",
+                        list(members),
+                        f"agents are numbered from 0 to {count - 1}, each at most once in a list",
+                    )
+        if not all(len(members) for members in self.in_constraint):
+            raise InvalidInput("game.in_constraint", [], "every constraint contains an agent")
 
     @property
     def agents(self) -> int:
@@ -181,12 +216,14 @@ class Game:
         """dF/dy, shape (m, m), at one profile y of shape (m,)."""
         out = np.zeros((self.actions, self.actions))
         _native(self.kernels).pseudo_gradient_jacobian(self.data, self._profile(y), out)
+        raise_pending()
         return out
 
     def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dg/dy, shape (p, m), at one profile y of shape (m,)."""
         out = np.zeros((self.constraints_count, self.actions))
         _native(self.kernels).constraint_jacobian(self.data, self._profile(y), out)
+        raise_pending()
         return out
 
     def weighted_constraint_hessian(self, y: ArrayLike, weights: ArrayLike) -> NDArray[np.float64]:
@@ -196,6 +233,7 @@ class Game:
         if weights.shape != (self.constraints_count,):
             raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
         _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
+        raise_pending()
         return out
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:

@@ -414,12 +414,7 @@ class CustomController(_NetworkController):
 
     def build(self, game: Game) -> Law:
         """The law."""
-        law = load_law(self.file, game, self.network(game.agents), self.parameters)
-        if self.mode == "sampled" and not law.propagates:
-            raise InvalidInput(
-                "controller.mode", self.mode, "a plain law with a memory runs in mode 'continuous'"
-            )
-        return law
+        return load_law(self.file, game, self.network(game.agents), self.parameters)
 
 
 class PlantTable(_Table):

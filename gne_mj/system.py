@@ -121,6 +121,12 @@ class System:
                 self.law.graph.agents,
                 f"the game has {self.game.agents} agents",
             )
+        if self.mode == "sampled" and not self.law.propagates:
+            raise InvalidInput(
+                f"systems.{self.name}.controller.mode",
+                self.mode,
+                "a plain law with a memory runs in mode 'continuous'",
+            )
         if not np.all(np.isfinite(self.state)):
             raise InvalidInput(
                 f"systems.{self.name}.initial", "nan or inf", "every entry must be finite"
@@ -228,6 +234,11 @@ class System:
         Raises:
             InvalidInput: a step that the estimates' dynamics do not allow.
         """
+        loop = self._closed_loop(clock)
+        loop.keeps = self
+        return loop
+
+    def _closed_loop(self, clock: Clock) -> ClosedLoop:
         self._check_step(clock)
         rest = self.agents.equilibrium(self.equilibrium.action)
         problem = Problem(
@@ -248,10 +259,14 @@ class System:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
 
+<<<<<<< HEAD
             plant = self._mujoco_plant(
                 clock.timestep, *room(self.game, self.agents, len(self.memory), mode)
             )
             plant.reset(self.state)
+=======
+            plant = self._mujoco_plant(clock.timestep, room(self.game, self.agents))
+>>>>>>> examples
             return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
         kind = self.agents.kind
@@ -265,17 +280,32 @@ class System:
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
         return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
 
+<<<<<<< HEAD
     def _mujoco_plant(
         self, timestep: float, userdata: int, memory: int
     ) -> "MujocoPlant | MjcfPlant":
+=======
+    def _mujoco_plant(self, timestep: float, userdata: int) -> "MujocoPlant | MjcfPlant":
+        """The fleet, reset to the start."""
+>>>>>>> examples
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
         if not isinstance(self.agents, MjcfRobots):
-            return MujocoPlant(
+            fleet = MujocoPlant(
                 self.agents, timestep, self.integrator, userdata=userdata, memory=memory
             )
-        plant = MjcfPlant(self.agents, timestep, self.integrator, userdata=userdata, memory=memory)
+            fleet.reset(self.state)
+            return fleet
+        try:
+            plant = MjcfPlant(
+                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
+            )
+            plant.reset(self.state)
+        except InvalidInput as error:
+            raise InvalidInput(
+                f"systems.{self.name}.{error.key}", error.value, error.expected
+            ) from None
         if (
             not plant.measures_every_stage
             and self.mode == "continuous"
