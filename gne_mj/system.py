@@ -134,8 +134,15 @@ class System:
                 names[worst],
                 value,
             )
+        expected = self.law.initial_memory(self.start)
         if not len(self.memory):
-            object.__setattr__(self, "memory", self.law.initial_memory(self.start))
+            object.__setattr__(self, "memory", expected)
+        elif self.memory.shape != expected.shape:
+            raise InvalidInput(
+                f"systems.{self.name}.memory",
+                f"shape {self.memory.shape}",
+                f"the {self.law.information} law's memory has shape {expected.shape}",
+            )
         self._check_memory()
         self._check_engine()
 
@@ -206,7 +213,7 @@ class System:
                 clock.timestep,
                 f"the estimates of '{self.name}' follow each other at up to"
                 f" {STABLE[self.integrator] / largest:.4g} /s, which '{self.integrator}' can follow"
-                f" with steps of at most {largest:.3g} s; {others}",
+                f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
             )
 
     @property
@@ -282,3 +289,9 @@ class System:
                 " integrator 'euler', or name a joint",
             )
         return plant
+
+
+def _rounded_down(value: float) -> float:
+    """To three digits: what a message names as the largest must itself be accepted."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 2)
+    return float(np.floor(value / unit) * unit)
