@@ -106,12 +106,12 @@ def initial_estimates(
     agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
 ) -> NDArray[np.float64]:
     """All agents' estimates at the start, flat (N m,); see :meth:`Law.initial_memory`."""
-    given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
     m = len(y)
+    expected = f"it must be one number, a list of {m}, or {agents} lists of {m}"
+    try:
+        given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
+    except ValueError:
+        raise InvalidInput("initial.estimate", "lists of different lengths", expected) from None
     if given.shape not in ((), (m,), (agents, m)):
-        raise InvalidInput(
-            "initial.estimate",
-            f"shape {given.shape}",
-            f"it must be one number, a list of {m}, or {agents} lists of {m}",
-        )
+        raise InvalidInput("initial.estimate", f"shape {given.shape}", expected)
     return np.broadcast_to(given, (agents, m)).astype(np.float64).ravel()

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
-from gne_mj.plants import mjcf_robot
 from gne_mj.system import System
 from gne_mj.theory import Theorem
 
@@ -257,7 +256,7 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     claimed = unhindered and Theorem(system).lyapunov
     return {
         "claimed": claimed,
-        "known": agents.kind is not mjcf_robot,
+        "known": system.agents.knows_storage,
         "start": start,
         "final": float(monitor[watch.STORAGE]),
         "largest_rise": rise,

@@ -57,35 +57,32 @@ class GameData(NamedTuple):
 class Game:
     """A generalized game [eq:GNE].
 
-        Args:
-            name: what the game is called in messages and files.
-            kernels: module of kernels, as in this module's table; or of plain Python functions of
-                the same names, which is slow and may lack the two second derivatives.
-            parameters: q, flat.
-            sizes: m_i of each agent.
-            in_cost: for each agent the agents that appear in its cost.
-            in_constraint: for each constraint the agents that appear in it.
-            constraint_names: one name for each constraint, used in messages and files.
-            action_name: what an action is, e.g. "velocity".
-            action_unit: its unit.
-            affine: whether F is an affine map, so that its Jacobian is the same everywhere.
-            box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
-            jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
-                every entry of dF/dy over it, each (m, m).
-            row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
-                rows lies between the two that the bounds' entries make up.
-            gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
-    <<<<<<< HEAD
-            affine_constraints: how many affine constraints describe the same set by the same barrier,
-                where the game's own are not affine; None if none do.
-            agent_name: what an agent is, e.g. "robot".
-            axes: names of the entries of an agent's action; "1", "2", ... if left out.
-            quantities: what follows from the actions and is recorded and drawn beside them.
-    =======
+    Args:
+        name: what the game is called in messages and files.
+        kernels: module of kernels, as in this module's table; or of plain Python functions of
+            the same names, which is slow and may lack the two second derivatives.
+        parameters: q, flat.
+        sizes: m_i of each agent.
+        in_cost: for each agent the agents that appear in its cost.
+        in_constraint: for each constraint the agents that appear in it.
+        constraint_names: one name for each constraint, used in messages and files.
+        action_name: what an action is, e.g. "velocity".
+        action_unit: its unit.
+        affine: whether F is an affine map, so that its Jacobian is the same everywhere.
+        box: (lower, upper), each (m,): bounds of every action that the shared constraints imply.
+        jacobian_bounds: for an F that is not affine, maps such a box to (lower, upper) bounds of
+            every entry of dF/dy over it, each (m, m).
+        row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
+            rows lies between the two that the bounds' entries make up.
+        gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
+        affine_constraints: how many affine constraints describe the same set by the same barrier,
+            where the game's own are not affine; None if none do.
+        agent_name: what an agent is, e.g. "robot".
+        axes: names of the entries of an agent's action; "1", "2", ... if left out.
+        quantities: what follows from the actions and is recorded and drawn beside them.
 
-        Raises:
-            InvalidInput: what does not fit together, before native code would read beyond an array.
-    >>>>>>> examples
+    Raises:
+        InvalidInput: what does not fit together, before native code would read beyond an array.
     """
 
     name: str

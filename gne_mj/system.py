@@ -143,8 +143,15 @@ class System:
                 names[worst],
                 value,
             )
+        expected = self.law.initial_memory(self.start)
         if not len(self.memory):
-            object.__setattr__(self, "memory", self.law.initial_memory(self.start))
+            object.__setattr__(self, "memory", expected)
+        elif self.memory.shape != expected.shape:
+            raise InvalidInput(
+                f"systems.{self.name}.memory",
+                f"shape {self.memory.shape}",
+                f"the {self.law.information} law's memory has shape {expected.shape}",
+            )
         self._check_memory()
         self._check_engine()
 
@@ -215,7 +222,7 @@ class System:
                 clock.timestep,
                 f"the estimates of '{self.name}' follow each other at up to"
                 f" {STABLE[self.integrator] / largest:.4g} /s, which '{self.integrator}' can follow"
-                f" with steps of at most {largest:.3g} s; {others}",
+                f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
             )
 
     @property
@@ -259,14 +266,9 @@ class System:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
 
-<<<<<<< HEAD
             plant = self._mujoco_plant(
                 clock.timestep, *room(self.game, self.agents, len(self.memory), mode)
             )
-            plant.reset(self.state)
-=======
-            plant = self._mujoco_plant(clock.timestep, room(self.game, self.agents))
->>>>>>> examples
             return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
         kind = self.agents.kind
@@ -280,14 +282,10 @@ class System:
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
         return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
 
-<<<<<<< HEAD
     def _mujoco_plant(
         self, timestep: float, userdata: int, memory: int
     ) -> "MujocoPlant | MjcfPlant":
-=======
-    def _mujoco_plant(self, timestep: float, userdata: int) -> "MujocoPlant | MjcfPlant":
         """The fleet, reset to the start."""
->>>>>>> examples
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
@@ -318,3 +316,9 @@ class System:
                 " integrator 'euler', or name a joint",
             )
         return plant
+
+
+def _rounded_down(value: float) -> float:
+    """To three digits: what a message names as the largest must itself be accepted."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 2)
+    return float(np.floor(value / unit) * unit)

@@ -164,7 +164,6 @@ def _dataset(
         ),
         "equilibrium": ((axis,), system.equilibrium.action, {**unit, "long_name": "y*"}),
     }
-<<<<<<< HEAD
     for index, (name, state_unit) in enumerate(kind.STATES):
         if index != kind.OUTPUT:
             attributes = {"units": state_unit or game.action_unit}
@@ -180,20 +179,6 @@ def _dataset(
         )
         for name, bound in quantity.bounds(entries).items():
             variables[name] = (dimensions, bound, units)
-    if samples.memory.shape[1]:
-=======
-    if robots:
-        states = dict(enumerate(kind.STATES))
-        for index, name in ((3, "position"), (0, "extension")):
-            variables[name] = (
-                ("time", axis),
-                samples.state[:, :, index],
-                {"units": states[index][1]},
-            )
-    if game.kernels is velocity:
-        ahead = np.concatenate([np.full((len(y), 1), game.parameters[0]), y[:, :-1]], axis=1)
-        variables["gap"] = (("time", axis), y - ahead, {**unit, "long_name": "velocity gap"})
-        variables["gap_bound"] = ((axis,), game.parameters[1:].copy(), unit)
     if samples.memory.shape[1] and system.law.information == "custom":
         variables["memory"] = (
             ("time", "memory_entry"),
@@ -201,7 +186,6 @@ def _dataset(
             {"long_name": "the law's memory"},
         )
     elif samples.memory.shape[1]:
->>>>>>> examples
         m = game.actions
         estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
         owner = game.agent_of_action
