@@ -31,12 +31,12 @@ class Law(ABC):
     """A feedback law of one information structure.
 
     Attributes:
-        information: name of the information structure.
+        information: name of the information structure; "custom" if it is none of the paper's.
         graph: over which agents communicate; None if they need not.
         propagates: whether its memory can be propagated, as mode sampled needs.
     """
 
-    information: ClassVar[str]
+    information: ClassVar[str] = "custom"
     graph: Graph | None = None
     propagates: bool = True
 
@@ -106,12 +106,12 @@ def initial_estimates(
     agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
 ) -> NDArray[np.float64]:
     """All agents' estimates at the start, flat (N m,); see :meth:`Law.initial_memory`."""
-    given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
     m = len(y)
+    expected = f"it must be one number, a list of {m}, or {agents} lists of {m}"
+    try:
+        given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
+    except ValueError:
+        raise InvalidInput("initial.estimate", "lists of different lengths", expected) from None
     if given.shape not in ((), (m,), (agents, m)):
-        raise InvalidInput(
-            "initial.estimate",
-            f"shape {given.shape}",
-            f"it must be one number, a list of {m}, or {agents} lists of {m}",
-        )
+        raise InvalidInput("initial.estimate", f"shape {given.shape}", expected)
     return np.broadcast_to(given, (agents, m)).astype(np.float64).ravel()

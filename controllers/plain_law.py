@@ -7,14 +7,14 @@ The functions get NumPy arrays and the game as a Python object, and run in every
 import sys
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.settings import COUNT
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game import Game
 from gne_mj.native import kernel
 from gne_mj.plain import call_out, callable_address
@@ -34,8 +34,6 @@ class PlainLaw(Law):
         rate: ``rate(game, rho, y, memory)`` returns the memory's rate; needed with a memory only.
         memory: the memory at the start, as a function of y(0), or None for a static law.
     """
-
-    information: ClassVar[str] = "custom"
 
     def __init__(
         self,
@@ -66,13 +64,18 @@ class PlainLaw(Law):
             def filled(
                 a: int, b: int, c: int, scale: float, y: Array, memory: Array, out: Array
             ) -> float:
-                out[:] = function(self._game, rho, y, memory)
+                value = _numbers(function, self._game, rho, y, memory)
+                if value.shape != out.shape:
+                    raise UserCodeError(
+                        function, f"it must return {len(out)} numbers, not shape {value.shape}"
+                    )
+                out[:] = value
                 return 0.0
 
             return filled
 
-        functions = [fill(self._action), fill(self._rate or (lambda *_: 0.0))]
-        addresses, kept = zip(*(callable_address(function) for function in functions), strict=True)
+        functions = [self._action, self._rate or self._action]
+        addresses, kept = zip(*(callable_address(fill(f), f) for f in functions), strict=True)
         self._kept.extend(kept)
         return np.concatenate([super().settings(rho), addresses])
 
@@ -83,7 +86,27 @@ class PlainLaw(Law):
         super().initial_memory(y, estimate, filtered)
         if self._memory is None:
             return np.zeros(0)
-        return np.array(self._memory(y), dtype=np.float64).ravel()
+        try:
+            memory = _numbers(self._memory, y.copy())
+        except UserCodeError:
+            raise
+        except Exception as error:
+            raise UserCodeError(self._memory, error) from error
+        if memory.ndim != 1 or not len(memory):
+            raise UserCodeError(
+                self._memory, f"it must return one row of numbers, not shape {memory.shape}"
+            )
+        return memory.copy()
+
+
+def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:
+    value = function(*arguments)
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserCodeError(
+            function, f"it must return numbers, not {type(value).__name__}"
+        ) from None
 
 
 @kernel

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
-from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
 from gne_mj.theory import Theorem
@@ -16,8 +15,6 @@ from gne_mj.theory import Theorem
 SUCCESSES = ("converged", "completed")
 SETTLED = 0.02  # of the initial distance
 TAIL = 0.05  # of the run, over which "converged" must hold
-# Best responses cost a Newton solve for each agent: beyond this many they are left out.
-EPSILON_AGENTS = 50
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
 
@@ -29,13 +26,14 @@ class Certificate:
     Attributes:
         status: one of the statuses of the README, with its sentence in ``message``.
         worst_constraint: the least margin -g over all constraints and integration steps.
-        worst_gap: for velocity games, the gap that used most of its bound.
+        worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
-        lyapunov: V over the run (V^{x*}, and under partial information the estimates' part), and
-            whether the theory claims that it never rises (:class:`gne_mj.theory.Theorem`), for the
-            set-up and as long as no input limit is met.
+        lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
+            whether it is known (not of MJCF robots), and whether the theory claims that it never
+            rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long as no input limit is
+            met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """
@@ -201,9 +199,11 @@ def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] |
     gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
     index = int(np.argmax(gaps / bounds))
     return {
-        "agent": index + 1,
+        "name": system.game.constraint_names[index],
+        "index": index + 1,
         "gap": float(gaps[index]),
         "bound": float(bounds[index]),
+        "unit": system.game.action_unit,
         "time": float(when[index]),
         "each": gaps.tolist(),
     }
@@ -218,7 +218,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        variational = variational_equilibrium(system.game, penalised.action)
+        variational = variational_equilibrium(system.game, penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
@@ -228,19 +228,16 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     game = system.game
-    measured = None
-    if game.agents <= EPSILON_AGENTS:
-        try:
-            measured = float(np.max(measured_epsilon(game, equilibrium.action)))
-        except SolverError:
-            measured = None
+    affine = game.affine_constraints
+    try:
+        measured = float(np.max(measured_epsilon(game, equilibrium.action)))
+    except SolverError:
+        measured = None
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,
-        # The same set by affine constraints, two a gap, meets Assumption [asmp:cost] to the letter.
-        "p_rho_affine": (
-            2 * game.constraints_count * system.rho if game.kernels is velocity else None
-        ),
+        # The same set by affine constraints meets Assumption [asmp:cost] to the letter.
+        "p_rho_affine": None if affine is None else affine * system.rho,
         "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
     }
 
@@ -260,6 +257,7 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     claimed = unhindered and Theorem(system).lyapunov
     return {
         "claimed": claimed,
+        "known": system.agents.knows_storage,
         "start": start,
         "final": float(monitor[watch.STORAGE]),
         "largest_rise": rise,

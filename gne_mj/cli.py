@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from gne_mj.simulation import Simulation
     from gne_mj.trajectory import Trajectory
 
 app = typer.Typer(
@@ -103,6 +104,55 @@ def paper(
         for figure in sorted(out.glob("*.png")):
             print(f"figure      {figure}")
     raise typer.Exit(0 if trajectory.holds else 1)
+
+
+@app.command()
+def solve(
+    scenario: _SCENARIO,
+    set_: _SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Solve this system only.")
+    ] = None,
+    rho: Annotated[
+        list[float] | None,
+        typer.Option("--rho", help="In place of the scenario's penalty; may be repeated."),
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option("--path", metavar="FROM:TO:COUNT", help="Equilibria over a range of rho."),
+    ] = None,
+    out: _OUT = None,
+    as_json: _JSON = False,
+) -> None:
+    """Compute a scenario's penalised and variational equilibria, without running it.
+
+    --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
+    """
+    from gne_mj import solve as solving
+    from gne_mj.errors import InvalidInput, nearest
+
+    rhos = [] if path is None else solving.parse_path(path)
+    simulation = _load(scenario, set_, quiet=as_json)
+    systems = [each for each in simulation.systems if system in (None, each.name)]
+    if not systems:
+        names = [each.name for each in simulation.systems]
+        raise InvalidInput("--system", system, nearest(str(system), names))
+    with _working(as_json, _PREPARING):
+        solutions = [solving.solve_system(each, rho or (), rhos) for each in systems]
+    report = json.dumps({each.name: each.to_dict() for each in solutions}, indent=2)
+    with _results(out, replace=False) as folder:
+        if folder is not None:
+            (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+            if path is not None:
+                from gne_mj import plots
+
+                for each in solutions:
+                    solving.write_path(each, folder / f"{each.name}-path.csv")
+                    plots.save_path(each, folder / f"{each.name}-path.png")
+    if as_json:
+        print(report)
+    else:
+        print("\n\n".join("\n".join(solving.summary(each)) for each in solutions))
 
 
 @app.command()
@@ -226,7 +276,10 @@ def _options(
 
 
 def main() -> None:
-    """Entry point: an error meant for the user is one sentence on stderr, and exit status 2."""
+    """Entry point: an error meant for the user is one sentence on stderr.
+
+    The exit status is 2, but 1 where a function of the user's own fails.
+    """
     try:
         app()
     except BrokenPipeError:
@@ -234,18 +287,31 @@ def main() -> None:
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:
-        from gne_mj.errors import GneError
+        from gne_mj.errors import GneError, UserCodeError
 
+        if type(error).__module__.startswith("numba"):
+            from gne_mj.user_files import compiler_complaint
+
+            if (complaint := compiler_complaint(error)) is not None:
+                _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
             raise
-        _fail(str(error), getattr(error, "status", None))
+        code = 1 if isinstance(error, UserCodeError) else 2
+        _fail(str(error), getattr(error, "status", None), code)
 
 
-def _fail(message: str, status: str | None = None) -> None:
+def _fail(message: str, status: str | None = None, code: int = 2) -> None:
     if "--json" in sys.argv:
         print(json.dumps({"status": status or "invalid_input", "message": message}))
     print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
+
+
+def _load(scenario: str, changes: list[str] | None, *, quiet: bool) -> "Simulation":
+    from gne_mj.scenario import load_scenario
+
+    with _working(quiet, _PREPARING):
+        return load_scenario(scenario, _settings(changes)).simulation_object()
 
 
 def _simulate(
@@ -257,11 +323,9 @@ def _simulate(
     replace: bool = False,
     figures: tuple[str, ...] = (),
 ) -> "Trajectory":
-    from gne_mj.scenario import load_scenario
     from gne_mj.simulation import interruption
 
-    with _working(quiet, _PREPARING):
-        simulation = load_scenario(scenario, _settings(changes)).simulation_object()
+    simulation = _load(scenario, changes, quiet=quiet)
     # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
     with (
         interruption(),
@@ -401,7 +465,9 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
         "settling time": "not settled" if settling is None else f"{settling:.4g} s",
         "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
         + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": ("never rose" if lyapunov["monotone"] else "rose")
+        "Lyapunov function": "not known of MJCF robots"
+        if not lyapunov["known"]
+        else ("never rose" if lyapunov["monotone"] else "rose")
         + f" (largest rise {lyapunov['largest_rise']:.2g}; "
         + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
@@ -409,7 +475,8 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
     }
     if gap is not None:
         rows["widest gap"] = (
-            f"{gap['gap']:.6g} of {gap['bound']:g} m/s, agent {gap['agent']} at {gap['time']:.4g} s"
+            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
+            f" {gap['time']:.4g} s"
         )
     if epsilon["measured"] is not None:
         rows["epsilon"] = (

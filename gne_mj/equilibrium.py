@@ -1,18 +1,30 @@
 """Equilibria of a game: the penalised one, the variational one, and how near they are.
 
 The penalised equilibrium solves F(y) + dphi(y) = 0 [eq:NEcondition]; as rho falls it follows a
-smooth path whose end is the variational GNE [eq:vGNE].
+smooth path whose end is the variational GNE [eq:vGNE]. All are found by the interior-point method
+of :mod:`gne_mj.interior_point`.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from threading import Lock
+from typing import NoReturn
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from gne_mj.errors import InfeasibleStart, SolverError
+from gne_mj import interior_point as method
+from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
+from gne_mj.interior_point import Free, Iterate, Path, Work
 
 TOLERANCE = 1e-12
+FIRST_RHO, LAST_RHO = 1.0, 1e-11  # of the path to rho -> 0
+# There only the order of lambda_l s_l counts, so that it may be off by half.
+TO_ZERO = Path(FIRST_RHO, LAST_RHO, TOLERANCE, 0.5)
 
 
 @dataclass(frozen=True)
@@ -20,12 +32,12 @@ class Equilibrium:
     """A profile with what shows that it is an equilibrium.
 
     Attributes:
-        action: y, shape (m,).
+        action: y, shape (m,), strictly inside: every g_l(y) is negative.
         multipliers: lambda_l >= 0, shape (p,).
         rho: the penalty parameter it was computed with.
         residual: greatest entry of |F(y) + sum_l lambda_l dg_l(y)|, relative to the size of the
             terms that must cancel where that exceeds 1.
-        complementarity: greatest lambda_l * (-g_l); it is rho along the path.
+        complementarity: greatest lambda_l * s_l, with s_l = -g_l; it is rho along the path.
         iterations: Newton steps in all.
     """
 
@@ -37,43 +49,64 @@ class Equilibrium:
     iterations: int
 
 
+# A profile strictly inside, shape (m,), or an equilibrium whose multipliers help as well
+Start = ArrayLike | Equilibrium
+
+
 def penalised_equilibrium(
-    game: Game, rho: float, start: ArrayLike, *, tolerance: float = TOLERANCE
+    game: Game, rho: float, start: Start, *, tolerance: float = TOLERANCE
 ) -> Equilibrium:
-    """The unique y* with F(y*) + dphi(y*) = 0, by damped Newton from an interior profile.
+    """The unique y* with F(y*) + dphi(y*) = 0 [eq:NEcondition].
 
     Args:
         game: with F strictly monotone.
         rho: the penalty parameter.
-        start: strictly inside, shape (m,).
+        start: strictly inside, shape (m,), or an equilibrium near this one.
         tolerance: on the residual as :class:`Equilibrium` defines it; where rounding ends the
             progress before, up to a hundred times as much is accepted and reported.
 
     Raises:
+        InvalidInput: a rho that is not positive and finite.
         InfeasibleStart: ``start`` is not strictly inside.
         SolverError: the tolerance was not reached.
     """
-    return _solve(game, rho, start, np.ones(game.actions, dtype=bool), tolerance)
+    highest = start.rho if isinstance(start, Equilibrium) else FIRST_RHO
+    rho = float(rho)
+    return _solver(game).follow(start, Path(max(highest, rho), rho, tolerance, tolerance))
+
+
+def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibrium]:
+    """The penalised equilibria at each of ``rhos``, each one started from the one before.
+
+    Primal and dual unknowns are handed on, so that neighbours cost few steps of Newton's method.
+    The arguments are as :func:`penalised_equilibrium` has them, which also says what is raised.
+    """
+    for rho in rhos:
+        start = penalised_equilibrium(game, rho, start)
+        yield start
 
 
 def variational_equilibrium(
-    game: Game, start: ArrayLike, *, rho: float = 1.0, last_rho: float = 1e-11
+    game: Game, start: Start, *, rho: float = FIRST_RHO, last_rho: float = LAST_RHO
 ) -> Equilibrium:
-    """The variational GNE with its multipliers, by following the path rho -> 0.
+    """The variational GNE with its multipliers [eq:vGNE], by following the path rho -> 0.
 
     The result lies strictly inside, within about ``last_rho`` of the boundaries that bind:
-    p * last_rho bounds what any agent could still gain.
+    p * last_rho bounds what any agent could still gain. From an equilibrium the path starts at
+    that one's rho. Raises as :func:`penalised_equilibrium` does.
     """
-    everyone = np.ones(game.actions, dtype=bool)
-    return _follow(game, start, everyone, rho, last_rho)
+    if isinstance(start, Equilibrium):
+        rho = max(start.rho, last_rho)
+    return _solver(game).follow(start, TO_ZERO._replace(rho=rho, last_rho=last_rho))
 
 
-def best_response(game: Game, agent: int, y: ArrayLike, *, last_rho: float = 1e-11) -> Equilibrium:
+def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     """An agent's own minimiser of J_i over its feasible actions, the others' held at y (m,).
 
-    Found by the same path, for this agent alone; y must be strictly inside.
+    Found by the same path, for this agent alone; y must be strictly inside. The multipliers are
+    those of the agent's own problem, zero for constraints that do not contain its action.
     """
-    return _follow(game, y, game.agent_of_action == agent, 1.0, last_rho)
+    return _solver(game).respond(y, agent)
 
 
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
@@ -82,146 +115,163 @@ def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     At the penalised equilibrium it is at most p_i * rho, with p_i the constraints that contain
     y_i, and so at most p * rho [lemma:epsilon].
     """
-    y = np.asarray(y, dtype=np.float64)
-    costs = game.costs(y)
-    gains = np.empty(game.agents)
-    for agent in range(game.agents):
-        response = best_response(game, agent, y).action
-        gains[agent] = costs[agent] - game.costs(response)[agent]
-    return np.maximum(gains, 0.0)
+    solver, costs = _solver(game), game.costs(y)
+    least = [solver.cost(i, solver.respond(y, i).action) for i in range(game.agents)]
+    return np.maximum(costs - least, 0.0)
 
 
-def _follow(
-    game: Game, start: ArrayLike, free: NDArray[np.bool_], rho: float, last_rho: float
-) -> Equilibrium:
-    iterations = 0
-    while True:
-        rho = max(rho, last_rho)
-        # On the way only nearness to the path matters.
-        point = _solve(game, rho, start, free, TOLERANCE if rho == last_rho else 1e-6)
-        iterations += point.iterations
-        start = point.action
-        if rho == last_rho:
-            return Equilibrium(
-                point.action,
-                point.multipliers,
-                rho,
-                point.residual,
-                point.complementarity,
-                iterations,
-            )
-        rho *= 0.1
+_SOLVERS: WeakKeyDictionary[Game, "Solver"] = WeakKeyDictionary()
 
 
-def _solve(
-    game: Game, rho: float, start: ArrayLike, free: NDArray[np.bool_], tolerance: float
-) -> Equilibrium:
-    """Damped primal-dual Newton in the free actions.
+def _solver(game: Game) -> "Solver":
+    found = _SOLVERS.get(game)
+    if found is None:
+        found = _SOLVERS.setdefault(game, Solver(game))
+    return found
 
-    Unknowns are y, slacks s = -g(y) > 0 and multipliers lambda with lambda_l s_l = rho. Slacks
-    of their own keep the digits that g(y) loses when it is small beside its terms.
+
+class Solver:
+    """The interior-point method prepared for one game: its unknowns' order, and memory to work in.
+
+    The functions of this module keep one for each game. Threads may share it: a lock lets one in
+    at a time, and results are copies.
     """
-    y = np.array(start, dtype=np.float64)
-    worst, value = game.tightest(y)
-    if not value < 0.0:
-        raise InfeasibleStart(game.name, "start", game.constraint_names[worst], value)
-    slack = -game.constraints(y)
-    point = _Point(game, rho, free, y, slack, rho / slack)
-    best, stalled = point, 0
-    for iteration in range(300):
-        # Near the boundary rounding can end progress shortly before the tolerance.
-        if best.error <= tolerance or (stalled >= 4 and best.error <= 100 * tolerance):
-            return Equilibrium(
-                action=best.y,
-                multipliers=best.multipliers,
-                rho=rho,
-                residual=best.dual,
-                complementarity=float(np.max(best.multipliers * best.slack)),
-                iterations=iteration,
+
+    def __init__(self, game: Game) -> None:
+        m, p = game.actions, game.constraints_count
+        self._data = game.data
+        self._name, self._constraint_names = game.name, game.constraint_names
+        self._kernels, self._native = game.kernels, method.build(game.kernels)
+        self._lock = Lock()
+        self._report = np.zeros(method.COUNT)
+        position, self._half_band = _order(game)
+        agents, constraints = np.arange(game.agents), np.arange(p)
+        agents.flags.writeable = constraints.flags.writeable = False
+        self._everyone = Free(agents, constraints, position)
+        self._nobody = Free(agents, constraints, np.full(m, -1))
+        self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
+        entries = int(np.sum(np.diff(game.data.offsets)[game.data.member_index]))
+        self._work = Work(
+            trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
+            g=np.zeros(p),
+            size=np.zeros(p),
+            row=np.zeros(p + 1, dtype=np.int64),
+            column=np.zeros(entries, dtype=np.int64),
+            jacobian=np.zeros(entries),
+            stationarity=np.zeros(m),
+            terms=np.zeros(m),
+            step=np.zeros(m),
+            step_slack=np.zeros(p),
+            step_multipliers=np.zeros(p),
+            hessian_row=np.zeros(m),
+            band=np.zeros((m, 3 * self._half_band + 1)),
+            pivots=np.zeros(m, dtype=np.int64),
+        )
+
+    def follow(self, start: Start, path: Path) -> Equilibrium:
+        """The end of a path of penalised equilibria.
+
+        Args:
+            start: where to begin, best near the path's first equilibrium.
+            path: from which rho to which, and how accurately.
+
+        Raises:
+            InvalidInput: a rho that is not positive and finite.
+            InfeasibleStart: ``start`` is not strictly inside.
+            SolverError: the tolerance was not reached.
+        """
+        known = isinstance(start, Equilibrium)
+        y = self._profile(start.action if isinstance(start, Equilibrium) else start)
+        if not 0.0 < path.last_rho <= path.rho < np.inf:
+            raise InvalidInput("barrier.rho", path.last_rho, "it must be positive and finite")
+        with self._lock:
+            self._point.y[:] = y
+            if isinstance(start, Equilibrium):
+                self._point.multipliers[:] = start.multipliers
+            ended = self._native.run(
+                self._data, self._everyone, self._half_band, path, known, self._point, self._work,
+                self._report,
+            )  # fmt: skip
+            if ended != method.CONVERGED:
+                self._fail(ended, y)
+            return self._result(path.last_rho, self._point.y.copy(), self._point.multipliers.copy())
+
+    def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
+        """The best response of one agent, which minimises alone, from y and nothing else.
+
+        Raises:
+            InfeasibleStart: y is not strictly inside.
+            SolverError: the minimiser was not found.
+        """
+        y = self._profile(y)
+        data, point, position = self._data, self._point, self._nobody.position
+        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
+        alone = Free(self._nobody.agents[agent : agent + 1], own, position)
+        block = slice(data.offsets[agent], data.offsets[agent + 1])
+        with self._lock:
+            position[block] = np.arange(block.stop - block.start)
+            point.y[:] = y
+            ended = self._native.run(
+                data, alone, self._half_band, TO_ZERO, False, point, self._work, self._report
             )
-        point = point.improved()
-        stalled = stalled + 1 if point.error > 0.5 * best.error else 0
-        if point.error < best.error:
-            best = point
-    raise SolverError(f"the equilibrium of the {game.name} game was not found", best.error, 300)
+            position[block] = -1
+            if ended != method.CONVERGED:
+                self._fail(ended, y)
+            multipliers = np.zeros(len(point.multipliers))
+            multipliers[own] = point.multipliers[: len(own)]
+            return self._result(LAST_RHO, point.y.copy(), multipliers)
+
+    def cost(self, agent: int, y: NDArray[np.float64]) -> float:
+        """J_i(y); y of shape (m,)."""
+        return float(self._native.cost(self._data, agent, y))
+
+    def _profile(self, y: ArrayLike) -> NDArray[np.float64]:
+        profile = np.ascontiguousarray(y, dtype=np.float64)
+        if profile.shape != self._point.y.shape:
+            raise ValueError(f"y must have shape {self._point.y.shape}, not {profile.shape}")
+        return profile
+
+    def _result(
+        self, rho: float, action: NDArray[np.float64], multipliers: NDArray[np.float64]
+    ) -> Equilibrium:
+        iterations, _, residual, complementarity = self._report.tolist()
+        return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
+
+    def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
+        if ended == method.OUTSIDE:
+            q, count = self._data.parameters, len(self._point.slack)
+            g = np.array([self._kernels.constraint(q, k, y) for k in range(count)])
+            worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
+            raise InfeasibleStart(
+                self._name, "start", self._constraint_names[worst], float(g[worst])
+            )
+        reason = {
+            method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name} game",
+            method.NO_WAY_ON: f"Newton's method found no way on in the {self._name} game",
+            method.TOO_MANY: f"the equilibrium of the {self._name} game was not found",
+        }[ended]
+        iterations, error = int(self._report[method.ITERATIONS]), float(self._report[method.ERROR])
+        raise SolverError(reason, error, iterations)
 
 
-class _Point:
-    """One iterate of the primal-dual Newton method, with its residuals."""
+def _order(game: Game) -> tuple[NDArray[np.int64], int]:
+    """Each action's row in Newton's matrix and the matrix's half bandwidth, kept small.
 
-    def __init__(
-        self,
-        game: Game,
-        rho: float,
-        free: NDArray[np.bool_],
-        y: NDArray[np.float64],
-        slack: NDArray[np.float64],
-        multipliers: NDArray[np.float64],
-    ) -> None:
-        self.game, self.rho, self.free = game, rho, free
-        self.y, self.slack, self.multipliers = y, slack, multipliers
-        self.jacobian = game.constraint_jacobian(y)[:, free]
-        gradient = game.pseudo_gradient(y)[free]
-        self.stationarity = gradient + multipliers @ self.jacobian
-        size = np.abs(gradient) + multipliers @ np.abs(self.jacobian)
-        self.dual = float(np.max(np.abs(self.stationarity) / np.maximum(1.0, size), initial=0.0))
-        self.gap = game.constraints(y) + slack
-        self.product = multipliers * slack - rho
-        self.error = max(
-            self.dual,
-            float(np.max(np.abs(self.gap))),
-            float(np.max(np.abs(self.product))) / rho,
-        )
-        residuals = (self.stationarity, self.gap, self.product)
-        self.merit = float(np.sqrt(sum(np.sum(part**2) for part in residuals)))
-
-    def improved(self) -> "_Point":
-        """The next iterate: a Newton step, shortened to stay inside and to make progress."""
-        ratio = self.multipliers / self.slack
-        curvature = self.game.weighted_constraint_hessian(self.y, self.multipliers)
-        matrix = (self.game.pseudo_gradient_jacobian(self.y) + curvature)[
-            np.ix_(self.free, self.free)
-        ]
-        matrix += (self.jacobian.T * ratio) @ self.jacobian
-        change = (-self.product + self.multipliers * self.gap) / self.slack
-        try:
-            step = np.linalg.solve(matrix, -self.stationarity - change @ self.jacobian)
-        except np.linalg.LinAlgError:
-            raise SolverError(
-                f"the derivative of F + dphi is singular in the {self.game.name} game",
-                self.error,
-                0,
-            ) from None
-        along = self.jacobian @ step
-        step_slack = -self.gap - along
-        step_multipliers = change + ratio * along
-        length = min(1.0, _longest(self.slack, step_slack))
-        length_dual = min(1.0, _longest(self.multipliers, step_multipliers))
-        for _ in range(60):
-            y = self.y.copy()
-            y[self.free] += length * step
-            if np.all(self.game.constraints(y) < 0.0):
-                trial = _Point(
-                    self.game,
-                    self.rho,
-                    self.free,
-                    y,
-                    self.slack + length * step_slack,
-                    self.multipliers + length_dual * step_multipliers,
-                )
-                # Close to the solution rounding hides progress: a full step is then taken as is.
-                if trial.merit <= (1.0 - 1e-4 * length) * self.merit or self.error < 1e-6:
-                    return trial
-            length *= 0.5
-            length_dual = min(length, length_dual)
-        raise SolverError(
-            f"Newton's method found no way on in the {self.game.name} game", self.error, 60
-        )
+    Two agents are coupled if one is in the other's cost or both are in one constraint.
+    """
+    data, n = game.data, game.agents
+    costs = _incidence(data.cost_pointer, data.cost_index, n)
+    members = _incidence(data.member_pointer, data.member_index, n)
+    coupled = csr_array(costs + costs.T + members.T @ members)
+    order = reverse_cuthill_mckee(coupled, symmetric_mode=True)
+    sizes = np.diff(data.offsets)
+    first = np.empty(n, dtype=np.int64)  # row of each agent's first action
+    first[order] = np.cumsum(sizes[order]) - sizes[order]
+    position = first[game.agent_of_action] + np.arange(game.actions)
+    position -= data.offsets[game.agent_of_action]
+    row, column = coupled.nonzero()
+    return position, int(np.max(first[row] + sizes[row] - 1 - first[column], initial=0))
 
 
-def _longest(values: NDArray[np.float64], step: NDArray[np.float64]) -> float:
-    """Longest step that keeps positive values at no less than 0.5% of what they are."""
-    shrinking = step < 0.0
-    if not np.any(shrinking):
-        return np.inf
-    return float(0.995 * np.min(values[shrinking] / -step[shrinking]))
+def _incidence(pointer: NDArray[np.int64], index: NDArray[np.int64], columns: int) -> csr_array:
+    return csr_array((np.ones(len(index)), index, pointer), shape=(len(pointer) - 1, columns))

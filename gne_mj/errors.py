@@ -1,7 +1,11 @@
 """Errors that the package raises on purpose; each message is one sentence a user can act on."""
 
 import difflib
-from collections.abc import Iterable
+import traceback
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 
 class GneError(Exception):
@@ -41,12 +45,39 @@ class InfeasibleStart(GneError, ValueError):
         )
 
 
+class UserCodeError(GneError, RuntimeError):
+    """A function of the user's own raised, or returned something of no use; the cause is chained.
+
+    Args:
+        function: the user's.
+        error: what it raised, or a sentence about what it returned.
+    """
+
+    status = "user_code_failed"
+
+    def __init__(self, function: Callable[..., Any], error: Exception | str) -> None:
+        inner = function.func if isinstance(function, partial) else function
+        name = getattr(inner, "__name__", repr(inner))
+        code = getattr(inner, "__code__", None)
+        where = f"{name}: "
+        if code is not None:
+            line = code.co_firstlineno
+            if isinstance(error, Exception):  # the deepest line of the user's own file
+                lines = traceback.extract_tb(error.__traceback__)
+                line = next((f.lineno for f in lines[::-1] if f.filename == code.co_filename), line)
+            where = f"{Path(code.co_filename).name}, line {line}, in {name}: "
+        what = f"{type(error).__name__}: {error}" if isinstance(error, Exception) else error
+        super().__init__(where + " ".join(what.split()))
+
+
 class EngineError(GneError, RuntimeError):
     """MuJoCo cannot be driven natively here (unknown version, or callbacks already in use)."""
 
 
 class SolverError(GneError, RuntimeError):
     """An iteration ended without reaching its tolerance; the numbers are attributes."""
+
+    status = "not_solved"
 
     def __init__(self, message: str, residual: float, iterations: int) -> None:
         self.residual, self.iterations = residual, iterations

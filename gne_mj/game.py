@@ -27,8 +27,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import is_plain, plain_kernels, raise_pending
+from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -73,6 +75,14 @@ class Game:
         row_scaled: whether dF/dy = diag(d(y)) A with A the same everywhere, so that each of its
             rows lies between the two that the bounds' entries make up.
         gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
+        affine_constraints: how many affine constraints describe the same set by the same barrier,
+            where the game's own are not affine; None if none do.
+        agent_name: what an agent is, e.g. "robot".
+        axes: names of the entries of an agent's action; "1", "2", ... if left out.
+        quantities: what follows from the actions and is recorded and drawn beside them.
+
+    Raises:
+        InvalidInput: what does not fit together, before native code would read beyond an array.
     """
 
     name: str
@@ -89,8 +99,13 @@ class Game:
     jacobian_bounds: Callable[[Box], Box] | None = None
     row_scaled: bool = False
     gap_bounds: NDArray[np.float64] | None = None
+    affine_constraints: int | None = None
+    agent_name: str = "agent"
+    axes: tuple[str, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
+        self._check()
         if is_plain(self.kernels):
             kernels, addresses, kept = plain_kernels(
                 self.kernels, np.asarray(self.parameters, dtype=np.float64)
@@ -98,6 +113,33 @@ class Game:
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
             object.__setattr__(self, "_kept", kept)
+
+    def _check(self) -> None:
+        count = len(self.sizes)
+        if not count or any(size < 1 for size in self.sizes):
+            raise InvalidInput("game.sizes", self.sizes, "it must list a positive size an agent")
+        if len(self.in_cost) != count:
+            raise InvalidInput(
+                "game.in_cost", f"{len(self.in_cost)} lists", f"there must be {count}, one an agent"
+            )
+        constraints = len(self.in_constraint)
+        if not constraints or len(self.constraint_names) != constraints:
+            raise InvalidInput(
+                "game.in_constraint",
+                f"{constraints} lists and {len(self.constraint_names)} constraint_names",
+                "there must be as many of both, and at least one",
+            )
+        for key in ("in_cost", "in_constraint"):
+            for members in getattr(self, key):
+                inside = min(members, default=0) >= 0 and max(members, default=0) < count
+                if not inside or len(set(members)) != len(members):
+                    raise InvalidInput(
+                        f"game.{key}",
+                        list(members),
+                        f"agents are numbered from 0 to {count - 1}, each at most once in a list",
+                    )
+        if not all(len(members) for members in self.in_constraint):
+            raise InvalidInput("game.in_constraint", [], "every constraint contains an agent")
 
     @property
     def agents(self) -> int:
@@ -144,6 +186,17 @@ class Game:
         """Which agent each entry of a profile belongs to, shape (m,)."""
         return np.repeat(np.arange(self.agents), self.sizes)
 
+    @cached_property
+    def axis_of_action(self) -> tuple[str, ...]:
+        """Name of each entry of a profile among its agent's, length m."""
+        numbers = tuple(str(k + 1) for k in range(max(self.sizes)))
+        return tuple((self.axes or numbers)[k] for size in self.sizes for k in range(size))
+
+    def entries(self, quantity: Quantity) -> tuple[int, ...]:
+        """Shape of a quantity at one profile: (N,), (p,) or ()."""
+        shapes = {"agent": (self.agents,), "constraint": (self.constraints_count,)}
+        return shapes.get(quantity.each, ())
+
     def costs(self, y: ArrayLike) -> NDArray[np.float64]:
         """J_i(y) of each agent; y of shape (..., m), result (..., N)."""
         return self._rows(y, self.agents, _native(self.kernels).costs)
@@ -160,12 +213,14 @@ class Game:
         """dF/dy, shape (m, m), at one profile y of shape (m,)."""
         out = np.zeros((self.actions, self.actions))
         _native(self.kernels).pseudo_gradient_jacobian(self.data, self._profile(y), out)
+        raise_pending()
         return out
 
     def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dg/dy, shape (p, m), at one profile y of shape (m,)."""
         out = np.zeros((self.constraints_count, self.actions))
         _native(self.kernels).constraint_jacobian(self.data, self._profile(y), out)
+        raise_pending()
         return out
 
     def weighted_constraint_hessian(self, y: ArrayLike, weights: ArrayLike) -> NDArray[np.float64]:
@@ -175,6 +230,7 @@ class Game:
         if weights.shape != (self.constraints_count,):
             raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
         _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
+        raise_pending()
         return out
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:

@@ -7,12 +7,15 @@ functions run in, some hundred times slower. Putting ``@kernel`` (:mod:`gne_mj.n
 of the same functions gives full speed.
 
 An exception inside a native loop cannot be raised there. It is kept, the function's value becomes
-"not a number", which ends a run, and :func:`raise_pending` raises it afterwards.
+"not a number", which ends a run, and :func:`raise_pending` raises it afterwards. Arrays that a
+plain function only reads are handed to it read-only, and are valid during the call.
 """
 
 import ctypes
+import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -22,19 +25,20 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.native import is_kernel, kernel
 
 Array = NDArray[np.float64]
 
-# What a game's functions are called; the two second derivatives may be left out
-NAMES = (
-    "cost",
-    "cost_gradient",
-    "add_cost_hessian",
-    "constraint",
-    "constraint_gradient",
-    "constraint_hessian",
-)
+# What a game's functions are called and take; the two second derivatives may be left out
+FUNCTIONS = {
+    "cost": ("q", "i", "y"),
+    "cost_gradient": ("q", "i", "a", "y"),
+    "add_cost_hessian": ("q", "i", "a", "y", "scale", "out"),
+    "constraint": ("q", "l", "y"),
+    "constraint_gradient": ("q", "l", "a", "y"),
+    "constraint_hessian": ("q", "l", "a", "b", "y"),
+}
 _OPTIONAL = ("add_cost_hessian", "constraint_hessian")
 _DIFFERENCE = 6e-6  # step of central differences, relative to the entry's size where that exceeds 1
 
@@ -45,37 +49,48 @@ _SIGNATURE = ctypes.CFUNCTYPE(
     ctypes.c_double,
     *(ctypes.c_int64,) * 6,
 )
-_pending: list[BaseException] = []
+_VIEWS = 1000  # arrays whose views are kept for the next call
+_pending: list[tuple[Callable[..., Any], BaseException]] = []
 
 
 def raise_pending() -> None:
-    """Raise what a plain function raised inside a native loop, if any did."""
+    """Raise what a plain function raised inside a native loop, if any did.
+
+    Raises:
+        UserCodeError: names the function, its file and line.
+    """
     if _pending:
-        error = _pending[0]
+        function, error = _pending[0]
         _pending.clear()
+        if isinstance(error, Exception) and not isinstance(error, UserCodeError):
+            raise UserCodeError(function, error) from error
         raise error
 
 
-def callable_address(function: Callable[..., float]) -> tuple[float, Any]:
+def callable_address(function: Callable[..., float], own: Callable[..., Any]) -> tuple[float, Any]:
     """A C function's address, as a double, that calls ``function(a, b, c, scale, x, y, z)``.
 
-    The second item must be kept as long as the address is used.
+    x and y are read-only, z is not. ``own`` is the user's function behind it, for messages. The
+    second item must be kept as long as the address is used.
     """
-    views: dict[tuple[int, int], Array] = {}
+    views: dict[tuple[int, int, bool], Array] = {}
 
-    def view(address: int, length: int) -> Array:
-        found = views.get((address, length))
+    def view(address: int, length: int, writes: bool) -> Array:
+        found = views.get((address, length, writes))
         if found is None:
+            if len(views) >= _VIEWS:
+                views.clear()
             block = (ctypes.c_double * length).from_address(address)
-            found = views[address, length] = np.ctypeslib.as_array(block)
+            found = views[address, length, writes] = np.ctypeslib.as_array(block)
+            found.flags.writeable = writes
         return found
 
     def called(a: int, b: int, c: int, scale: float, *arrays: int) -> float:
         try:
-            x, y, z = (view(*arrays[at : at + 2]) for at in (0, 2, 4))
-            return float(function(a, b, c, scale, x, y, z))
+            x, y, z = (view(arrays[at], arrays[at + 1], at == 4) for at in (0, 2, 4))
+            return function(a, b, c, scale, x, y, z)
         except BaseException as error:
-            _pending.append(error)
+            _pending.append((own, error))
             return float("nan")
 
     kept = _SIGNATURE(called)
@@ -108,22 +123,46 @@ def is_plain(module: ModuleType) -> bool:
     """Whether a game's functions are plain Python ones.
 
     Raises:
-        TypeError: some are kernels and some are not, or one is missing.
+        InvalidInput: some are kernels and some are not, one is missing or takes other arguments.
     """
-    kinds = {name: getattr(module, name, None) for name in NAMES}
-    natives = [name for name, function in kinds.items() if is_kernel(function)]
-    if len(natives) == len(NAMES):
-        return False
-    missing = [name for name in NAMES if kinds[name] is None and name not in _OPTIONAL]
-    if missing:
-        raise TypeError(f"{module.__name__}: a game needs a function '{missing[0]}'")
-    if natives:
-        other = next(name for name in NAMES if name not in natives)
-        raise TypeError(
-            f"{module.__name__}: '{natives[0]}' is a kernel and '{other}' is not; mark all six"
-            " functions with @kernel, or none"
-        )
-    return True
+    found = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
+    natives = [name for name, function in found.items() if is_kernel(function)]
+    file = Path(module.__file__ or module.__name__).name
+    for name, arguments in FUNCTIONS.items():
+        if name not in found:
+            if not natives and name in _OPTIONAL:
+                continue
+            raise InvalidInput("game.kernels", file, f"it must define {_call(name, arguments)}")
+        if natives and name not in natives:
+            raise InvalidInput(
+                "game.kernels",
+                file,
+                f"its '{natives[0]}' is a kernel and its '{name}' is not; mark all six functions"
+                " with @kernel, or none",
+            )
+        check_arguments("game.kernels", file, found[name], name, arguments)
+    return not natives
+
+
+def check_arguments(
+    key: str,
+    file: str,
+    function: Any,
+    name: str,
+    arguments: tuple[str, ...],
+    parameters: Iterable[str] = (),
+) -> None:
+    """Refuse a user's function that cannot take these arguments, and parameters by name."""
+    try:
+        inspect.signature(function).bind(*arguments, **dict.fromkeys(parameters))
+    except TypeError as error:
+        raise InvalidInput(
+            key, file, f"it must define {_call(name, (*arguments, *parameters))}: {error}"
+        ) from None
+
+
+def _call(name: str, arguments: tuple[str, ...]) -> str:
+    return f"{name}({', '.join(arguments)})"
 
 
 def plain_kernels(module: ModuleType, parameters: Array) -> tuple[ModuleType, Array, list[Any]]:
@@ -137,28 +176,41 @@ def plain_kernels(module: ModuleType, parameters: Array) -> tuple[ModuleType, Ar
     cost, gradient = module.cost, module.cost_gradient
     constraint, slope = module.constraint, module.constraint_gradient
 
-    def add_cost_hessian(i: int, a: int, y: Array, scale: float, out: Array) -> None:
-        if hasattr(module, "add_cost_hessian"):
-            module.add_cost_hessian(q, i, a, y, scale, out)
+    second = getattr(module, "add_cost_hessian", None)
+    bend = getattr(module, "constraint_hessian", None)
+
+    def add_cost_hessian(i: int, a: int, y: Array, scale: float, out: Array) -> float:
+        if second is not None:
+            second(q, i, a, y, scale, out)
         else:
             for b in range(len(y)):
-                out[b] += scale * _central(lambda at: gradient(q, i, a, at), y, b)
+                out[b] += scale * _central(lambda at: _number(gradient, q, i, a, at), y, b)
+        return 0.0
 
     def constraint_hessian(k: int, a: int, b: int, y: Array) -> float:
-        if hasattr(module, "constraint_hessian"):
-            return float(module.constraint_hessian(q, k, a, b, y))
-        return _central(lambda at: slope(q, k, a, at), y, b)
+        if bend is not None:
+            return _number(bend, q, k, a, b, y)
+        return _central(lambda at: _number(slope, q, k, a, at), y, b)
 
-    functions: tuple[Callable[..., float], ...] = (
-        lambda i, a, b, scale, y, *_: cost(q, i, y),
-        lambda i, a, b, scale, y, *_: gradient(q, i, a, y),
-        lambda i, a, b, scale, y, out, _: add_cost_hessian(i, a, y, scale, out) or 0.0,  # type: ignore[func-returns-value]
-        lambda k, a, b, scale, y, *_: constraint(q, k, y),
-        lambda k, a, b, scale, y, *_: slope(q, k, a, y),
-        lambda k, a, b, scale, y, *_: constraint_hessian(k, a, b, y),
+    functions: tuple[tuple[Callable[..., float], Callable[..., Any]], ...] = (
+        (lambda i, a, b, scale, y, *_: _number(cost, q, i, y), cost),
+        (lambda i, a, b, scale, y, *_: _number(gradient, q, i, a, y), gradient),
+        (lambda i, a, b, scale, y, _, o: add_cost_hessian(i, a, y, scale, o), second or gradient),
+        (lambda k, a, b, scale, y, *_: _number(constraint, q, k, y), constraint),
+        (lambda k, a, b, scale, y, *_: _number(slope, q, k, a, y), slope),
+        (lambda k, a, b, scale, y, *_: constraint_hessian(k, a, b, y), bend or slope),
     )
-    addresses, kept = zip(*(callable_address(function) for function in functions), strict=True)
+    addresses, kept = zip(*(callable_address(*pair) for pair in functions), strict=True)
     return sys.modules[__name__], np.array(addresses), list(kept)
+
+
+def _number(function: Callable[..., Any], *arguments: Any) -> float:
+    value = function(*arguments)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        shown = "None" if value is None else f"{type(value).__name__} {value!r:.40}"
+        raise UserCodeError(function, f"it must return a number, not {shown}") from None
 
 
 def _central(function: Callable[[Array], float], y: Array, b: int) -> float:

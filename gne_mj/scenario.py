@@ -127,10 +127,11 @@ def _first(error: ValidationError) -> InvalidInput:
     """The first of pydantic's complaints as one sentence."""
     details = error.errors()
     detail = details[0]
-    if detail["loc"][-1] == "float" and isinstance(detail["input"], list):
-        # of "one number or a list of them" the user meant the list
-        detail = details[1]
-    tags = union_tags() | {"float", "list", "literal"}
+    if detail["loc"][-1] in ("float", "str") and isinstance(detail["input"], list):
+        # of "one number, a list of them or a list of lists" the user meant what goes deepest
+        same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
+        detail = max(same[1:], key=lambda d: len(d["loc"]))
+    tags = union_tags() | {"float", "str", "list", "literal"}
     where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
     value = detail["input"]
     context = detail.get("ctx", {})

@@ -7,7 +7,7 @@ object they describe.
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,13 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game import Game
-from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_game
+from gne_mj.games import (
+    cournot_game,
+    osnr_game,
+    ten_channels,
+    velocity_consensus_game,
+    velocity_game,
+)
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
@@ -28,6 +34,13 @@ from gne_mj.user_files import load_game, load_law
 
 # One number for all agents, or one each
 PerAgent = float | list[float]
+
+# m_i, the entries of each agent's action
+Sizes = tuple[int, ...]
+
+# Of what every entry of an action has: one number for all; where an action is a vector, one vector
+# for all agents or a list of them; else one number for each agent
+PerAction = float | list[float] | list[list[float]]
 
 # The paper gives no initial velocities, and from rest the first gap would lie on its bound.
 DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
@@ -58,11 +71,21 @@ class VelocityGame(_Table):
     type: Literal["velocity-synchronization"]
     reference_velocity: float = Field(3.0, description="v_0 in m/s")
     gap_bound: PerAgent = Field(3.0, description="delta_i in m/s, positive")
+    desired_velocity: PerAgent | None = Field(
+        None, description="v_i^d in m/s; the reference velocity if left out"
+    )
+    desired_weight: PerAgent = Field(0.0, description="w_i, not negative")
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
-        bound = _per_agent("game.gap_bound", self.gap_bound, count, positive=True)
-        return velocity_game(count, self.reference_velocity, bound)
+        desired = self.desired_velocity
+        return velocity_game(
+            count,
+            self.reference_velocity,
+            _per_agent("game.gap_bound", self.gap_bound, count, positive=True),
+            None if desired is None else _per_agent("game.desired_velocity", desired, count),
+            _per_agent("game.desired_weight", self.desired_weight, count),
+        )
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """The named start for five agents; else everyone half a bound below the reference."""
@@ -70,6 +93,52 @@ class VelocityGame(_Table):
             return np.array(DEFAULT_VELOCITIES)
         first = self.gap_bound if isinstance(self.gap_bound, float) else self.gap_bound[0]
         return np.full(count, self.reference_velocity - 0.5 * first)
+
+
+class VelocityConsensusGame(_Table):
+    """Velocity vectors synchronised over any graph, some agents knowing the reference."""
+
+    type: Literal["velocity-consensus"]
+    reference_velocity: list[float] = Field([1.0, 1.0], description="v_0 in m/s")
+    edges: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or pairs of agents numbered from 1; of the game, not"
+              " of who hears whom")
+    )  # fmt: skip
+    leader_weight: PerAgent | None = Field(
+        None, description="w_i, positive for leaders and 0 for others; if left out agent 1 leads"
+    )
+    gap_bound: PerAgent = Field(3.0, description="in m/s, positive; one or one for each edge")
+    leader_gap_bound: PerAgent = Field(
+        3.0, description="to v_0 in m/s, positive; one or one for each leader"
+    )
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        given = self.leader_weight
+        weight = _per_agent("game.leader_weight", 0.0 if given is None else given, count)
+        if given is None:
+            weight[0] = 1.0
+        return velocity_consensus_game(
+            self._edges(count),
+            weight.tolist(),
+            self.reference_velocity,
+            self.gap_bound,
+            self.leader_gap_bound,
+        )
+
+    def _edges(self, count: int) -> list[tuple[int, int]]:
+        if not isinstance(self.edges, str):
+            return [(i - 1, j - 1) for i, j in self.edges]
+        try:
+            return list(graphs.NAMED[self.edges](count).edges)
+        except InvalidInput as error:
+            raise InvalidInput("game.edges", error.value, error.expected) from None
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """Everyone half a leader's bound below the reference, along the first axis."""
+        start = np.tile(np.array(self.reference_velocity), (count, 1))
+        start[:, 0] -= 0.5 * np.min(self.leader_gap_bound)
+        return start.ravel()
 
 
 class OsnrGame(_Table):
@@ -142,42 +211,60 @@ class CustomGame(_Table):
 
 class _AgentsTable(_Table):
     count: int = Field(gt=0, description="N")
-    input_limit: PerAgent | None = Field(
-        None, description="greatest |u_i| that the actuators deliver; no limit if left out"
+    input_limit: PerAction | None = Field(
+        None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
 
-    def limits(self) -> NDArray[np.float64]:
-        """(N,) limits, infinite where none is given."""
+    def limits(self, sizes: Sizes) -> NDArray[np.float64]:
+        """(m,) limits, infinite where none is given."""
         if self.input_limit is None:
-            return np.full(self.count, np.inf)
-        return _per_agent("agents.input_limit", self.input_limit, self.count, positive=True)
+            return np.full(sum(sizes), np.inf)
+        limits = _per_action("agents.input_limit", self.input_limit, sizes)
+        if np.any(limits <= 0):
+            raise InvalidInput("agents.input_limit", self.input_limit, "it must be positive")
+        return limits
 
-    def columns(self, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
-        """(N, len(names)) parameters."""
+    def rows(self, sizes: Sizes, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
+        """(m, len(names)) parameters, the same for all channels of an agent."""
         columns = [
             _per_agent(f"agents.{n}", getattr(self, n), self.count, positive=n in positive)
             for n in names
         ]
-        return np.column_stack(columns)
+        return np.repeat(np.column_stack(columns), sizes, axis=0)
 
 
-class RobotAgents(_AgentsTable):
+class _RobotTable(_AgentsTable):
     """[eq:MobileRobot]"""
 
-    type: Literal["flexible-robot"]
+    axes: ClassVar[int]
     main_mass: PerAgent = Field(1.0, description="M in kg, positive")
     appendage_mass: PerAgent = Field(1.0, description="m in kg, positive")
     stiffness: PerAgent = Field(1.0, description="linear part of psi in N/m")
     atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
     damping: PerAgent = Field(1.0, description="gamma in N s/m")
 
-    def build(self) -> Agents:
-        """The agents."""
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        _check_sizes(self.type, self.axes, sizes)  # type: ignore[attr-defined]
         names = flexible_robot.PARAMETERS
-        table = self.columns(*names, positive=("main_mass", "appendage_mass"))
+        table = self.rows(sizes, *names, positive=("main_mass", "appendage_mass"))
         if np.any(table[:, 4] < 0):
             raise InvalidInput("agents.damping", self.damping, "no entry may be negative")
-        return Agents(flexible_robot, table, self.limits())
+        return Agents(flexible_robot, table, self.limits(sizes), self.axes)
+
+
+class RobotAgents(_RobotTable):
+    """Robots on a lane."""
+
+    axes: ClassVar[int] = 1
+    type: Literal["flexible-robot"]
+
+
+class PlanarRobotAgents(_RobotTable):
+    """Robots in the plane, with the same masses, spring and damper along both axes."""
+
+    axes: ClassVar[int] = 2
+    type: Literal["planar-flexible-robot"]
 
 
 class IntegratorAgents(_AgentsTable):
@@ -185,9 +272,10 @@ class IntegratorAgents(_AgentsTable):
 
     type: Literal["integrator"]
 
-    def build(self) -> Agents:
-        """The agents."""
-        return Agents(integrator, np.zeros((self.count, 0)), self.limits())
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = np.zeros((sum(sizes), 0))
+        return Agents(integrator, table, self.limits(sizes), _dimension(sizes))
 
 
 class PiCascadeAgents(_AgentsTable):
@@ -197,16 +285,16 @@ class PiCascadeAgents(_AgentsTable):
     decay_rate: PerAgent = Field(1.0, description="v in 1/s")
     integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
 
-    def build(self) -> Agents:
-        """The agents."""
-        table = self.columns(*pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = self.rows(sizes, *pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
         if np.any(table[:, 1] >= table[:, 0]):
             raise InvalidInput(
                 "agents.integral_gain",
                 self.integral_gain,
                 "it must be below decay_rate (0 < k < v)",
             )
-        return Agents(pi_cascade, table, self.limits())
+        return Agents(pi_cascade, table, self.limits(sizes), _dimension(sizes))
 
 
 class MjcfAgents(_AgentsTable):
@@ -217,8 +305,9 @@ class MjcfAgents(_AgentsTable):
     output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
     input: str | list[str] = Field(description="actuator that u_i drives")
 
-    def build(self) -> Agents:
-        """The agents."""
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of one entry each."""
+        _check_sizes(self.type, 1, sizes)
         columns = []
         for key in ("file", "output", "input"):
             given = getattr(self, key)
@@ -229,7 +318,7 @@ class MjcfAgents(_AgentsTable):
                 )
             columns.append(each)
         robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
-        return mjcf_robots(robots, self.limits())
+        return mjcf_robots(robots, self.limits(sizes))
 
 
 class MixedAgents(_Table):
@@ -237,7 +326,10 @@ class MixedAgents(_Table):
 
     type: Literal["mixed"]
     groups: list[
-        Annotated[RobotAgents | IntegratorAgents | PiCascadeAgents, Field(discriminator="type")]
+        Annotated[
+            RobotAgents | PlanarRobotAgents | IntegratorAgents | PiCascadeAgents,
+            Field(discriminator="type"),
+        ]
     ] = Field(min_length=1, description="tables of agents, one behind the other")
 
     @property
@@ -245,9 +337,16 @@ class MixedAgents(_Table):
         """N."""
         return sum(group.count for group in self.groups)
 
-    def build(self) -> Agents:
-        """The agents."""
-        return mixed.join([group.build() for group in self.groups])
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        first = np.cumsum([0, *(group.count for group in self.groups)])
+        return mixed.join(
+            [
+                group.build(sizes[start : start + group.count])
+                for start, group in zip(first[:-1], self.groups, strict=True)
+            ],
+            _dimension(sizes),
+        )
 
 
 class BarrierTable(_Table):
@@ -315,12 +414,7 @@ class CustomController(_NetworkController):
 
     def build(self, game: Game) -> Law:
         """The law."""
-        law = load_law(self.file, game, self.network(game.agents), self.parameters)
-        if self.mode == "sampled" and not law.propagates:
-            raise InvalidInput(
-                "controller.mode", self.mode, "a plain law with a memory runs in mode 'continuous'"
-            )
-        return law
+        return load_law(self.file, game, self.network(game.agents), self.parameters)
 
 
 class PlantTable(_Table):
@@ -337,42 +431,49 @@ class PlantTable(_Table):
 class InitialTable(_Table):
     """The start; what is left out rests, relaxed, at the default actions."""
 
-    action: PerAgent | None = Field(None, description="y(0)")
-    extension: PerAgent | None = Field(None, description="robots: x1(0) in m")
-    appendage_velocity: PerAgent | None = Field(None, description="robots: x3(0) in m/s")
-    position: PerAgent | None = Field(None, description="robots: d(0) in m")
-    integral: PerAgent | None = Field(None, description="PI cascade: s(0)")
+    action: PerAction | None = Field(None, description="y(0)")
+    extension: PerAction | None = Field(None, description="robots: x1(0) in m")
+    appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
+    position: PerAction | None = Field(None, description="robots: d(0) in m")
+    integral: PerAction | None = Field(None, description="PI cascade: s(0)")
     estimate: float | list[float] | list[list[float]] | None = Field(
         None, description="one number, a profile that all agents hold, or one profile each; y(0)"
     )
-    filtered: PerAgent | None = Field(None, description="distributed law: z(0); y(0) if left out")
+    filtered: PerAction | None = Field(None, description="distributed law: z(0); y(0) if left out")
 
     def build(
-        self, agents: Agents, default: Callable[[], NDArray[np.float64]]
+        self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
-        count = agents.channels
-        y = default() if self.action is None else _per_agent("initial.action", self.action, count)
+        y = default() if self.action is None else _per_action("initial.action", self.action, sizes)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
         if agents.kind is flexible_robot:
-            state[:, names.index("position")] = -1.5 * np.arange(count)
+            state[:, names.index("position")] = _places(sizes)
         for key in ("extension", "appendage_velocity", "position", "integral"):
             given = getattr(self, key)
             if given is None:
                 continue
             if key not in names:
                 raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
-            state[:, names.index(key)] = _per_agent(f"initial.{key}", given, count)
+            state[:, names.index(key)] = _per_action(f"initial.{key}", given, sizes)
         return state
 
 
 class SystemTable(_Table):
     """One game with its agents."""
 
-    game: Annotated[VelocityGame | OsnrGame | CournotGame | CustomGame, Field(discriminator="type")]
+    game: Annotated[
+        VelocityGame | VelocityConsensusGame | OsnrGame | CournotGame | CustomGame,
+        Field(discriminator="type"),
+    ]
     agents: Annotated[
-        RobotAgents | IntegratorAgents | PiCascadeAgents | MixedAgents | MjcfAgents,
+        RobotAgents
+        | PlanarRobotAgents
+        | IntegratorAgents
+        | PiCascadeAgents
+        | MixedAgents
+        | MjcfAgents,
         Field(discriminator="type"),
     ]
     barrier: BarrierTable = BarrierTable()
@@ -388,11 +489,15 @@ class SystemTable(_Table):
         count = self.agents.count
         try:
             game = self.game.build(count)
-            agents = self.agents.build()
+            agents = self.agents.build(game.sizes)
             law = self.controller.build(game)
-            state = self.initial.build(agents, lambda: self.game.default_start(count))
-            start = state[:, agents.kind.OUTPUT]
-            memory = law.initial_memory(start, self.initial.estimate, self.initial.filtered)
+            state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
+            filtered = self.initial.filtered
+            memory = law.initial_memory(
+                state[:, agents.kind.OUTPUT],
+                self.initial.estimate,
+                None if filtered is None else _per_action("initial.filtered", filtered, game.sizes),
+            )
         except InvalidInput as error:
             raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
         return System(
@@ -483,6 +588,54 @@ class Scenario(_Table):
             seed=self.simulation.seed,
             source=self.model_dump_json(exclude_none=True),
         )
+
+
+def _dimension(sizes: Sizes) -> int:
+    """Channels of each agent, where all have as many; else each channel is taken by itself."""
+    return sizes[0] if len(set(sizes)) == 1 else 1
+
+
+def _check_sizes(kind: str, axes: int, sizes: Sizes) -> None:
+    for size in sizes:
+        if size != axes:
+            raise InvalidInput(
+                "agents.type",
+                kind,
+                f"its agents act along {axes} {'axis' if axes == 1 else 'axes'}, and the game's"
+                f" actions have {size}",
+            )
+
+
+def _places(sizes: Sizes) -> NDArray[np.float64]:
+    """(m,) positions in m, 1.5 m apart: behind each other, or in the rows of a square."""
+    count, dimension = len(sizes), max(sizes)
+    places = np.zeros((count, dimension))
+    number = np.arange(count)
+    side = count if dimension == 1 else int(np.ceil(np.sqrt(count)))
+    places[:, 0] = -1.5 * (number % side)
+    places[:, 1:2] = -1.5 * (number // side)[:, None]
+    return places[np.arange(dimension) < np.array(sizes)[:, None]]
+
+
+def _per_action(key: str, given: PerAction, sizes: Sizes) -> NDArray[np.float64]:
+    """(m,) numbers, agent by agent."""
+    count, dimension = len(sizes), _dimension(sizes)
+    vectors: list[Any] = []
+    if isinstance(given, list):
+        if any(isinstance(entry, list) for entry in given):
+            vectors = given
+        elif max(sizes) > 1:
+            vectors = [given] * count
+    if not vectors:
+        return np.repeat(_per_agent(key, given, count), sizes)  # type: ignore[arg-type]
+    if tuple(map(len, vectors)) != tuple(sizes):
+        one = f"one list of {dimension} for all agents, or " if dimension > 1 else ""
+        raise InvalidInput(
+            key,
+            given,
+            f"it must be one number, {one}a list of {count} lists, one for each agent",
+        )
+    return np.concatenate(vectors, dtype=np.float64)
 
 
 def _per_agent(

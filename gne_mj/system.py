@@ -121,10 +121,19 @@ class System:
                 self.law.graph.agents,
                 f"the game has {self.game.agents} agents",
             )
+        if self.mode == "sampled" and not self.law.propagates:
+            raise InvalidInput(
+                f"systems.{self.name}.controller.mode",
+                self.mode,
+                "a plain law with a memory runs in mode 'continuous'",
+            )
         if not np.all(np.isfinite(self.state)):
             raise InvalidInput(
                 f"systems.{self.name}.initial", "nan or inf", "every entry must be finite"
             )
+        for quantity in self.game.quantities:  # wrong shapes are better found before a run
+            quantity.at(self.start[None], self.game.entries(quantity))
+            quantity.bounds(self.game.entries(quantity))
         worst, value = self.game.tightest(self.start)
         if not value < 0.0:
             names = self.game.constraint_names
@@ -134,8 +143,15 @@ class System:
                 names[worst],
                 value,
             )
+        expected = self.law.initial_memory(self.start)
         if not len(self.memory):
-            object.__setattr__(self, "memory", self.law.initial_memory(self.start))
+            object.__setattr__(self, "memory", expected)
+        elif self.memory.shape != expected.shape:
+            raise InvalidInput(
+                f"systems.{self.name}.memory",
+                f"shape {self.memory.shape}",
+                f"the {self.law.information} law's memory has shape {expected.shape}",
+            )
         self._check_memory()
         self._check_engine()
 
@@ -206,7 +222,7 @@ class System:
                 clock.timestep,
                 f"the estimates of '{self.name}' follow each other at up to"
                 f" {STABLE[self.integrator] / largest:.4g} /s, which '{self.integrator}' can follow"
-                f" with steps of at most {largest:.3g} s; {others}",
+                f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
             )
 
     @property
@@ -225,6 +241,11 @@ class System:
         Raises:
             InvalidInput: a step that the estimates' dynamics do not allow.
         """
+        loop = self._closed_loop(clock)
+        loop.keeps = self
+        return loop
+
+    def _closed_loop(self, clock: Clock) -> ClosedLoop:
         self._check_step(clock)
         rest = self.agents.equilibrium(self.equilibrium.action)
         problem = Problem(
@@ -248,7 +269,6 @@ class System:
             plant = self._mujoco_plant(
                 clock.timestep, *room(self.game, self.agents, len(self.memory), mode)
             )
-            plant.reset(self.state)
             return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
         kind = self.agents.kind
@@ -265,14 +285,25 @@ class System:
     def _mujoco_plant(
         self, timestep: float, userdata: int, memory: int
     ) -> "MujocoPlant | MjcfPlant":
+        """The fleet, reset to the start."""
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
         if not isinstance(self.agents, MjcfRobots):
-            return MujocoPlant(
+            fleet = MujocoPlant(
                 self.agents, timestep, self.integrator, userdata=userdata, memory=memory
             )
-        plant = MjcfPlant(self.agents, timestep, self.integrator, userdata=userdata, memory=memory)
+            fleet.reset(self.state)
+            return fleet
+        try:
+            plant = MjcfPlant(
+                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
+            )
+            plant.reset(self.state)
+        except InvalidInput as error:
+            raise InvalidInput(
+                f"systems.{self.name}.{error.key}", error.value, error.expected
+            ) from None
         if (
             not plant.measures_every_stage
             and self.mode == "continuous"
@@ -285,3 +316,9 @@ class System:
                 " integrator 'euler', or name a joint",
             )
         return plant
+
+
+def _rounded_down(value: float) -> float:
+    """To three digits: what a message names as the largest must itself be accepted."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 2)
+    return float(np.floor(value / unit) * unit)

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 from gne_mj.certificate import SUCCESSES, Certificate
 from gne_mj.errors import InvalidInput
-from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.loops.base import Samples
-from gne_mj.plants import flexible_robot
 from gne_mj.system import System
 
 if TYPE_CHECKING:
@@ -40,7 +38,8 @@ class Trajectory:
 
     Attributes:
         tree: the DataTree; ``tree["robots"].dataset`` is one system's dataset on dimensions
-            time, agent or action, constraint and component (of the state).
+            time, agent, constraint and component (of the state); agents whose actions have
+            several entries add a dimension action, with coordinates owner and axis.
         reports: for each system its certificate as plain data.
     """
 
@@ -140,7 +139,6 @@ def _dataset(
 
     game, kind = system.game, system.agents.kind
     y = samples.state[:, :, kind.OUTPUT]
-    robots = kind is flexible_robot
     unit = {"units": game.action_unit}
     # Where every action is a number of its own, agents and actions are the same axis.
     axis = "agent" if game.actions == game.agents else "action"
@@ -150,7 +148,7 @@ def _dataset(
             ("time", axis),
             samples.input,
             {
-                "units": "N" if robots else f"{game.action_unit}/s",
+                "units": kind.INPUT_UNIT or f"{game.action_unit or 1}/s",
                 "long_name": "delivered input u",
             },
         ),
@@ -166,19 +164,28 @@ def _dataset(
         ),
         "equilibrium": ((axis,), system.equilibrium.action, {**unit, "long_name": "y*"}),
     }
-    if robots:
-        states = dict(enumerate(kind.STATES))
-        for index, name in ((3, "position"), (0, "extension")):
-            variables[name] = (
-                ("time", axis),
-                samples.state[:, :, index],
-                {"units": states[index][1]},
-            )
-    if game.kernels is velocity:
-        ahead = np.concatenate([np.full((len(y), 1), game.parameters[0]), y[:, :-1]], axis=1)
-        variables["gap"] = (("time", axis), y - ahead, {**unit, "long_name": "velocity gap"})
-        variables["gap_bound"] = ((axis,), game.parameters[1:].copy(), unit)
-    if samples.memory.shape[1]:
+    for index, (name, state_unit) in enumerate(kind.STATES):
+        if index != kind.OUTPUT:
+            attributes = {"units": state_unit or game.action_unit}
+            variables[name] = (("time", axis), samples.state[:, :, index], attributes)
+    for quantity in game.quantities:
+        entries = game.entries(quantity)
+        dimensions = (quantity.each,) if quantity.each else ()
+        units = {"units": quantity.unit}
+        variables[quantity.name] = (
+            ("time", *dimensions),
+            quantity.at(y, entries),
+            {**units, "long_name": quantity.long_name, "symbol": quantity.symbol},
+        )
+        for name, bound in quantity.bounds(entries).items():
+            variables[name] = (dimensions, bound, units)
+    if samples.memory.shape[1] and system.law.information == "custom":
+        variables["memory"] = (
+            ("time", "memory_entry"),
+            samples.memory,
+            {"long_name": "the law's memory"},
+        )
+    elif samples.memory.shape[1]:
         m = game.actions
         estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
         owner = game.agent_of_action
@@ -204,12 +211,15 @@ def _dataset(
     }
     if axis == "action":
         coordinates["owner"] = ("action", game.agent_of_action + 1)
+        coordinates["axis"] = ("action", np.array(game.axis_of_action))
     report = certificate.to_dict()
     return xarray.Dataset(
         variables,
         coordinates,
         attrs={
             "game": game.name,
+            "agent_name": game.agent_name,
+            "quantities": json.dumps([quantity.name for quantity in game.quantities]),
             "information": system.law.information,
             "mode": system.mode,
             "engine": system.engine,

@@ -4,11 +4,13 @@ A game's file has ``game(count, **parameters)``, which returns a :class:`gne_mj.
 functions are plain ones or all kernels (see :mod:`gne_mj.game` for their names). A law's file has
 ``law(game, graph, **parameters)``, which returns a :class:`gne_mj.controllers.Law`, or the plain
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
-for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``.
+for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; all of them take
+the scenario's parameters too, by name.
 """
 
 import hashlib
 import importlib.util
+import re
 import sys
 from collections.abc import Mapping
 from functools import partial
@@ -20,6 +22,24 @@ from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import GneError, InvalidInput
 from gne_mj.game import Game
 from gne_mj.graph import Graph
+from gne_mj.native import is_kernel
+from gne_mj.plain import check_arguments
+
+_PREFIX = "gne_mj_user_"  # of the names of modules made of users' files
+
+# What the functions of a plain law are called, and take besides the scenario's parameters
+_LAW_FUNCTIONS = {
+    "action": ("game", "rho", "y", "memory"),
+    "rate": ("game", "rho", "y", "memory"),
+    "initial_memory": ("y",),
+}
+# The kernels of a law's module
+_LAW_KERNELS = {
+    "action": ("game", "problem", "y", "weights", "memory", "work", "u"),
+    "rate": ("problem", "y", "memory", "out"),
+    "propagate": ("problem", "y", "memory", "scratch"),
+    "storage": ("problem", "memory"),
+}
 
 
 def load_game(path: str | Path, count: int, parameters: Mapping[str, Any]) -> Game:
@@ -58,17 +78,61 @@ def load_law(
         )
         if not isinstance(law, Law):
             raise InvalidInput("controller.file", str(path), "its function law must return a Law")
+        _check_law(law, Path(path).name)
         return law
     if not callable(getattr(module, "action", None)):
         raise InvalidInput(
             "controller.file", str(path), "it must define law(game, graph, ...) or action(...)"
         )
-    functions = {
-        name: partial(getattr(module, name), **parameters)
-        for name in ("action", "rate")
-        if hasattr(module, name)
+    functions = {}
+    for name, arguments in _LAW_FUNCTIONS.items():
+        if hasattr(module, name):
+            function = getattr(module, name)
+            check_arguments(
+                "controller.file", Path(path).name, function, name, arguments, parameters
+            )
+            functions[name] = partial(function, **parameters)
+    return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
+
+
+def _check_law(law: Law, file: str) -> None:
+    if type(law).__module__.startswith("gne_mj."):
+        return
+    if law.information != "custom":
+        raise InvalidInput(
+            "controller.file",
+            file,
+            f"its law has information = {law.information!r}, for which the theory makes claims; a"
+            " law of one's own has 'custom'",
+        )
+    for name, arguments in _LAW_KERNELS.items():
+        function = getattr(law.kernels, name, None)
+        if not is_kernel(function):
+            raise InvalidInput("controller.file", file, f"its law needs a kernel named {name}")
+        check_arguments("controller.file", file, function, name, arguments)
+
+
+def compiler_complaint(error: Exception) -> str | None:
+    """The one sentence in numba's pages about a user's kernel; None if no user's file is named.
+
+    Its deepest reason stands behind the last "Failed in ..." line, and after it, innermost first,
+    the lines of the files that led there.
+    """
+    text = str(error)
+    places = re.findall(r'File "([^"]+)", line (\d+)', text) or [("", "")]
+    own = {
+        Path(module.__file__).name
+        for name, module in sys.modules.items()
+        if name.startswith(_PREFIX) and module.__file__
     }
-    return PlainLaw(game, memory=getattr(module, "initial_memory", None), **functions)
+    found = [(Path(file).name, line) for file, line in places if Path(file).name in own]
+    if not found:
+        return None
+    reasons = re.findall(r"Failed in [^\n]*\n\s*([^\n]+)", text)
+    reason = reasons[-1] if reasons else type(error).__name__
+    if "returning of array" in reason:  # what numba says without its run time
+        reason = "it allocates an array"
+    return f"{found[0][0]}, line {found[0][1]}: a kernel cannot be compiled: {reason}"
 
 
 def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
@@ -90,7 +154,7 @@ def _load(path: str | Path, key: str) -> ModuleType:
         raise InvalidInput(key, str(path), f"it cannot be read: {error.strerror}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
     digest = hashlib.sha256(str(path).encode() + text).hexdigest()[:16]
-    name = f"gne_mj_user_{path.stem}_{digest}"
+    name = f"{_PREFIX}{path.stem}_{digest}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)

@@ -1,1 +1,1 @@
-"""MJCF models: one flexible robot and the lane that a fleet of them runs in."""
+"""MJCF models: a flexible robot with its lane, and a planar one with its plane."""

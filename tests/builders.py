@@ -1,11 +1,14 @@
 """Systems of the product beside the same ones of reference.py, for tests to compare."""
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
-from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.system import Clock, System
@@ -119,3 +122,40 @@ def run_loop(system, h, steps, control=None, every=1):
 def relative_error(got, expected):
     """Greatest absolute error over the greatest magnitude."""
     return np.max(np.abs(got - expected)) / np.max(np.abs(expected))
+
+
+@dataclass
+class Consensus:
+    """A random game of velocity consensus, an oracle of it, and a source of interior profiles."""
+
+    game: Any
+    oracle: Any
+    rng: Any
+
+    def interior(self, used=0.99):
+        """A profile whose gaps use up to this part of their bounds, on a random way from v_0."""
+        oracle, rng = self.oracle, self.rng
+        away = rng.normal(size=(oracle.agents, oracle.d)) * rng.uniform(0.1, 3)
+        gaps = np.array([oracle.gap(k, (oracle.v0 + away).ravel()) for k in range(oracle.p)])
+        widest = np.max(np.linalg.norm(gaps, axis=1) / oracle.delta)
+        return (oracle.v0 + away * rng.uniform(0.05, used) / widest).ravel()
+
+
+def random_consensus(seed, dimension, tightest=0.3):
+    """Any graph of up to seven agents, in one or more parts, each with one leader or more."""
+    rng = np.random.default_rng(seed)
+    agents = int(rng.integers(1, 8))
+    pairs = [(i, j) for i in range(agents) for j in range(i + 1, agents)]
+    edges = [pair[:: rng.choice([1, -1])] for pair in pairs if rng.random() < rng.random()]
+    part = list(range(agents))
+    for i, j in edges:
+        part = [part[j] if label == part[i] else label for label in part]
+    weight = np.where(rng.random(agents) < 0.3, rng.uniform(0.2, 2, agents), 0.0)
+    for label in set(part):
+        members = [i for i in range(agents) if part[i] == label]
+        if not np.any(weight[members] > 0):
+            weight[rng.choice(members)] = rng.uniform(0.2, 2)
+    leaders = int(np.sum(weight > 0))
+    v0, delta = rng.uniform(-3, 3, dimension), rng.uniform(tightest, 4, len(edges) + leaders)
+    game = velocity_consensus_game(edges, weight, v0, delta[: len(edges)], delta[len(edges) :])
+    return Consensus(game, reference.VelocityConsensusGame(v0, edges, weight, delta), rng)

@@ -31,14 +31,18 @@ COMPLEX_STEP = 1e-30
 class VelocityGame:
     """Velocity synchronisation [eq:sensorNetGNE]: a chain of followers behind a reference.
 
-    J_i = (y_i - y_{i-1})^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, with the reference v0 before
-    agent 0. The constraints are shared, so y_i occurs in constraints i and i + 1.
+    J_i = (y_i - y_{i-1})^2 + w_i (y_i - d_i)^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, with the
+    reference v0 before agent 0. The constraints are shared, so y_i occurs in constraints i and
+    i + 1.
 
-    v0: float, m/s. delta: (N,) bounds on the velocity gaps, m/s.
+    v0: float, m/s. delta: (N,) bounds on the velocity gaps, m/s. desired d: (N,), m/s, and
+    weight w: (N,), which the paper's game does not have.
     """
 
-    def __init__(self, v0, delta):
+    def __init__(self, v0, delta, desired=None, weight=None):
         self.v0 = float(v0)
+        self.desired = np.zeros(len(delta)) if desired is None else np.array(desired, dtype=float)
+        self.weight = np.zeros(len(delta)) if weight is None else np.array(weight, dtype=float)
         self.delta = np.array(delta, dtype=float)
         self.N = len(self.delta)
         self.p = self.N
@@ -50,11 +54,11 @@ class VelocityGame:
 
     def cost(self, i, y):
         """J_i(y) [eq:sensorNetGNE], a scalar. y: (N,)."""
-        return self.gap(i, y) ** 2
+        return self.gap(i, y) ** 2 + self.weight[i] * (y[i] - self.desired[i]) ** 2
 
     def partial_gradient(self, i, y):
         """dJ_i/dy_i at y [eq:sensorNetGNE], a scalar. y: (N,)."""
-        return 2 * self.gap(i, y)
+        return 2 * self.gap(i, y) + 2 * self.weight[i] * (y[i] - self.desired[i])
 
     def constraint(self, l, y):  # noqa: E741
         """g_l(y) [eq:sensorNetGNE], a scalar, negative inside. y: (N,)."""
@@ -67,6 +71,74 @@ class VelocityGame:
         if l > 0:
             gradient[l - 1] = -2 * self.gap(l, y)
         return gradient
+
+
+class VelocityConsensusGame:
+    """Velocity consensus with leaders, one entry of this oracle for each axis of each agent.
+
+    J_i = sum over neighbours |y_i - y_j|^2 + w_i |y_i - v0|^2; |y_i - y_j|^2 - delta^2 <= 0 along
+    every edge, then |y_i - v0|^2 - delta^2 <= 0 for every leader (w_i > 0).
+
+    v0: (d,), m/s. edges: pairs of agents. weight: (agents,). delta: (edges + leaders,), m/s.
+    N = agents * d scalar actions, agent by agent.
+    """
+
+    def __init__(self, v0, edges, weight, delta):
+        self.v0 = np.array(v0, dtype=float)
+        self.edges = [(int(i), int(j)) for i, j in edges]
+        self.weight = np.array(weight, dtype=float)
+        self.leaders = [i for i in range(len(weight)) if weight[i] > 0]
+        self.delta = np.array(delta, dtype=float)
+        self.d = len(self.v0)
+        self.agents = len(self.weight)
+        self.N = self.agents * self.d
+        self.p = len(self.edges) + len(self.leaders)
+
+    def velocity(self, i, y):
+        """y_i: (d,). y: (N,)."""
+        return y[i * self.d : (i + 1) * self.d]
+
+    def cost(self, i, y):
+        """J_i(y) of agent i, a scalar. y: (N,)."""
+        own = self.velocity(i, y)
+        total = self.weight[i] * np.sum((own - self.v0) ** 2)
+        for edge in self.edges:
+            if i in edge:
+                other = edge[1] if edge[0] == i else edge[0]
+                total = total + np.sum((own - self.velocity(other, y)) ** 2)
+        return total
+
+    def partial_gradient(self, a, y):
+        """dJ_i/dy_a of the agent i that entry a belongs to, a scalar. y: (N,)."""
+        i, k = divmod(a, self.d)
+        total = 2 * self.weight[i] * (y[a] - self.v0[k])
+        for edge in self.edges:
+            if i in edge:
+                other = edge[1] if edge[0] == i else edge[0]
+                total = total + 2 * (y[a] - y[other * self.d + k])
+        return total
+
+    def gap(self, l, y):  # noqa: E741
+        """y_i - y_j along edge l, then y_i - v0 of the leaders: (d,). y: (N,)."""
+        if l < len(self.edges):
+            i, j = self.edges[l]
+            return self.velocity(i, y) - self.velocity(j, y)
+        return self.velocity(self.leaders[l - len(self.edges)], y) - self.v0
+
+    def constraint(self, l, y):  # noqa: E741
+        """g_l(y), a scalar, negative inside. y: (N,)."""
+        return np.sum(self.gap(l, y) ** 2) - self.delta[l] ** 2
+
+    def constraint_gradient(self, l, y):  # noqa: E741
+        """Full gradient of g_l at y: (N,). y: (N,)."""
+        gradient = np.zeros((self.agents, self.d), dtype=np.asarray(y).dtype)
+        if l < len(self.edges):
+            i, j = self.edges[l]
+            gradient[j] = -2 * self.gap(l, y)
+        else:
+            i = self.leaders[l - len(self.edges)]
+        gradient[i] = 2 * self.gap(l, y)
+        return gradient.ravel()
 
 
 class OsnrGame:

@@ -15,7 +15,7 @@ import gne_mj
 from gne_mj.scenario import load_scenario, shipped
 
 COMMAND = Path(sys.executable).with_name("gne-mj")
-COMMANDS = ("run", "certify", "paper", "plot", "passivity", "scenarios")
+COMMANDS = ("run", "solve", "certify", "paper", "plot", "passivity", "scenarios")
 FIGURES = {"robots-velocities", "robots-gaps", "channels-powers", "channels-total-power"}
 SHORT = ("--set", "simulation.duration=0.2")
 # crosses the barrier at a stage of its first step

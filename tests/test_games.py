@@ -24,6 +24,16 @@ def velocity(rng, count):
     return velocity_game(count, v0, delta), reference.VelocityGame(v0, delta), interior
 
 
+def desired_velocity(rng, count):
+    _, plain, interior = velocity(rng, count)
+    desired, weight = (
+        rng.uniform(-5, 5, count),
+        rng.uniform(0, 3, count) * rng.integers(0, 2, count),
+    )
+    game = velocity_game(count, plain.v0, plain.delta, desired, weight)
+    return game, reference.VelocityGame(plain.v0, plain.delta, desired, weight), interior
+
+
 def osnr(rng, count):
     parameters = {
         "price": rng.uniform(0.1, 3, count),
@@ -53,7 +63,7 @@ def cournot(rng, count):
     return game, reference.CournotGame(costs, intercept, lower, upper), interior
 
 
-any_game = pytest.mark.parametrize("build", [velocity, osnr, cournot])
+any_game = pytest.mark.parametrize("build", [velocity, desired_velocity, osnr, cournot])
 sizes = st.integers(1, 8)
 seeds = st.integers(0, 2**32 - 1)
 
@@ -309,6 +319,32 @@ def test_bad_gap_bounds(bad):
     with pytest.raises(InvalidInput) as caught:
         velocity_game(3, 3.0, bad)
     assert caught.value.key == "game.gap_bound"
+
+
+@pytest.mark.parametrize(
+    ("key", "bad"),
+    [("desired_velocity", np.nan), ("desired_velocity", [1.0, np.inf, 0.0])]
+    + [("desired_weight", bad) for bad in (-1.0, np.nan, np.inf, [0.0, 0.0, -1e-9])],
+    ids=str,
+)
+def test_bad_desires(key, bad):
+    with pytest.raises(InvalidInput) as caught:
+        velocity_game(3, 3.0, 1.0, **{key: bad})
+    assert caught.value.key == f"game.{key}"
+
+
+def test_a_desired_velocity_of_no_weight_changes_no_bit():
+    rng = np.random.default_rng(6)
+    game, _, interior = velocity(rng, 6)
+    v0, delta = game.parameters[0], game.gap_bounds
+    other = velocity_game(6, v0, delta, rng.uniform(-9, 9, 6), 0.0)
+    for y in interior(20):
+        gap = np.diff(y, prepend=v0)
+        assert np.array_equal(other.costs(y), gap**2)
+        assert np.array_equal(other.pseudo_gradient(y), 2.0 * gap)
+        assert np.array_equal(game.pseudo_gradient(y), 2.0 * gap)
+        assert np.array_equal(game.costs(y), gap**2)
+        assert np.array_equal(game.pseudo_gradient_jacobian(y), 2.0 * (np.eye(6) - np.eye(6, k=-1)))
 
 
 def test_the_crosstalk_of_a_channel_with_itself_is_not_used():

@@ -44,3 +44,56 @@ def test_refusals():
         graphs.Graph(2, ((0, 2),))
     with pytest.raises(InvalidInput, match="10 agents, not 5"):
         graphs.printed(5)
+
+
+@pytest.mark.parametrize("count", [2, 3, 10, 200])
+def test_extreme_eigenvalues_in_closed_form(count):
+    ring, line, complete = (getattr(graphs, name)(count) for name in ("ring", "line", "complete"))
+    turns = 2 - 2 * np.cos(2 * np.pi * np.arange(count) / count)
+    if count > 2:
+        assert ring.algebraic_connectivity == pytest.approx(turns[1], rel=1e-9)
+        assert ring.largest_eigenvalue == pytest.approx(np.max(turns), rel=1e-12)
+    half_turns = 2 - 2 * np.cos(np.pi * np.arange(count) / count)
+    assert line.algebraic_connectivity == pytest.approx(half_turns[1], rel=1e-9)
+    assert line.largest_eigenvalue == pytest.approx(half_turns[-1], rel=1e-12)
+    assert complete.algebraic_connectivity == pytest.approx(count, rel=1e-12)
+    assert complete.largest_eigenvalue == pytest.approx(count, rel=1e-12)
+
+
+def test_a_single_agent_has_no_eigenvalue_to_speak_of():
+    graph = graphs.line(1)
+    assert graph.algebraic_connectivity == graph.largest_eigenvalue == 0.0
+    assert graph.data.pointer.tolist() == [0, 0]
+
+
+def test_eigenvalues_of_a_thousand_agents_on_a_ring():
+    graph = graphs.ring(1000)
+    assert graph.algebraic_connectivity == pytest.approx(2 - 2 * np.cos(2 * np.pi / 1000), rel=1e-9)
+    assert graph.largest_eigenvalue == pytest.approx(4.0, rel=1e-4)
+
+
+@given(st.integers(3, 60), st.integers(0, 2**32 - 1))
+def test_sparse_and_dense_eigenvalues_agree(count, seed):
+    rng = np.random.default_rng(seed)
+    edges = [(i, int(rng.integers(i))) for i in range(1, count)]
+    edges += [tuple(rng.choice(count, 2, replace=False).tolist()) for _ in range(count // 2)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(graphs, "_DENSE", 1)
+        sparse = graphs.Graph(count, tuple(edges))
+        found = sparse.algebraic_connectivity, sparse.largest_eigenvalue
+        again = graphs.Graph(count, tuple(edges)).largest_eigenvalue
+    expected = np.linalg.eigvalsh(reference.laplacian(count, sparse.edges))
+    assert found[0] == pytest.approx(expected[1], rel=1e-8)
+    assert found[1] == pytest.approx(expected[-1], rel=1e-4)
+    assert found[1] == again
+    dense = graphs.Graph(count, tuple(edges))
+    assert dense.algebraic_connectivity == pytest.approx(expected[1], rel=1e-10)
+    assert dense.largest_eigenvalue == pytest.approx(expected[-1], rel=1e-12)
+
+
+def test_a_large_graph_stays_sparse():
+    graph = graphs.ring(5000)
+    assert graph.sparse_laplacian.nnz == 3 * 5000
+    assert len(graph.data.neighbour) == 2 * 5000
+    with pytest.raises(InvalidInput, match=r"agent 1 cannot reach agent 3, 4, 5, 6, 7, \.\.\."):
+        graphs.Graph(5000, ((0, 1),))

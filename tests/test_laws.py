@@ -3,6 +3,8 @@
 from functools import cache
 from types import SimpleNamespace
 
+import block_reference
+import coupled_game
 import numpy as np
 import pytest
 from builders import (
@@ -21,9 +23,10 @@ from builders import (
 
 import reference
 from gne_mj import graph as graphs
-from gne_mj.controllers import FullInformation, FullyDistributed
+from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
@@ -32,6 +35,7 @@ from gne_mj.native import compiled, source_key
 from gne_mj.plants.ode import EULER, Channels
 
 RHO, EPSILON, GAIN = 0.1, 0.05, 0.7
+COUPLING, TAU = 1.7, 0.3
 STATES = 100
 
 
@@ -95,6 +99,14 @@ def pack_memory(estimates, z):
     return np.concatenate([estimates.ravel(), z])
 
 
+def laplacian_of(graph, count):
+    """By the reference's own edges where it has them."""
+    edges = graphs.NAMED[graph](count).edges
+    if graph in ("line", "ring", "complete"):
+        edges = getattr(reference, graph)(count)
+    return reference.laplacian(count, edges)
+
+
 def draw(case):
     """y, and for every agent a filtered profile of its own inside: estimates and z."""
     y = case.interior(1)[0]
@@ -123,10 +135,7 @@ def test_full_information_is_the_formula(kind, count):
 def test_fully_distributed_is_the_formula(kind, count, graph):
     now = case(kind, count)
     law = FullyDistributed(graphs.NAMED[graph](count), EPSILON, GAIN)
-    edges = [*graphs.NAMED[graph](count).edges]
-    if graph in ("line", "ring", "complete"):
-        edges = getattr(reference, graph)(count)
-    laplacian = reference.laplacian(count, edges)
+    laplacian = laplacian_of(graph, count)
     for _ in range(STATES):
         y, estimates, z = draw(now)
         u, rate = step(now.game, law, y, pack_memory(estimates, z))
@@ -141,12 +150,45 @@ def test_fully_distributed_is_the_formula(kind, count, graph):
             assert_same(rates[others], estimates_rate[others])
 
 
+@pytest.mark.parametrize(("kind", "count", "graph"), NETWORKS)
+def test_partial_information_is_the_formula(kind, count, graph):
+    now = case(kind, count)
+    law = PartialInformation(graphs.NAMED[graph](count), COUPLING, TAU)
+    laplacian = laplacian_of(graph, count)
+    for _ in range(STATES):
+        y, estimates, _ = draw(now)
+        u, rate = step(now.game, law, y, estimates.ravel())
+        expected_u, estimates_rate = reference.partial_information(
+            now.oracle, RHO, laplacian, COUPLING, TAU, y, estimates
+        )
+        assert_same(u, expected_u)
+        others = ~np.eye(count, dtype=bool)
+        if count > 1:
+            assert_same(rate.reshape(count, count)[others], estimates_rate[others])
+
+
+def test_by_default_coupling_and_time_constant_are_the_papers():
+    law = PartialInformation(graphs.ring(5))
+    assert (law.coupling, law.time_constant, law.estimate_rate) == (1.0, 1.0, 1.0)
+    now = case("velocity", 5)
+    y, estimates, _ = draw(now)
+    u, rate = step(now.game, law, y, estimates.ravel())
+    expected_u, expected = reference.partial_information(
+        now.oracle, RHO, laplacian_of("ring", 5), 1.0, 1.0, y, estimates
+    )
+    assert_same(u, expected_u)
+    others = ~np.eye(5, dtype=bool)
+    assert_same(rate.reshape(5, 5)[others], expected[others])
+
+
 def test_own_blocks_of_the_estimates_stay_as_they_are():
     now = case("osnr", 10)
     y, estimates, z = draw(now)
     np.fill_diagonal(estimates, np.arange(10.0))
     _, rate = step(now.game, distributed(epsilon=EPSILON), y, pack_memory(estimates, z))
     assert np.all(np.diag(rate[:100].reshape(10, 10)) == 0)
+    _, rate = step(now.game, PartialInformation(graphs.ring(10)), y, estimates.ravel())
+    assert np.all(np.diag(rate.reshape(10, 10)) == 0)
 
 
 def test_the_five_robots_first_forces():
@@ -176,19 +218,29 @@ def native(law, game):
     return action, rate
 
 
+def ask(game, law, y, weights, memory):
+    """Code, u and the memory's rates by the law's kernels."""
+    action, rate = native(law.kernels, game.kernels)
+    u, rates = np.full(len(y), np.nan), np.full(len(memory), np.nan)
+    problem = problem_of(game, law)
+    code = action(problem, y, weights, memory, work(len(y), len(weights), game.agents), u)
+    rate(problem, y, memory, rates)
+    return code, u, rates
+
+
 def act(game, law, y, estimates, z):
     """Code, u, rates of the estimates and of z by the distributed law, true weights unknown."""
-    action, rate = native(law.kernels, game.kernels)
-    memory, u, rates = (
-        pack_memory(estimates, z),
-        np.full(len(y), np.nan),
-        np.full(len(y) ** 2 + len(y), np.nan),
-    )
     unknown = np.full(game.constraints_count, np.nan)
-    problem = problem_of(game, law)
-    code = action(problem, y, unknown, memory, work(len(y), len(unknown), game.agents), u)
-    rate(problem, y, memory, rates)
-    return code, u, rates[: len(y) ** 2].reshape(len(y), -1), rates[len(y) ** 2 :]
+    code, u, rates = ask(game, law, y, unknown, pack_memory(estimates, z))
+    size = estimates.size
+    return code, u, rates[:size].reshape(estimates.shape), rates[size:]
+
+
+def act_partially(game, law, y, weights, estimates):
+    """u and the estimates' rates under partial information, with these barrier weights."""
+    code, u, rates = ask(game, law, y, weights, estimates.ravel())
+    assert code == -1
+    return u, rates.reshape(estimates.shape)
 
 
 @pytest.mark.parametrize(
@@ -232,6 +284,172 @@ def test_distributed_rates_depend_on_neighbours_messages_only(kind, count, graph
         _, _, rates, z_rates = act(now.game, law, hidden_y, hidden, hidden_z)
         assert np.array_equal(rates[i], estimates_rate[i])
         assert z_rates[i] == z_rate[i]
+
+
+PARTIAL_NETWORKS = pytest.mark.parametrize(
+    ("kind", "count", "graph"),
+    [
+        ("velocity", 5, "line"),
+        ("velocity", 5, "ring"),
+        ("osnr", 10, "line"),
+        ("osnr", 10, "printed"),
+    ],
+)
+
+
+@PARTIAL_NETWORKS
+def test_a_partial_action_depends_on_what_the_agent_may_see(kind, count, graph):
+    """y_i, the barrier of its own constraints, its estimates of agents in its cost, and what its
+    neighbours take y_i to be; all else becomes NaN, and not a bit changes."""
+    now = case(kind, count)
+    game, law = now.game, PartialInformation(graphs.NAMED[graph](count), COUPLING, TAU)
+    y, estimates, _ = draw(now)
+    weights = RHO / -game.constraints(y)
+    u, _ = act_partially(game, law, y, weights, estimates)
+    assert np.all(np.isfinite(u))
+    for i in range(count):
+        heard = np.flatnonzero(law.graph.laplacian[i] < 0)
+        shared = [l for l, members in enumerate(game.in_constraint) if i in members]  # noqa: E741
+        measured = sorted({i}.union(*(game.in_constraint[l] for l in shared)))  # noqa: E741
+        seen_weights, seen_y = np.full(len(weights), np.nan), np.full(count, np.nan)
+        seen_weights[shared], seen_y[measured] = weights[shared], y[measured]
+        seen = np.full((count, count), np.nan)
+        costly = [j for j in game.in_cost[i] if j != i]
+        seen[i, costly] = estimates[i, costly]
+        seen[heard, i] = estimates[heard, i]
+        other_u, _ = act_partially(game, law, seen_y, seen_weights, seen)
+        assert other_u[i] == u[i]
+        # and it does depend on each of these
+        for j in costly:
+            changed = estimates.copy()
+            changed[i, j] += 0.01
+            assert act_partially(game, law, y, weights, changed)[0][i] != u[i]
+        for j in heard:
+            changed = estimates.copy()
+            changed[j, i] += 0.01
+            assert act_partially(game, law, y, weights, changed)[0][i] != u[i]
+
+
+@PARTIAL_NETWORKS
+def test_partial_rates_depend_on_neighbours_messages_only(kind, count, graph):
+    """Neighbours' rows, with their own actions in place; not even the agent's own action."""
+    now = case(kind, count)
+    game, law = now.game, PartialInformation(graphs.NAMED[graph](count), COUPLING, TAU)
+    y, estimates, _ = draw(now)
+    unknown = np.full(game.constraints_count, np.nan)
+    _, rates = act_partially(game, law, y, unknown, estimates)
+    for i in range(count):
+        heard = np.flatnonzero(law.graph.laplacian[i] < 0)
+        seen_y, seen = np.full(count, np.nan), np.full((count, count), np.nan)
+        seen_y[heard], seen[heard], seen[i] = y[heard], estimates[heard], estimates[i]
+        seen[heard, i] = np.nan
+        _, other = act_partially(game, law, seen_y, unknown, seen)
+        assert np.array_equal(other[i], rates[i])
+        assert np.all(np.isfinite(other[i]))
+
+
+# --------------------------------------------------------------- actions of several entries
+
+
+BLOCK_GRAPHS = {
+    "line": ((0, 1), (1, 2)),
+    "star": ((0, 2), (0, 1)),
+    "complete": ((0, 1), (0, 2), (1, 2)),
+}
+
+
+def coupled():
+    """A game with actions of two, one and one entries, and its plain version."""
+    return Game(
+        "coupled", coupled_game, np.array([0.3]), coupled_game.SIZES, ((0, 1, 2),) * 3,
+        coupled_game.IN_CONSTRAINT, ("ball", "product"),
+    ), block_reference.CoupledGame(0.3)  # fmt: skip
+
+
+def block_profiles(oracle, rng, rows):
+    """Random profiles strictly inside, (rows, 4)."""
+    found = []
+    while len(found) < rows:
+        y = rng.uniform(-1.6, 1.6, 4)
+        if all(oracle.constraint(l, y) < -0.05 for l in range(2)):  # noqa: E741
+            found.append(y)
+    return np.array(found)
+
+
+def block_draw(oracle, rng):
+    """y, estimates whose own blocks are no numbers, z, all inside."""
+    y, z, *rows = block_profiles(oracle, rng, 5)
+    estimates = np.array(rows)
+    for i, at in enumerate(block_reference.blocks(oracle.sizes)):
+        while True:
+            filtered = estimates[i].copy()
+            filtered[at] = z[at]
+            if all(oracle.constraint(l, filtered) < 0 for l in range(2)):  # noqa: E741
+                break
+            estimates[i] = block_profiles(oracle, rng, 1)[0]
+        estimates[i, at] = np.nan
+    return y, estimates, z
+
+
+@pytest.mark.parametrize("name", BLOCK_GRAPHS)
+def test_laws_of_actions_of_several_entries(name):
+    game, oracle = coupled()
+    rng = np.random.default_rng(len(name))
+    graph = graphs.Graph(3, BLOCK_GRAPHS[name])
+    neighbours = [list(np.flatnonzero(row < 0)) for row in graph.laplacian]
+    own = game.agent_of_action == np.arange(3)[:, None]
+    partial = PartialInformation(graph, COUPLING, TAU)
+    distributed_law = FullyDistributed(graph, EPSILON, GAIN)
+    for _ in range(STATES):
+        y, estimates, z = block_draw(oracle, rng)
+        weights = RHO / -np.array([oracle.constraint(l, y) for l in range(2)])  # noqa: E741
+        _, u, _ = ask(game, FullInformation(), y, weights, np.zeros(0))
+        assert_same(u, block_reference.full_information(oracle, RHO, y))
+
+        u, rates = act_partially(game, partial, y, weights, estimates)
+        expected_u, expected = block_reference.partial_information(
+            oracle, RHO, neighbours, COUPLING, TAU, y, estimates
+        )
+        assert_same(u, expected_u)
+        assert_same(rates[~own], expected[~own])
+        assert np.all(rates[own] == 0)
+
+        code, u, rates, z_rates = act(game, distributed_law, y, estimates, z)
+        expected_u, expected, expected_z = block_reference.fully_distributed(
+            oracle, RHO, neighbours, GAIN, EPSILON, y, z, estimates
+        )
+        assert code == -1
+        assert_same(u, expected_u)
+        assert_same(rates[~own], expected[~own])
+        assert np.all(rates[own] == 0)
+        assert_same(z_rates, expected_z)
+
+
+@pytest.mark.slow
+def test_loops_of_actions_of_several_entries():
+    """The same by the compiled loops."""
+    game, oracle = coupled()
+    rng = np.random.default_rng(7)
+    graph = graphs.Graph(3, BLOCK_GRAPHS["star"])
+    neighbours = [list(np.flatnonzero(row < 0)) for row in graph.laplacian]
+    own = (game.agent_of_action == np.arange(3)[:, None]).ravel()
+    for _ in range(STATES):
+        y, estimates, z = block_draw(oracle, rng)
+        u, _ = step(game, FullInformation(), y, np.zeros(0))
+        assert_same(u, block_reference.full_information(oracle, RHO, y))
+        u, rates = step(game, PartialInformation(graph, COUPLING, TAU), y, estimates.ravel())
+        expected_u, expected = block_reference.partial_information(
+            oracle, RHO, neighbours, COUPLING, TAU, y, estimates
+        )
+        assert_same(u, expected_u)
+        assert_same(rates[~own], expected.ravel()[~own])
+        u, rates = step(game, FullyDistributed(graph, EPSILON, GAIN), y, pack_memory(estimates, z))
+        expected_u, expected, expected_z = block_reference.fully_distributed(
+            oracle, RHO, neighbours, GAIN, EPSILON, y, z, estimates
+        )
+        assert_same(u, expected_u)
+        assert_same(rates[:12][~own], expected.ravel()[~own])
+        assert_same(rates[12:], expected_z)
 
 
 def test_full_information_sees_outputs_only():
@@ -348,6 +566,8 @@ def test_the_memory_at_the_start_knows_everybody():
     y = np.array([1.0, 2.0, 3.0, 4.0])
     assert np.array_equal(law.initial_memory(y), [*y, *y, *y, *y, *y])
     assert FullInformation().initial_memory(y).shape == (0,)
+    partial = PartialInformation(graphs.ring(4))
+    assert np.array_equal(partial.initial_memory(y), [*y, *y, *y, *y])
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
@@ -355,3 +575,10 @@ def test_the_memory_at_the_start_knows_everybody():
 def test_bad_numbers_of_the_law(key, bad):
     with pytest.raises(InvalidInput, match=f"controller.{key}"):
         distributed(count=3, graph="line", **{"epsilon": 0.1, key: bad})
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("key", ["coupling", "time_constant"])
+def test_bad_numbers_of_partial_information(key, bad):
+    with pytest.raises(InvalidInput, match=f"controller.{key}"):
+        PartialInformation(graphs.line(3), **{key: bad})

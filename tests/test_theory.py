@@ -530,7 +530,7 @@ def test_the_papers_first_experiment_is_certified():
     assert [a.label for a in theorem.assumptions] == [
         "asmp:cost", "asmp:pseudo(a)", "asmp:nonlinearPlant",
     ]  # fmt: skip
-    assert "2p affine" in theorem.assumptions[0].why
+    assert "10 affine constraints" in theorem.assumptions[0].why
 
 
 def test_the_papers_second_experiment_is_certified_for_small_epsilon():

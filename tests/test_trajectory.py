@@ -34,6 +34,8 @@ ROBOTS = {
     "extension": (("time", "agent"), "m"),
     "gap": (("time", "agent"), "m/s"),
     "gap_bound": (("agent",), "m/s"),
+    "gap_lower_bound": (("agent",), "m/s"),
+    "appendage_velocity": (("time", "agent"), "m/s"),
     "equilibrium": (("agent",), "m/s"),
 }
 CHANNELS = {
@@ -43,6 +45,8 @@ CHANNELS = {
     "state": (("time", "agent", "component"), "mW, mW"),
     "estimate": (("time", "estimating_agent", "agent"), "mW"),
     "filtered_action": (("time", "agent"), "mW"),
+    "total_power": (("time",), "mW"),
+    "total_power_bound": ((), "mW"),
     "equilibrium": (("agent",), "mW"),
 }
 
@@ -162,6 +166,9 @@ def test_what_is_recorded_fits_together(trajectory):
     y = robots["action"].to_numpy()
     gap = np.diff(y, axis=1, prepend=3.0)
     assert np.array_equal(robots["gap"], gap)
+    assert np.array_equal(robots["gap_lower_bound"], -robots["gap_bound"])
+    assert np.array_equal(channels["total_power"], channels["action"].sum("agent"))
+    assert float(channels["total_power_bound"]) == 2.5
     assert np.allclose(robots["constraint"], gap**2 - robots["gap_bound"].to_numpy() ** 2)
     y = channels["action"].to_numpy()
     expected = np.concatenate([-y, y.sum(axis=1, keepdims=True) - 2.5], axis=1)

@@ -69,6 +69,7 @@ def cournot_game(
         action_name="quantity",
         affine=True,
         box=(lower.copy(), upper.copy()),
+        agent_name="firm",
     )
 
 

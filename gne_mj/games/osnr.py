@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Box, Game
 from gne_mj.native import kernel
+from gne_mj.quantity import Quantity
 
 
 def osnr_game(
@@ -63,6 +64,13 @@ def osnr_game(
     if not (np.isfinite(total_power_limit) and total_power_limit > 0):
         raise InvalidInput("game.total_power_limit", total_power_limit, "it must be positive")
     everyone = list(range(agents))
+    total = Quantity(
+        name="total_power",
+        long_name="total power",
+        unit="mW",
+        values=lambda y: np.sum(y, axis=1),
+        bound=total_power_limit,
+    )
     return Game(
         name="OSNR",
         kernels=sys.modules[__name__],
@@ -76,6 +84,8 @@ def osnr_game(
         action_name="power",
         action_unit="mW",
         box=(np.zeros(agents), np.full(agents, total_power_limit)),
+        agent_name="channel",
+        quantities=(total,),
         jacobian_bounds=partial(
             _jacobian_bounds,
             np.prod([columns["utility_weight"], columns["gain"]], axis=0),

@@ -1,9 +1,11 @@
 """Velocity synchronisation with bounded gaps along a line of robots [eq:sensorNetGNE].
 
-J_i = (y_i - y_{i-1})^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2 with y_0 := v_0, velocities in m/s.
-The constraints are shared: g_{i+1} contains y_i too, so agent i feels its follower.
+J_i = (y_i - y_{i-1})^2 + w_i (y_i - v_i^d)^2 and g_i = (y_i - y_{i-1})^2 - delta_i^2, where
+y_0 := v_0; velocities in m/s. The constraints are shared: g_{i+1} contains y_i too, so agent i
+feels its follower. The paper's game has no desired velocities v_i^d (w = 0), and the equilibrium
+v_0 whatever the bounds are; with w_i > 0 some of them can bind.
 
-Parameters q = [v_0, delta_1, ..., delta_N].
+Parameters q = [v_0, delta_1, ..., delta_N, v_1^d, ..., v_N^d, w_1, ..., w_N].
 """
 
 import sys
@@ -14,25 +16,59 @@ from numpy.typing import ArrayLike
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
+from gne_mj.quantity import Quantity
 
 
-def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) -> Game:
+def velocity_game(
+    agents: int,
+    reference_velocity: float,
+    gap_bound: ArrayLike,
+    desired_velocity: ArrayLike | None = None,
+    desired_weight: ArrayLike = 0.0,
+) -> Game:
     """The game of N robots that follow each other, the first one a reference velocity.
 
     Args:
         agents: N.
         reference_velocity: v_0 in m/s.
         gap_bound: delta_i > 0 in m/s, one for all or one each.
+        desired_velocity: v_i^d in m/s, one for all or one each; v_0 if left out.
+        desired_weight: w_i >= 0, how much agent i weighs it, one for all or one each.
+
+    Raises:
+        InvalidInput: a number that is not finite, a bound that is not positive, a weight below 0.
     """
     bounds = np.broadcast_to(np.asarray(gap_bound, dtype=np.float64), (agents,))
     if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
         raise InvalidInput("game.gap_bound", gap_bound, "every bound must be positive and finite")
+    if desired_velocity is None:
+        desired_velocity = reference_velocity
+    desired = np.broadcast_to(np.asarray(desired_velocity, dtype=np.float64), (agents,))
+    if not np.all(np.isfinite(desired)):
+        raise InvalidInput(
+            "game.desired_velocity", desired_velocity, "every velocity must be finite"
+        )
+    weights = np.broadcast_to(np.asarray(desired_weight, dtype=np.float64), (agents,))
+    if not np.all(weights >= 0) or not np.all(np.isfinite(weights)):
+        raise InvalidInput(
+            "game.desired_weight", desired_weight, "every weight must be finite and not negative"
+        )
     reach = np.cumsum(bounds)
+    gaps = Quantity(
+        name="gap",
+        long_name="velocity gap",
+        unit="m/s",
+        values=lambda y: np.diff(y, axis=1, prepend=reference_velocity),
+        each="agent",
+        symbol="y_i - y_{i-1}",
+        bound=bounds,
+        lower_bound=-bounds,
+    )
     predecessors = [[] if i == 0 else [i - 1] for i in range(agents)]
     return Game(
         name="velocity synchronisation",
         kernels=sys.modules[__name__],
-        parameters=np.concatenate([[reference_velocity], bounds]),
+        parameters=np.concatenate([[reference_velocity], bounds, desired, weights]),
         sizes=(1,) * agents,
         in_cost=[[i, *before] for i, before in enumerate(predecessors)],
         in_constraint=[[*before, i] for i, before in enumerate(predecessors)],
@@ -42,6 +78,9 @@ def velocity_game(agents: int, reference_velocity: float, gap_bound: ArrayLike) 
         affine=True,
         box=(reference_velocity - reach, reference_velocity + reach),
         gap_bounds=bounds,
+        affine_constraints=2 * agents,  # -delta_i <= gap_i <= delta_i
+        agent_name="robot",
+        quantities=(gaps,),
     )
 
 
@@ -52,21 +91,33 @@ def gap(q, i, y):
 
 
 @kernel
+def desired_velocity(q, i):
+    """v_i^d."""
+    return q[1 + (len(q) - 1) // 3 + i]
+
+
+@kernel
+def desired_weight(q, i):
+    """w_i."""
+    return q[1 + (len(q) - 1) // 3 * 2 + i]
+
+
+@kernel
 def cost(q, i, y):
-    """J_i = gap_i^2."""
-    return gap(q, i, y) ** 2
+    """J_i = gap_i^2 + w_i (y_i - v_i^d)^2."""
+    return gap(q, i, y) ** 2 + desired_weight(q, i) * (y[i] - desired_velocity(q, i)) ** 2
 
 
 @kernel
 def cost_gradient(q, i, a, y):
-    """dJ_i/dy_i = 2 gap_i."""
-    return 2.0 * gap(q, i, y)
+    """dJ_i/dy_i = 2 gap_i + 2 w_i (y_i - v_i^d)."""
+    return 2.0 * gap(q, i, y) + 2.0 * desired_weight(q, i) * (y[i] - desired_velocity(q, i))
 
 
 @kernel
 def add_cost_hessian(q, i, a, y, scale, out):
-    """2 for the agent itself, -2 for its predecessor."""
-    out[i] += 2.0 * scale
+    """2 + 2 w_i for the agent itself, -2 for its predecessor."""
+    out[i] += 2.0 * scale + 2.0 * scale * desired_weight(q, i)
     if i > 0:
         out[i - 1] -= 2.0 * scale
 

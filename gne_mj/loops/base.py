@@ -27,9 +27,11 @@ class ClosedLoop(ABC):
 
     Attributes:
         monitor: the flat array of :mod:`gne_mj.loops.monitor`.
+        keeps: what must live as long as the loop, as plain functions that it knows by address.
     """
 
     monitor: NDArray[np.float64]
+    keeps: object = None
 
     @abstractmethod
     def advance(self, samples: int, every: int) -> Samples:

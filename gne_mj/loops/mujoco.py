@@ -41,6 +41,7 @@ from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
     LOOP_MARK,
+    MARK,
     USERDATA_HEADER,
     Offsets,
     Table,
@@ -216,7 +217,7 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         parts = parts_of(userdata, sizes[ROOM], steps[0], steps[1], steps[2], states)
         memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
         law.rate(problem_in(table), parts[2].y, memory, rates)
-        return 0.0
+        return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
     def advance(
         mj_step, model, data, qpos, qvel, act, userdata, start, m, p, agents, restores, every,
@@ -347,7 +348,6 @@ class MujocoLoop(ClosedLoop):
         data = plant.data
         data.userdata[:] = 0.0
         sizes = plant.table_arrays[SIZES]
-        self._step = 0
         self._start = int(sizes[ROOM])
         self._sizes = (m, p, agents)
         moved = mode == CONTINUOUS and len(memory) > 0  # by the integrator
@@ -360,6 +360,12 @@ class MujocoLoop(ClosedLoop):
         length = int(watch.length(m, p))
         self.monitor = data.userdata[first : first + length]
         self._u = data.userdata[first + length : first + length + m]
+        self._mark()
+
+    @property
+    def _step(self) -> int:
+        """Steps taken; in userdata, so that a state that is set again brings its own time."""
+        return int(self.plant.data.userdata[self._start + STEP_NOW])
 
     @property
     def time(self) -> float:
@@ -378,9 +384,8 @@ class MujocoLoop(ClosedLoop):
             np.empty((samples, m)),
             np.empty((samples, len(self._memory))),
         )
-        self._mark()
-        # The callback counts steps and stages; a step that ended in an exit is not one of them.
-        data.userdata[self._start + STEP_NOW] = self._step
+        self._check_mark()
+        first = self._step
         data.userdata[self._start + STAGE_NOW] = 0.0
         remember = self._remember if restores else None
         with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
@@ -389,7 +394,8 @@ class MujocoLoop(ClosedLoop):
                 self._memory, data.userdata, self._start, *self._sizes, restores, every, before,
                 *recorded,
             )  # fmt: skip
-        self._step += steps
+        # The callback counts steps, but one that ended in an exit was not taken.
+        data.userdata[self._start + STEP_NOW] = first + steps
         data.time = self.time
         states, inputs, memories = (rows[:done] for rows in recorded)
         return Samples(states.reshape(-1, m, agents.states), inputs, memories)
@@ -398,15 +404,18 @@ class MujocoLoop(ClosedLoop):
         """See the base class."""
         data = self.plant.data
         state = self.plant.state  # first, since it brings a plant's sensors up to date
-        self._mark()
+        self._check_mark()
         inside = self._finish(self.plant.model._address, data._address, self._step)
         u = self._u if inside else np.full_like(self._u, np.nan)
         return Samples(state[None], u[None].copy(), self._memory[None].copy())
 
     def _mark(self) -> None:
-        """Mark the data as this loop's: the plant's own step, or a reset, may have come between."""
-        if self._step > 0 and self.monitor[watch.STARTED] == 0.0:
+        self.plant.data.userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
+
+    def _check_mark(self) -> None:
+        """Mark the data as this loop's again: the plant's own step may have come between."""
+        if self.plant.data.userdata[MARK] == 0.0:
             raise EngineError(
                 "the loop's MuJoCo data was reset: make a new loop to start from there"
             )
-        self.plant.data.userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
+        self._mark()

@@ -18,6 +18,7 @@ from gne_mj.passivity.report import (
 from gne_mj.passivity.trials import Build, Rest, Storage, Trials
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
+from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import OdePlant
 
 # Channels in one simulation, at most
@@ -35,9 +36,13 @@ def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
         if engine == "ode":
             return OdePlant(agents.repeated(copies), timestep, method)
         # Late: MuJoCo is slow to import, and the twins do not need it.
+        from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
-        return MujocoPlant(agents.repeated(copies), timestep, method, decorated=False)
+        fleet = agents.repeated(copies)
+        if isinstance(fleet, MjcfRobots):
+            return MjcfPlant(fleet, timestep, method)
+        return MujocoPlant(fleet, timestep, method, decorated=False)
 
     return build
 

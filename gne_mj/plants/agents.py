@@ -1,9 +1,9 @@
 """A group of agents of one type: what has state, and knows nothing of games and controllers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,11 +20,13 @@ class Agents:
         kind: module that describes a channel (:mod:`gne_mj.plants.integrator` says how).
         parameters: (m, numbers of the type), one row a channel.
         input_limit: (m,) greatest |u| that the actuators deliver, infinite for no limit.
+        dimension: channels of each agent; all channels are numbered agent by agent.
     """
 
     kind: ModuleType
     parameters: NDArray[np.float64]
     input_limit: NDArray[np.float64]
+    dimension: int = 1
 
     def __post_init__(self) -> None:
         width = len(self.kind.PARAMETERS)
@@ -32,6 +34,12 @@ class Agents:
         if parameters.ndim != 2 or parameters.shape[1] != width:
             raise InvalidInput(
                 "agents.parameters", parameters.shape, f"its shape must be (channels, {width})"
+            )
+        if self.dimension < 1 or len(parameters) % self.dimension:
+            raise InvalidInput(
+                "agents.dimension",
+                self.dimension,
+                f"it must be positive and divide the {len(parameters)} channels",
             )
         limit = np.array(self.input_limit, dtype=np.float64)
         if limit.shape != parameters.shape[:1] or not np.all(limit > 0):
@@ -48,15 +56,27 @@ class Agents:
         return len(self.parameters)
 
     @property
+    def count(self) -> int:
+        """N."""
+        return self.channels // self.dimension
+
+    @property
     def states(self) -> int:
         """States of a channel."""
         return len(self.kind.STATES)
 
-    def repeated(self, copies: int) -> "Agents":
+    def repeated(self, copies: int) -> Self:
         """The same agents ``copies`` times in a row."""
-        return Agents(
-            self.kind, np.tile(self.parameters, (copies, 1)), np.tile(self.input_limit, copies)
+        return replace(
+            self,
+            parameters=np.tile(self.parameters, (copies, 1)),
+            input_limit=np.tile(self.input_limit, copies),
         )
+
+    @property
+    def knows_storage(self) -> bool:
+        """Whether the type has a storage function; without one, ``storage`` is zero."""
+        return bool(getattr(self.kind, "KNOWS_STORAGE", True))
 
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""

@@ -25,6 +25,7 @@ STATES = (
     ("position", "m"),
 )
 OUTPUT = 1
+INPUT_UNIT = "N"
 
 
 def is_passive(parameters):

@@ -2,9 +2,10 @@
 
 Every agent module describes one channel, that is one scalar output with its input; an agent with
 an action of m_i entries is m_i such channels. It defines PARAMETERS (their names), STATES (names
-and units), OUTPUT (which of them is y), ``is_passive`` (whether given parameters meet the theory's
-assumption), and the kernels below; x' is affine in u. It may define ``energy_balance``, from which
-the theory's rates follow.
+and units; an empty unit stands for the action's), OUTPUT (which of them is y; the others are
+recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
+given parameters meet the theory's assumption), and the kernels below; x' is affine in u. It may
+define ``energy_balance``, from which the theory's rates follow.
 """
 
 import numpy as np
@@ -15,6 +16,7 @@ NAME = "integrator"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)
 OUTPUT = 0
+INPUT_UNIT = ""
 
 
 def is_passive(parameters):

@@ -24,13 +24,14 @@ STATES = (
     ("position", "m, robots"),
 )
 OUTPUT = 1
+INPUT_UNIT = "N for robots, else the output's per second"
 TYPES: tuple[ModuleType, ...] = (flexible_robot, integrator, pi_cascade)
 ROBOT, INTEGRATOR, PI_CASCADE = range(3)
 PARAMETERS = ("type", *(f"number_{n}" for n in range(1, 6)))
 
 
-def join(groups: Sequence[Agents]) -> Agents:
-    """One fleet of all groups' channels, in their order."""
+def join(groups: Sequence[Agents], dimension: int = 1) -> Agents:
+    """One fleet of all groups' channels, in their order; so many channels are an agent's."""
     rows = []
     for group in groups:
         block = np.zeros((group.channels, len(PARAMETERS)))
@@ -38,7 +39,7 @@ def join(groups: Sequence[Agents]) -> Agents:
         block[:, 1 : 1 + group.parameters.shape[1]] = group.parameters
         rows.append(block)
     limits = np.concatenate([group.input_limit for group in groups])
-    return Agents(sys.modules[__name__], np.concatenate(rows), limits)
+    return Agents(sys.modules[__name__], np.concatenate(rows), limits, dimension)
 
 
 def by_type(

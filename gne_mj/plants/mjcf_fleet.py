@@ -62,8 +62,8 @@ def stored(channels, state, userdata):
 class MjcfPlant(Plant):
     """A fleet of the user's own robots in MuJoCo.
 
-    Each file's bodies are attached to one world, side by side, with the first file's gravity and
-    flags; contacts are between a robot's own geoms and whatever its file brings along. A fleet
+    Each file's bodies are attached to one world, side by side; all must have one gravity and the
+    same flags; contacts are between a robot's own geoms and whatever its file brings along. A fleet
     starts from the models' reference pose at the given outputs.
 
     Args:
@@ -78,10 +78,12 @@ class MjcfPlant(Plant):
         model, data: MuJoCo's own.
 
     Raises:
-        InvalidInput: a file that MuJoCo cannot read, or a name that it does not have.
+        InvalidInput: a file that MuJoCo cannot read, a name that it does not have, or an actuator
+            that would clamp inputs that the agents' limit allows.
     """
 
     passive = None
+    agents: MjcfRobots
 
     def __init__(
         self,
@@ -131,6 +133,7 @@ class MjcfPlant(Plant):
         if actuator < 0:
             names = _names(model, "actuator", prefix)
             raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
+        self._check_limit(i, robot, actuator)
         if sensor >= 0:
             kind = mujoco.mjtSensor(model.sensor_type[sensor])
             if kind == mujoco.mjtSensor.mjSENS_JOINTVEL:
@@ -154,6 +157,24 @@ class MjcfPlant(Plant):
         ):
             raise InvalidInput("agents.output", robot.output, "it must be a slide or a hinge joint")
         return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint]), actuator
+
+    def _check_limit(self, i: int, robot: RobotFile, actuator: int) -> None:
+        """MuJoCo clamps silently; what the law asks for must not be changed unseen."""
+        model, limit = self.model, self.agents.input_limit[i]
+        ranges = []
+        if model.actuator_ctrllimited[actuator]:
+            ranges.append(model.actuator_ctrlrange[actuator])
+        if model.actuator_forcelimited[actuator]:
+            gain = model.actuator_gainprm[actuator, 0] or 1.0
+            ranges.append(np.sort(model.actuator_forcerange[actuator] / gain))
+        least = min((min(-low, high) for low, high in ranges), default=np.inf)
+        if limit > least:
+            raise InvalidInput(
+                "agents.input_limit",
+                limit,
+                f"actuator '{robot.input}' of agent {i + 1} clamps its input: give a limit of at"
+                f" most {least:g}",
+            )
 
     @property
     def state(self) -> NDArray[np.float64]:
@@ -179,6 +200,13 @@ class MjcfPlant(Plant):
             slopes[:, column] = self.state[:, 0]
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
         mujoco.mj_forward(self.model, self.data)
+        missed = np.abs(self.state[:, 0] - state[:, 0])
+        if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
+            raise InvalidInput(
+                "agents.output",
+                self.agents.robots[int(np.argmax(missed))].output,
+                "in the file's reference pose no joint velocities give it its initial value",
+            )
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
@@ -190,18 +218,21 @@ class MjcfPlant(Plant):
 
 def _world(robots: tuple[RobotFile, ...]) -> Any:
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
-    files: dict[Any, Any] = {}
     for i, robot in enumerate(robots):
         try:
-            files[robot.path] = spec = mujoco.MjSpec.from_file(str(robot.path))
+            spec = mujoco.MjSpec.from_file(str(robot.path))
         except (ValueError, OSError) as error:
             raise InvalidInput(
                 "agents.file", str(robot.path), f"MuJoCo must read it: {error}"
             ) from None
-        if i == 0:
-            world.option.gravity = spec.option.gravity
-            world.option.disableflags = spec.option.disableflags
-            world.option.enableflags = spec.option.enableflags
+        for name in ("gravity", "disableflags", "enableflags"):
+            own = getattr(spec.option, name)
+            if i == 0:
+                setattr(world.option, name, own)
+            elif np.any(own != getattr(world.option, name)):
+                raise InvalidInput(
+                    "agents.file", str(robot.path), f"its {name} must be that of the first file"
+                )
         for key in list(spec.keys):
             spec.delete(key)
         frame = world.worldbody.add_frame(pos=[0.0, SPACING * i, 0.0])
@@ -215,7 +246,9 @@ def _add_memory(world: Any, memory: int) -> None:
     """An actuator without any force that holds a law's memory, last in ``act``."""
     holder = world.add_actuator(name="memory")
     holder.trntype = mujoco.mjtTrn.mjTRN_JOINT
-    holder.target = world.joints[0].name
+    joint = world.joints[0]
+    joint.name = joint.name or "memory"
+    holder.target = joint.name
     holder.dyntype = mujoco.mjtDyn.mjDYN_USER
     holder.actdim = memory
     holder.gear = np.zeros(6)

@@ -5,8 +5,9 @@ of it; :mod:`gne_mj.passivity` examines them by experiment. Channel parameters: 
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from gne_mj.plants.agents import Agents
 
 NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
-STATES = (("output", ""), ("position", ""))
+STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
+INPUT_UNIT = "the actuator's ctrl"
+KNOWS_STORAGE = False
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,10 @@ class MjcfRobots(Agents):
     """
 
     robots: tuple[RobotFile, ...] = ()
+
+    def repeated(self, copies: int) -> Self:
+        """See the base class."""
+        return replace(super().repeated(copies), robots=self.robots * copies)
 
 
 def mjcf_robots(robots: tuple[RobotFile, ...], input_limit: np.ndarray) -> MjcfRobots:

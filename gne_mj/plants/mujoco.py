@@ -13,7 +13,7 @@ from gne_mj.native import callback, compiled, kernel, source_key
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
-from gne_mj.plants.fleet import compile_model, compose
+from gne_mj.plants.fleet import compile_model, compose, element_names
 from gne_mj.plants.native_mujoco import (
     CALLBACK,
     PLANT_MARK,
@@ -129,10 +129,10 @@ def run_steps() -> Any:
 
 
 class MujocoPlant(Plant):
-    """A fleet of flexible robots in the lane.
+    """A fleet of flexible robots in the lane, or of planar ones in the plane.
 
     Args:
-        agents: flexible robots, one channel each.
+        agents: flexible robots, of one channel each or (planar) of two.
         timestep: in s.
         integrator: "rk4" or "euler". MuJoCo's implicit integrators drop the damping of a tendon
             between sibling bodies, and are not offered.
@@ -166,7 +166,7 @@ class MujocoPlant(Plant):
         self.kernels = sys.modules[__name__]
         self.passive = passive_callback(offsets())
         self.model = compile_model(
-            compose(agents.parameters, decorated=decorated),
+            compose(agents.parameters, dimension=agents.dimension, decorated=decorated),
             timestep=timestep,
             integrator=INTEGRATORS[integrator],
             userdata=ARCTANGENTS + agents.channels + userdata,
@@ -177,8 +177,11 @@ class MujocoPlant(Plant):
         self._table = Table(self.table_arrays)
 
     def _table_arrays(self) -> list[NDArray[Any]]:
-        def joints(name: str) -> list[Any]:
-            return [self.model.joint(f"robot_{i + 1}/{name}") for i in range(self.agents.channels)]
+        def names(what: str) -> list[str]:
+            return element_names(what, self.agents.channels, self.agents.dimension)
+
+        def joints(what: str) -> list[Any]:
+            return [self.model.joint(name) for name in names(what)]
 
         main, appendage = joints("position"), joints("appendage_position")
         self.places = np.empty((self.agents.channels, PLACES_COUNT), dtype=np.int64)
@@ -186,9 +189,7 @@ class MujocoPlant(Plant):
         self.places[:, APPENDAGE_Q] = [joint.qposadr[0] for joint in appendage]
         self.places[:, MAIN_V] = [joint.dofadr[0] for joint in main]
         self.places[:, APPENDAGE_V] = [joint.dofadr[0] for joint in appendage]
-        self.places[:, ACTUATOR] = [
-            self.model.actuator(f"robot_{i + 1}/force").id for i in range(self.agents.channels)
-        ]
+        self.places[:, ACTUATOR] = [self.model.actuator(name).id for name in names("force")]
         model = self.model
         room = ARCTANGENTS + self.agents.channels
         sizes = (model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)

@@ -15,6 +15,7 @@ NAME = "PI cascade"
 PARAMETERS = ("decay_rate", "integral_gain")
 STATES = (("action", ""), ("integral", ""))
 OUTPUT = 0
+INPUT_UNIT = ""
 
 
 def is_passive(parameters):

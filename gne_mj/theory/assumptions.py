@@ -49,10 +49,10 @@ def costs(system: System, slopes: Slopes) -> Assumption:
     compact = "" if game.box is not None else "; that the feasible set is compact is taken on trust"
     status = MET if game.box is not None else ASSUMED
     if game.gap_bounds is not None:
-        if all(size == 1 for size in game.sizes):
+        if game.affine_constraints is not None:
             reading = (
-                "by the same set's 2p affine constraints, two a gap; the squared gaps as printed"
-                " are neither affine nor is any strictly convex"
+                f"by the {game.affine_constraints} affine constraints of the same set and barrier;"
+                " the squared gaps as printed are neither affine nor is any strictly convex"
             )
         else:
             reading = (

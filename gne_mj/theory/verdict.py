@@ -12,15 +12,14 @@ from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 def epsilon_bounds(system: System) -> dict[str, Any]:
     """Bounds of the epsilon of the limit, an epsilon-vGNE [lemma:epsilon].
 
-    p rho, the same of two affine constraints a gap (None if there are none), and the greatest
-    p_i rho.
+    p rho, the same where affine constraints describe the set (None if the game's own do, or none
+    do), and the greatest p_i rho.
     """
     game = system.game
-    p_rho = game.constraints_count * system.rho
-    scalar_gaps = game.gap_bounds is not None and all(size == 1 for size in game.sizes)
+    affine = game.affine_constraints
     return {
-        "p_rho": p_rho,
-        "p_rho_affine": 2 * p_rho if scalar_gaps else None,
+        "p_rho": game.constraints_count * system.rho,
+        "p_rho_affine": None if affine is None else affine * system.rho,
         "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
     }
 

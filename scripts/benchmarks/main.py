@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import fleet
+import solver
 import twin
 
 
@@ -15,7 +16,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=25, help="turns of which the median counts")
     parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
     options = parser.parse_args()
-    rows = [*fleet.rows(options.runs), *twin.rows(options.runs)]
+    rows = [*fleet.rows(options.runs), *twin.rows(options.runs), *solver.rows(options.runs)]
     text = table(rows, options.runs)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
@@ -25,7 +26,7 @@ def main() -> None:
 
 def table(rows: list[dict[str, str]], runs: int) -> str:
     """The rows in Markdown, with the machine and the versions named."""
-    packages = ("gne-mj", "mujoco", "numba", "numpy", "scipy")
+    packages = ("gne-mj", "mujoco", "numba", "numpy", "scipy", "nashopt")
     versions = ", ".join(f"{name} {version(name)}" for name in packages)
     lines = [
         "# Benchmarks",

@@ -1,0 +1,55 @@
+"""Banded matrices by rows, and how they are factorised and solved with.
+
+Of a matrix with b diagonals on either side, ``band[r, c - r + b]`` is the entry in row r and
+column c. Rows have 3 b + 1 entries: partial pivoting fills b more diagonals on the right. With
+b = n - 1 it is a dense matrix.
+"""
+
+from gne_mj.native import kernel
+
+
+@kernel
+def factorise(band, n, b, pivots):
+    """LU factors of the first n rows in place, with partial pivoting; False if singular."""
+    for k in range(n):
+        last = min(k + b, n - 1)
+        pivot, largest = k, abs(band[k, b])
+        for r in range(k + 1, last + 1):
+            size = abs(band[r, k - r + b])
+            if size > largest:
+                pivot, largest = r, size
+        pivots[k] = pivot
+        if not largest > 0.0:
+            return False
+        end = min(k + 2 * b, n - 1)
+        if pivot != k:
+            for c in range(k, end + 1):
+                held = band[k, c - k + b]
+                band[k, c - k + b] = band[pivot, c - pivot + b]
+                band[pivot, c - pivot + b] = held
+        inverse = 1.0 / band[k, b]
+        for r in range(k + 1, last + 1):
+            factor = band[r, k - r + b] * inverse
+            band[r, k - r + b] = factor
+            if factor != 0.0:
+                for c in range(end - k):
+                    band[r, k + 1 - r + b + c] -= factor * band[k, 1 + b + c]
+    return True
+
+
+@kernel
+def solve(band, n, b, pivots, x):
+    """Replace the right-hand side in x by the solution; band and pivots from ``factorise``."""
+    for k in range(n):
+        pivot = pivots[k]
+        value = x[pivot]
+        if pivot != k:
+            x[pivot] = x[k]
+            x[k] = value
+        for r in range(k + 1, min(k + b, n - 1) + 1):
+            x[r] -= band[r, k - r + b] * value
+    for k in range(n - 1, -1, -1):
+        value = x[k]
+        for c in range(k + 1, min(k + 2 * b, n - 1) + 1):
+            value -= band[k, c - k + b] * x[c]
+        x[k] = value / band[k, b]

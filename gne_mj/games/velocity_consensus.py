@@ -1,0 +1,276 @@
+"""Velocity consensus with leaders: velocity vectors synchronised over any graph, gaps bounded.
+
+With y_i in R^d (m/s) and an undirected graph of edges,
+
+J_i = sum over neighbours j of |y_i - y_j|^2 + w_i |y_i - v_0|^2,
+
+|y_i - y_j| <= delta along every edge and |y_i - v_0| <= delta for every leader (w_i > 0), as
+squares, edges first. It generalises [eq:sensorNetGNE], whose agents each look at one other only.
+
+Parameters q = [d, N, p, v_0 (d), w (N), constraints (p rows i, j, delta; j = N stands for v_0),
+where each agent's neighbours start (N + 1), neighbours].
+"""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Box, Game
+from gne_mj.native import kernel
+from gne_mj.quantity import Quantity
+
+HEADER = 3
+
+
+def velocity_consensus_game(
+    edges: Sequence[tuple[int, int]],
+    leader_weight: Sequence[float],
+    reference_velocity: Sequence[float],
+    gap_bound: ArrayLike,
+    leader_gap_bound: ArrayLike,
+) -> Game:
+    """The game of N agents whose velocities agree along edges, leaders knowing v_0.
+
+    Args:
+        edges: pairs of agents, numbered from 0; each pair once, in either order.
+        leader_weight: w_i >= 0, shape (N,); positive makes agent i a leader.
+        reference_velocity: v_0 in m/s, shape (d,).
+        gap_bound: delta > 0 in m/s of the edges, one for all or one each.
+        leader_gap_bound: delta > 0 in m/s of the leaders to v_0, one for all or one each.
+
+    Raises:
+        InvalidInput: a bad number or edge, or a connected part of the graph without a leader.
+    """
+    reference = _finite("game.reference_velocity", reference_velocity)
+    weight = _finite("game.leader_weight", leader_weight)
+    if np.any(weight < 0):
+        raise InvalidInput("game.leader_weight", leader_weight, "no entry may be negative")
+    agents, dimension = len(weight), len(reference)
+    pairs = _checked(edges, agents)
+    leaders = np.flatnonzero(weight > 0)
+    _check_leaders(pairs, weight)
+    bounds = np.concatenate(
+        [
+            _bounds("game.gap_bound", gap_bound, len(pairs), "edge"),
+            _bounds("game.leader_gap_bound", leader_gap_bound, len(leaders), "leader"),
+        ]
+    )
+    rows = [*pairs, *((int(i), agents) for i in leaders)]
+    neighbours: list[list[int]] = [[] for _ in weight]
+    for i, j in pairs:
+        neighbours[i].append(j)
+        neighbours[j].append(i)
+    first, second = np.array(rows).T
+
+    def distances(y: NDArray[np.float64]) -> NDArray[np.float64]:
+        points = np.empty((len(y), agents + 1, dimension))
+        points[:, :agents] = y.reshape(len(y), agents, dimension)
+        points[:, agents] = reference
+        return np.linalg.norm(points[:, first] - points[:, second], axis=2)
+
+    return Game(
+        name="velocity consensus",
+        kernels=sys.modules[__name__],
+        parameters=np.concatenate(
+            [
+                [dimension, agents, len(rows)],
+                reference,
+                weight,
+                np.column_stack([first, second, bounds]).ravel(),
+                np.cumsum([0, *map(len, neighbours)]),
+                [j for members in neighbours for j in members],
+            ]
+        ),
+        sizes=(dimension,) * agents,
+        in_cost=[[i, *members] for i, members in enumerate(neighbours)],
+        in_constraint=[[i] if j == agents else [i, j] for i, j in rows],
+        constraint_names=tuple(
+            f"gap of agent {i + 1} to v_0" if j == agents else f"gap of agents {i + 1} and {j + 1}"
+            for i, j in rows
+        ),
+        action_name="velocity",
+        action_unit="m/s",
+        affine=True,
+        box=_box(first, second, bounds, reference, agents),
+        gap_bounds=bounds,
+        # A disc is no polygon; only on a line are its bounds affine.
+        affine_constraints=2 * len(rows) if dimension == 1 else None,
+        agent_name="robot",
+        axes=("x", "y", "z")[:dimension] if 1 < dimension <= 3 else (),
+        quantities=(
+            Quantity(
+                name="gap",
+                long_name="velocity gap",
+                unit="m/s",
+                values=distances,
+                each="constraint",
+                symbol="|y_i - y_j|",
+                bound=bounds,
+            ),
+        ),
+    )
+
+
+def _finite(key: str, given: Sequence[float]) -> NDArray[np.float64]:
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)):
+        raise InvalidInput(key, given, "it must be a list of finite numbers")
+    return values
+
+
+def _bounds(key: str, given: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
+    bounds = np.asarray(given, dtype=np.float64)
+    if bounds.shape not in ((), (count,)):
+        raise InvalidInput(
+            key, given, f"it must be one number or a list of {count}, one for each {what}"
+        )
+    if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
+        raise InvalidInput(key, given, "every bound must be positive and finite")
+    return np.broadcast_to(bounds, (count,))
+
+
+def _checked(edges: Sequence[tuple[int, int]], agents: int) -> list[tuple[int, int]]:
+    seen = set()
+    for i, j in edges:
+        shown = [i + 1, j + 1]
+        if not (0 <= i < agents and 0 <= j < agents):
+            raise InvalidInput("game.edges", shown, f"agents are numbered 1 to {agents}")
+        if i == j:
+            raise InvalidInput("game.edges", shown, "an edge joins two agents")
+        if frozenset((i, j)) in seen:
+            raise InvalidInput("game.edges", shown, "each pair may be listed once only")
+        seen.add(frozenset((i, j)))
+    return [(int(i), int(j)) for i, j in edges]
+
+
+def _symmetric(first: ArrayLike, second: ArrayLike, values: ArrayLike, vertices: int) -> csr_array:
+    pairs = (np.asarray(first, dtype=np.int64), np.asarray(second, dtype=np.int64))
+    return csr_array((np.asarray(values), pairs), shape=(vertices, vertices))
+
+
+def _check_leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) -> None:
+    graph = _symmetric(
+        [i for i, _ in pairs], [j for _, j in pairs], np.ones(len(pairs)), len(weight)
+    )
+    _, part = connected_components(graph, directed=False)
+    led = np.isin(part, part[weight > 0])
+    if not np.all(led):
+        apart = [int(i) + 1 for i in np.flatnonzero(part == part[np.argmin(led)])]
+        shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
+        raise InvalidInput(
+            "game.leader_weight",
+            weight.tolist(),
+            "each connected part of the edges needs a leader, an agent of positive weight, and"
+            f" that of agent{'s' * (len(apart) > 1)} {shown} has none",
+        )
+
+
+def _box(
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    bounds: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    agents: int,
+) -> Box:
+    """No agent is farther from v_0 than the shortest way there over edges of length delta."""
+    lengths = _symmetric(first, second, bounds, agents + 1)
+    reach = dijkstra(lengths, directed=False, indices=agents)[:agents, None]
+    return (reference - reach).ravel(), (reference + reach).ravel()
+
+
+@kernel
+def gap(q, l, k, y):
+    """Entry k of y_i - y_j, or of y_i - v_0, in constraint l."""
+    d, n = int(q[0]), int(q[1])
+    row = HEADER + d + n + 3 * l
+    i, j = int(q[row]), int(q[row + 1])
+    return y[i * d + k] - (q[HEADER + k] if j == n else y[j * d + k])
+
+
+@kernel
+def neighbours_at(q, i):
+    """Where agent i's neighbours start in q, and where they end."""
+    d, n, p = int(q[0]), int(q[1]), int(q[2])
+    pointer = HEADER + d + n + 3 * p
+    index = pointer + n + 1
+    return index + int(q[pointer + i]), index + int(q[pointer + i + 1])
+
+
+@kernel
+def cost(q, i, y):
+    """J_i = sum_j |y_i - y_j|^2 + w_i |y_i - v_0|^2."""
+    d = int(q[0])
+    first, last = neighbours_at(q, i)
+    weight = q[HEADER + d + i]
+    total = 0.0
+    for k in range(d):
+        own = y[i * d + k]
+        total += weight * (own - q[HEADER + k]) ** 2
+        for entry in range(first, last):
+            total += (own - y[int(q[entry]) * d + k]) ** 2
+    return total
+
+
+@kernel
+def cost_gradient(q, i, a, y):
+    """dJ_i/dy_a = 2 sum_j (y_i - y_j) + 2 w_i (y_i - v_0), entry a of agent i."""
+    d = int(q[0])
+    k = a - i * d
+    first, last = neighbours_at(q, i)
+    total = q[HEADER + d + i] * (y[a] - q[HEADER + k])
+    for entry in range(first, last):
+        total += y[a] - y[int(q[entry]) * d + k]
+    return 2.0 * total
+
+
+@kernel
+def add_cost_hessian(q, i, a, y, scale, out):
+    """2 (w_i + neighbours) for the entry itself, -2 for each neighbour's entry on that axis."""
+    d = int(q[0])
+    k = a - i * d
+    first, last = neighbours_at(q, i)
+    out[a] += 2.0 * scale * (q[HEADER + d + i] + (last - first))
+    for entry in range(first, last):
+        out[int(q[entry]) * d + k] -= 2.0 * scale
+
+
+@kernel
+def constraint(q, l, y):
+    """g_l = |gap_l|^2 - delta_l^2.
+
+    The greatest entry's square and delta^2 are taken as a product, which cancels nothing where it
+    is most of the gap: of two entries it is at least 0.7 delta at the bound, so their difference
+    is exact.
+    """
+    d, n = int(q[0]), int(q[1])
+    bound = q[HEADER + d + n + 3 * l + 2]
+    greatest, rest = 0.0, 0.0
+    for k in range(d):
+        size = abs(gap(q, l, k, y))
+        if size > greatest:
+            size, greatest = greatest, size
+        rest += size * size
+    return (greatest - bound) * (greatest + bound) + rest
+
+
+@kernel
+def constraint_gradient(q, l, a, y):
+    """2 gap_l on a's axis for the first agent of the pair, -2 gap_l for the second."""
+    d, n = int(q[0]), int(q[1])
+    first = int(q[HEADER + d + n + 3 * l])
+    i = a // d
+    return (2.0 if i == first else -2.0) * gap(q, l, a - i * d, y)
+
+
+@kernel
+def constraint_hessian(q, l, a, b, y):
+    """On one axis 2 on the diagonal of the pair's block and -2 off it; 0 between axes."""
+    d = int(q[0])
+    if a % d != b % d:
+        return 0.0
+    return 2.0 if a == b else -2.0

@@ -1,0 +1,402 @@
+"""A primal-dual interior-point method on a game's kernels, compiled and without allocation.
+
+For the free agents' actions y it solves F(y) + sum_l lambda_l dg_l(y) = 0 with lambda_l s_l = rho
+and s = -g(y), where F has the free agents' own gradients: for all agents the penalised equilibrium
+[eq:NEcondition], and for rho -> 0 the variational GNE [eq:vGNE]; for one agent its best response.
+The slacks s are unknowns of their own: they keep the digits that g(y) loses when it is small beside
+its terms. Iterates stay strictly inside.
+
+Newton's matrix dF/dy + sum_l lambda_l d2g_l + dg' diag(lambda / s) dg couples actions of agents
+that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.banded`).
+"""
+
+from functools import cache
+from types import ModuleType, SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from gne_mj import banded
+from gne_mj.native import compiled, copy, kernel, source_key
+
+# How an iteration ended
+CONVERGED, OUTSIDE, SINGULAR, NO_WAY_ON, TOO_MANY = range(5)
+# Entries of a report
+ITERATIONS, ERROR, STATIONARITY, COMPLEMENTARITY, COUNT = range(5)
+
+LARGEST_COUNT = 300
+ACCEPTED = 100.0  # tolerances, where rounding ends the progress before
+TO_BOUNDARY = 0.005  # share of a slack or multiplier that one step leaves at least
+DECREASE = 1e-4  # of the merit, relative to the step's length
+ROUNDING = 1e-14  # of the terms of g
+NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
+
+
+class Free(NamedTuple):
+    """Whose actions are unknown."""
+
+    agents: np.ndarray  # the free agents
+    constraints: np.ndarray  # the constraints that contain an action of theirs
+    position: np.ndarray  # (m,) a free action's row in Newton's matrix, -1 if it is held
+
+
+class Path(NamedTuple):
+    """From which rho to which (a start without multipliers may take a lower one), and when it ends.
+
+    There g + s and the stationarity residual must be within ``tolerance`` (relative to their terms
+    where they exceed 1), and lambda_l s_l within ``spread * last_rho`` of last_rho.
+    """
+
+    rho: float
+    last_rho: float
+    tolerance: float
+    spread: float
+
+
+class Iterate(NamedTuple):
+    """A start, and then the result. q is the number of constraints."""
+
+    y: np.ndarray  # (m,)
+    slack: np.ndarray  # (q,) s > 0
+    multipliers: np.ndarray  # (q,) lambda > 0
+
+
+class Work(NamedTuple):
+    """Arrays that the method works on; n is the number of free actions."""
+
+    trial: Iterate
+    g: np.ndarray  # (q,)
+    size: np.ndarray  # (q,) size of the terms in g whose rounding shows in it
+    row: np.ndarray  # (q + 1,) where each constraint's entries begin in the next two
+    column: np.ndarray  # the free actions in one constraint after the other
+    jacobian: np.ndarray  # dg_l/dy_a for them
+    stationarity: np.ndarray  # (n,) F + sum_l lambda_l dg_l
+    terms: np.ndarray  # (n,) sum of the magnitudes of its terms
+    step: np.ndarray  # (n,)
+    step_slack: np.ndarray  # (q,)
+    step_multipliers: np.ndarray  # (q,)
+    hessian_row: np.ndarray  # (m,) zero between uses
+    band: np.ndarray  # (n, 3 b + 1)
+    pivots: np.ndarray  # (n,)
+
+
+@kernel
+def find_entries(data, free, work):
+    """Fill row and column: where the constraints' derivatives are that a step needs."""
+    at, entry = data.offsets, 0
+    for k in range(len(free.constraints)):
+        l = free.constraints[k]
+        work.row[k] = entry
+        for member in range(data.member_pointer[l], data.member_pointer[l + 1]):
+            j = data.member_index[member]
+            if free.position[at[j]] >= 0:
+                for a in range(at[j], at[j + 1]):
+                    work.column[entry] = a
+                    entry += 1
+    work.row[len(free.constraints)] = entry
+
+
+@kernel
+def evaluate(game, data, free, point, work):
+    """Fill g, the Jacobian and the stationarity residual; False if not strictly inside."""
+    q, at = data.parameters, data.offsets
+    for k in range(len(free.constraints)):
+        work.g[k] = game.constraint(q, free.constraints[k], point.y)
+        if not work.g[k] < 0.0:
+            return False
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        for a in range(at[i], at[i + 1]):
+            value = game.cost_gradient(q, i, a, point.y)
+            work.stationarity[free.position[a]] = value
+            work.terms[free.position[a]] = abs(value)
+    for k in range(len(free.constraints)):
+        size = 0.0
+        for entry in range(work.row[k], work.row[k + 1]):
+            a = work.column[entry]
+            slope = game.constraint_gradient(q, free.constraints[k], a, point.y)
+            work.jacobian[entry] = slope
+            size += abs(slope * point.y[a])
+            r = free.position[a]
+            work.stationarity[r] += point.multipliers[k] * slope
+            work.terms[r] += point.multipliers[k] * abs(slope)
+        work.size[k] = size
+    return True
+
+
+@kernel
+def merit(count, constraints, rho, point, work):
+    """Squared norm of all residuals, complementarity measured from rho."""
+    total = 0.0
+    for r in range(count):
+        total += work.stationarity[r] ** 2
+    for k in range(constraints):
+        total += (work.g[k] + point.slack[k]) ** 2
+        total += (point.multipliers[k] * point.slack[k] - rho) ** 2
+    return total
+
+
+@kernel
+def stationarity_error(count, work):
+    """Greatest residual of F + sum_l lambda_l dg_l, relative to its terms where they exceed 1."""
+    worst = 0.0
+    for r in range(count):
+        error = abs(work.stationarity[r]) / max(1.0, work.terms[r])
+        if not error <= worst:
+            worst = error
+    return worst
+
+
+@kernel
+def slack_error(constraints, point, work):
+    """Greatest |g + s|, relative to the terms of g where they exceed 1."""
+    worst = 0.0
+    for k in range(constraints):
+        worst = max(worst, abs(work.g[k] + point.slack[k]) / max(1.0, work.size[k]))
+    return worst
+
+
+@kernel
+def spread(constraints, rho, point):
+    """Greatest |lambda_l s_l - rho| / rho."""
+    worst = 0.0
+    for k in range(constraints):
+        worst = max(worst, abs(point.multipliers[k] * point.slack[k] - rho))
+    return worst / rho
+
+
+@kernel
+def correct_slacks(constraints, least, before, point, work):
+    """Set slacks that curvature has moved off -g to it; False if one is below its share of before.
+
+    A difference that rounding explains is left: there the slack is the better of the two.
+    """
+    for k in range(constraints):
+        if abs(work.g[k] + point.slack[k]) > ROUNDING * max(work.size[k], point.slack[k]):
+            point.slack[k] = -work.g[k]
+        if not point.slack[k] >= least * before.slack[k]:
+            return False
+    return True
+
+
+@kernel
+def complementarity(constraints, point):
+    """Greatest lambda_l s_l."""
+    worst = 0.0
+    for k in range(constraints):
+        worst = max(worst, point.multipliers[k] * point.slack[k])
+    return worst
+
+
+@kernel
+def assemble(game, data, free, point, b, work):
+    """Fill the band with Newton's matrix; its rows are in the order of ``free.position``."""
+    q, at, position, band = data.parameters, data.offsets, free.position, work.band
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        for a in range(at[i], at[i + 1]):
+            r = position[a]
+            for c in range(3 * b + 1):
+                band[r, c] = 0.0
+            game.add_cost_hessian(q, i, a, point.y, 1.0, work.hessian_row)
+            for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+                j = data.cost_index[member]
+                for c in range(at[j], at[j + 1]):
+                    if position[c] >= 0:
+                        band[r, position[c] - r + b] += work.hessian_row[c]
+                    work.hessian_row[c] = 0.0
+    for k in range(len(free.constraints)):
+        l = free.constraints[k]
+        weight = point.multipliers[k]
+        ratio = weight / point.slack[k]
+        for entry in range(work.row[k], work.row[k + 1]):
+            a = work.column[entry]
+            r = position[a]
+            slope = ratio * work.jacobian[entry]
+            for other in range(work.row[k], work.row[k + 1]):
+                c = work.column[other]
+                second = weight * game.constraint_hessian(q, l, a, c, point.y)
+                band[r, position[c] - r + b] += second + slope * work.jacobian[other]
+
+
+@kernel
+def newton(game, data, free, count, rho, point, b, work):
+    """Fill the steps of y, s and lambda towards lambda_l s_l = rho; False if singular."""
+    assemble(game, data, free, point, b, work)
+    if not banded.factorise(work.band, count, b, work.pivots):
+        return False
+    for r in range(count):
+        work.step[r] = -work.stationarity[r]
+    for k in range(len(free.constraints)):
+        # What lambda_l must change by if y stays
+        change = (rho + point.multipliers[k] * work.g[k]) / point.slack[k]
+        work.step_multipliers[k] = change
+        for entry in range(work.row[k], work.row[k + 1]):
+            work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
+    banded.solve(work.band, count, b, work.pivots, work.step)
+    for k in range(len(free.constraints)):
+        along = 0.0
+        for entry in range(work.row[k], work.row[k + 1]):
+            along += work.jacobian[entry] * work.step[free.position[work.column[entry]]]
+        work.step_slack[k] = -(work.g[k] + point.slack[k]) - along
+        work.step_multipliers[k] += point.multipliers[k] / point.slack[k] * along
+    return True
+
+
+@kernel
+def longest(constraints, keep, point, work):
+    """Longest step, at most 1, that leaves slacks and multipliers a share ``keep`` of theirs."""
+    length = 1.0
+    for k in range(constraints):
+        if work.step_slack[k] < 0.0:
+            length = min(length, (keep - 1.0) * point.slack[k] / work.step_slack[k])
+        if work.step_multipliers[k] < 0.0:
+            length = min(length, (keep - 1.0) * point.multipliers[k] / work.step_multipliers[k])
+    return length
+
+
+@kernel
+def move(data, free, length, point, work):
+    """Set the trial to the point that many steps on."""
+    at = data.offsets
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        for a in range(at[i], at[i + 1]):
+            work.trial.y[a] = point.y[a] + length * work.step[free.position[a]]
+    for k in range(len(free.constraints)):
+        work.trial.slack[k] = point.slack[k] + length * work.step_slack[k]
+        work.trial.multipliers[k] = point.multipliers[k] + length * work.step_multipliers[k]
+
+
+@kernel
+def accept(data, free, point, trial):
+    """Make the trial the point; held actions are equal in both."""
+    at = data.offsets
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        for a in range(at[i], at[i + 1]):
+            point.y[a] = trial.y[a]
+    for k in range(len(free.constraints)):
+        point.slack[k] = trial.slack[k]
+        point.multipliers[k] = trial.multipliers[k]
+
+
+@kernel
+def balance(count, constraints, free, highest, work):
+    """The rho at which the barrier pushes as hard as F pulls (at y* its own), at most ``highest``.
+
+    The stationarity residual must be F alone.
+    """
+    pull, push = 0.0, 0.0
+    for r in range(count):
+        pull += work.stationarity[r] ** 2
+        work.step[r] = 0.0
+    for k in range(constraints):
+        for entry in range(work.row[k], work.row[k + 1]):
+            work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
+    for r in range(count):
+        push += work.step[r] ** 2
+    return np.sqrt(pull / push) if pull < highest**2 * push else highest
+
+
+@kernel
+def begin(game, data, free, count, path, known, point, work):
+    """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
+
+    Unknown multipliers are rho / s, with a rho that suits y.
+    """
+    constraints = len(free.constraints)
+    if not known:
+        for k in range(constraints):
+            point.multipliers[k] = 0.0
+    if not evaluate(game, data, free, point, work):
+        return 0.0
+    for k in range(constraints):
+        point.slack[k] = -work.g[k]
+    if known:
+        return path.rho
+    rho = max(path.last_rho, balance(count, constraints, free, path.rho, work))
+    for k in range(constraints):
+        point.multipliers[k] = rho / point.slack[k]
+        for entry in range(work.row[k], work.row[k + 1]):
+            r = free.position[work.column[entry]]
+            work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
+            work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
+    return rho
+
+
+@kernel
+def follow(game, data, free, half_band, path, known, point, work, report):
+    """Follow the path to path.last_rho, from point's y; the point becomes its end."""
+    count, constraints = 0, len(free.constraints)
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        count += data.offsets[i + 1] - data.offsets[i]
+    b = min(half_band, max(count - 1, 0))
+    find_entries(data, free, work)
+    rho = begin(game, data, free, count, path, known, point, work)
+    if rho == 0.0:
+        return OUTSIDE
+    before, stalled = np.inf, 0
+    for iteration in range(LARGEST_COUNT):
+        residual = stationarity_error(count, work)
+        feasible = max(residual, slack_error(constraints, point, work))
+        off = spread(constraints, rho, point)
+        # On the way only nearness to the path matters.
+        while rho > path.last_rho and feasible <= 10.0 * rho and off <= 0.9:
+            rho = max(path.last_rho, min(0.1 * rho, rho * np.sqrt(rho)))
+            off = spread(constraints, rho, point)
+        error = max(feasible, off * (path.tolerance / path.spread))
+        report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
+        report[COMPLEMENTARITY] = complementarity(constraints, point)
+        if rho == path.last_rho:
+            stalled = stalled + 1 if error > 0.5 * before else 0
+            before = error
+            if error <= path.tolerance or (stalled >= 2 and error <= ACCEPTED * path.tolerance):
+                return CONVERGED
+        if not newton(game, data, free, count, rho, point, b, work):
+            return SINGULAR
+        now = merit(count, constraints, rho, point, work)
+        keep = min(TO_BOUNDARY, rho)
+        length = longest(constraints, keep, point, work)
+        found = False
+        for _ in range(60):
+            move(data, free, length, point, work)
+            if (
+                evaluate(game, data, free, work.trial, work)
+                and correct_slacks(constraints, keep, point, work.trial, work)
+                and (
+                    max(feasible, off) <= NEAR
+                    or merit(count, constraints, rho, work.trial, work)
+                    <= (1.0 - 2.0 * DECREASE * length) * now
+                )
+            ):
+                found = True
+                break
+            length *= 0.5
+        if not found:
+            near_enough = rho == path.last_rho and error <= ACCEPTED * path.tolerance
+            return CONVERGED if near_enough else NO_WAY_ON
+        accept(data, free, point, work.trial)
+    return TOO_MANY
+
+
+@cache
+def build(game: ModuleType) -> SimpleNamespace:
+    """``run`` and ``cost`` of a game's kernels, compiled at their first call."""
+    source = source_key(game)
+
+    @compiled
+    def run(data, free, half_band, path, known, point, work, report):
+        """``follow`` from point's y, and its multipliers if those are ``known``."""
+        _ = source
+        copy(point.y, work.trial.y)
+        return follow(game, data, free, half_band, path, known, point, work, report)
+
+    @compiled
+    def cost(data, i, y):
+        """J_i(y)."""
+        _ = source
+        return game.cost(data.parameters, i, y)
+
+    return SimpleNamespace(run=run, cost=cost)

@@ -1,0 +1,76 @@
+"""What a game derives from its actions and bounds, such as gaps or a total: recorded and drawn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.errors import InvalidInput
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A number, or one for each agent or constraint, that follows from the actions.
+
+    Args:
+        name: the variable's name in a trajectory; bounds are kept as NAME_bound and
+            NAME_lower_bound.
+        long_name: what it is, in the words of a figure's axis.
+        unit: of the values.
+        values: maps profiles (samples, m) to (samples, entries), or to (samples,) if it is one
+            number.
+        each: "agent" or "constraint", what the entries belong to; empty for one number.
+        symbol: its formula in TeX, for figures; may be empty.
+        bound: greatest allowed value, one number or (entries,); None if there is none.
+        lower_bound: least allowed value likewise.
+    """
+
+    name: str
+    long_name: str
+    unit: str
+    values: Callable[[NDArray[np.float64]], ArrayLike]
+    each: str = ""
+    symbol: str = ""
+    bound: ArrayLike | None = None
+    lower_bound: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.each not in ("", "agent", "constraint"):
+            raise InvalidInput(
+                f"game.quantities.{self.name}", self.each, "it must be 'agent', 'constraint' or ''"
+            )
+
+    def at(self, profiles: NDArray[np.float64], entries: tuple[int, ...]) -> NDArray[np.float64]:
+        """The values at profiles (samples, m), of shape (samples, *entries).
+
+        Raises:
+            InvalidInput: the values come in another shape.
+        """
+        values = np.asarray(self.values(profiles), dtype=np.float64)
+        if values.shape != (len(profiles), *entries):
+            raise InvalidInput(
+                f"game.quantities.{self.name}",
+                values.shape,
+                f"its values at {len(profiles)} profiles must be {(len(profiles), *entries)}",
+            )
+        return values
+
+    def bounds(self, entries: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
+        """The bounds there are, by the variable's name, each of shape ``entries``.
+
+        Raises:
+            InvalidInput: a bound that is neither one number nor of that shape.
+        """
+        given = {f"{self.name}_bound": self.bound, f"{self.name}_lower_bound": self.lower_bound}
+        bounds = {}
+        for name, value in given.items():
+            if value is None:
+                continue
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape not in ((), entries):
+                raise InvalidInput(
+                    f"game.quantities.{name}", array.shape, f"it must be one number or {entries}"
+                )
+            bounds[name] = np.broadcast_to(array, entries).copy()
+        return bounds

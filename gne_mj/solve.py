@@ -1,0 +1,233 @@
+"""The equilibria of a system's game, what agents could still gain there, and a path over rho."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.equilibrium import (
+    Equilibrium,
+    measured_epsilon,
+    path,
+    penalised_equilibrium,
+    variational_equilibrium,
+)
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.system import System
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A penalised equilibrium and what the lemma on epsilon says of it [lemma:epsilon].
+
+    Attributes:
+        equilibrium: the penalised equilibrium.
+        gains: what each agent could gain by deviating alone, shape (N,).
+        distance: greatest |y_a - y_a of the variational GNE|.
+    """
+
+    equilibrium: Equilibrium
+    gains: NDArray[np.float64]
+    distance: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What was computed for one system.
+
+    Attributes:
+        name: of the system.
+        game: its game.
+        penalised: at each rho that was asked for.
+        variational: the variational GNE.
+        active: the constraints that bind there. Their lambda_l exceeds -g_l: of the two, whose
+            product is 1e-11, one is near zero.
+        path: over rho, empty if it was not asked for.
+    """
+
+    name: str
+    game: Game
+    penalised: tuple[Measured, ...]
+    variational: Equilibrium
+    active: tuple[int, ...]
+    path: tuple[Measured, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings and lists, for JSON."""
+        game = self.game
+        return {
+            "game": game.name,
+            "action": game.action_name,
+            "unit": game.action_unit,
+            "agents": game.agents,
+            "constraints": list(game.constraint_names),
+            "variational": {
+                **_numbers(game, self.variational),
+                "active": [game.constraint_names[k] for k in self.active],
+            },
+            "penalised": [_compared(game, point) for point in self.penalised],
+            "path": [_compared(game, point) for point in self.path],
+        }
+
+
+def solve_system(
+    system: System, rhos: Sequence[float] = (), path_rhos: Sequence[float] = ()
+) -> Solution:
+    """Solve the game of a system from its start.
+
+    Args:
+        system: whose game and start are used.
+        rhos: penalty parameters; the system's own if there are none.
+        path_rhos: penalty parameters of a path, each equilibrium started from the one before.
+
+    Raises:
+        InvalidInput: a rho that is not positive and finite.
+        SolverError: an equilibrium was not found.
+    """
+    game, start = system.game, system.start
+    penalised = [penalised_equilibrium(game, rho, start) for rho in rhos or (system.rho,)]
+    variational = variational_equilibrium(game, penalised[0])
+    binding = variational.multipliers > -game.constraints(variational.action)
+    return Solution(
+        name=system.name,
+        game=game,
+        penalised=tuple(_measure(game, point, variational) for point in penalised),
+        variational=variational,
+        active=tuple(int(k) for k in np.flatnonzero(binding)),
+        path=tuple(
+            _measure(game, point, variational) for point in path(game, path_rhos, penalised[0])
+        ),
+    )
+
+
+def parse_path(text: str) -> list[float]:
+    """FROM:TO:COUNT as that many penalty parameters, at equal ratios.
+
+    Raises:
+        InvalidInput: it does not read so.
+    """
+    parts = text.split(":")
+    try:
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        right = len(parts) == 3 and 0 < first < np.inf and 0 < last < np.inf and count >= 2
+    except (ValueError, IndexError):
+        right = False
+    if not right:
+        raise InvalidInput(
+            "--path", text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive penalty"
+            " parameters and how many, at least 2)",
+        )  # fmt: skip
+    return np.geomspace(first, last, count).tolist()
+
+
+def write_path(solution: Solution, file: Path) -> None:
+    """The path as CSV: a row for each rho, with every action and multiplier."""
+    game = solution.game
+    header = ["rho", "distance_to_variational", "epsilon_measured", "p_rho", "largest_own_p_rho"]
+    header += [f"{game.action_name} {a + 1}" for a in range(game.actions)]
+    header += [f"multiplier of {name}" for name in game.constraint_names]
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        for point in solution.path:
+            numbers = _compared(game, point)
+            epsilon = numbers["epsilon"]
+            writer.writerow(
+                [
+                    numbers["rho"],
+                    numbers["distance_to_variational"],
+                    epsilon["measured"],
+                    epsilon["p_rho"],
+                    epsilon["largest_own_p_rho"],
+                    *numbers["action"],
+                    *numbers["multipliers"],
+                ]
+            )
+
+
+def _measure(game: Game, point: Equilibrium, variational: Equilibrium) -> Measured:
+    distance = float(np.max(np.abs(point.action - variational.action)))
+    return Measured(point, measured_epsilon(game, point.action), distance)
+
+
+def _numbers(game: Game, point: Equilibrium) -> dict[str, Any]:
+    return {
+        "rho": point.rho,
+        "action": point.action.tolist(),
+        "multipliers": point.multipliers.tolist(),
+        "residual": point.residual,
+        "largest_constraint": float(np.max(game.constraints(point.action), initial=-np.inf)),
+        "complementarity": point.complementarity,
+        "iterations": point.iterations,
+    }
+
+
+def _compared(game: Game, point: Measured) -> dict[str, Any]:
+    rho, own = point.equilibrium.rho, game.own_constraints
+    largest = int(np.argmax(point.gains))
+    return {
+        **_numbers(game, point.equilibrium),
+        "distance_to_variational": point.distance,
+        "epsilon": {
+            "measured": float(point.gains[largest]),
+            "agent": largest + 1,
+            "each": point.gains.tolist(),
+            "p_rho": game.constraints_count * rho,
+            "own_p_rho": (own * rho).tolist(),
+            "largest_own_p_rho": float(np.max(own)) * rho,
+        },
+    }
+
+
+def summary(solution: Solution) -> list[str]:
+    """The solution in words, line by line."""
+    game, variational = solution.game, solution.variational
+    binding = [
+        f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
+        for k in solution.active
+    ]
+    lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
+    for point in solution.penalised:
+        numbers = _compared(game, point)
+        epsilon = numbers["epsilon"]
+        lines += [
+            f"  penalised equilibrium at rho = {numbers['rho']:g}",
+            f"    {game.action_name:16} {_listed(point.equilibrium.action)} {game.action_unit}",
+            f"    {'multipliers':16} {_listed(point.equilibrium.multipliers)}",
+            f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
+            f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
+            f" p rho = {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}",
+            f"    {'distance':16} {point.distance:.4g} {game.action_unit} to the variational GNE",
+        ]
+    lines += [
+        "  variational GNE",
+        f"    {game.action_name:16} {_listed(variational.action)} {game.action_unit}",
+        f"    {'active':16} {len(binding)} of {game.constraints_count} constraints"
+        + (f": {_shortened(binding)}" if binding else ""),
+        f"    {'residual':16} stationarity {variational.residual:.1e}, complementarity"
+        f" {variational.complementarity:.1e}, every constraint negative;"
+        f" {variational.iterations} iterations",
+    ]
+    if solution.path:
+        lines += ["  path", f"    {'rho':>10}  {'distance':>10}  {'epsilon':>10}  {'p rho':>10}"]
+        for point in solution.path:
+            rho = point.equilibrium.rho
+            lines.append(
+                f"    {rho:10.3g}  {point.distance:10.3g}  {np.max(point.gains):10.3g}"
+                f"  {game.constraints_count * rho:10.3g}"
+            )
+    return lines
+
+
+def _listed(values: NDArray[np.float64]) -> str:
+    return _shortened([f"{value:.5g}" for value in values])
+
+
+def _shortened(words: Sequence[str], most: int = 12) -> str:
+    shown = ", ".join(words[:most])
+    return shown if len(words) <= most else f"{shown}, ... ({len(words)} in all)"

@@ -1,0 +1,277 @@
+"""What ends a run or refuses it because of the estimates, and the steps that they allow."""
+
+import numpy as np
+import pytest
+from builders import (
+    UNEQUAL,
+    V0,
+    clock,
+    integrators,
+    robot_state,
+    robot_system,
+    run_loop,
+)
+
+import reference
+from gne_mj import graph as graphs
+from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
+from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.games import velocity_game
+from gne_mj.loops import monitor as watch
+from gne_mj.scenario_tables import Scenario
+from gne_mj.simulation import Simulation
+from gne_mj.system import STABLE, System
+
+START = V0 + np.array([-1.0, 0.5, 1.0, -0.5, 0.3])
+
+
+def drifting(engine, mode, epsilon=1.5, h=0.02, integrator="rk4"):
+    """Robots whose estimates follow too slowly for their gain: some leave the interior."""
+    law = FullyDistributed(graphs.line(5), epsilon, 4.0)
+    state = robot_state(START)
+    estimates = START + 0.2 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    system = robot_system(
+        state, UNEQUAL, law=law, engine=engine, mode=mode, integrator=integrator, delta=2.0,
+        memory=law.initial_memory(START, estimates),
+    )  # fmt: skip
+    return system, h
+
+
+@pytest.mark.parametrize(
+    ("mode", "epsilon", "h", "integrator"),
+    [
+        ("continuous", 1.5, 0.02, "rk4"),
+        ("continuous", 0.5, 0.02, "rk4"),
+        ("continuous", 1.5, 0.1, "rk4"),
+        ("sampled", 1.5, 0.02, "rk4"),
+        ("sampled", 1.5, 0.02, "euler"),
+    ],
+)
+def test_an_estimate_that_leaves_ends_the_run_in_both_engines(mode, epsilon, h, integrator):
+    game = reference.VelocityGame(V0, [2.0] * 5)
+    seen = []
+    # Euler's method differs between MuJoCo and the ODE plant
+    engines = ("mujoco",) if integrator == "euler" else ("ode", "mujoco")
+    for engine in engines:
+        system, h = drifting(engine, mode, epsilon, h, integrator)
+        loop = system.closed_loop(clock(h, 20.0, 5 * h))
+        recorded = loop.advance(1000, 1)
+        monitor = loop.monitor
+        assert monitor[watch.EXIT] == watch.ESTIMATE_LEFT
+        agent, constraint = int(monitor[watch.EXIT_AGENT]), int(monitor[watch.EXIT_CONSTRAINT])
+        assert constraint in (agent, agent + 1)
+        stage = int(monitor[watch.EXIT_STAGE])
+        done = round(loop.time / h)
+        offset = (0.0, 0.5, 0.5, 1.0)[stage] * h
+        assert monitor[watch.EXIT_TIME] == pytest.approx(done * h + offset, abs=1e-12)
+        assert len(recorded.input) == done + (stage > 0)
+        last = loop.finish()
+        z, estimates = last.memory[0, 25:], last.memory[0, :25].reshape(5, 5)
+        margins = reference.estimate_margins(game, z, estimates)
+        if stage == 0:
+            assert margins[agent, constraint] == pytest.approx(monitor[watch.EXIT_VALUE], rel=1e-9)
+            assert monitor[watch.EXIT_VALUE] >= 0
+        else:  # the state and memory before the step, both inside
+            own = [margins[i, [i, i + 1][: 5 - i]] for i in range(5)]
+            assert max(map(np.max, own)) < 0
+            assert np.array_equal(last.memory[0], recorded.memory[-1])
+            assert np.array_equal(last.state[0], recorded.state[-1])
+        assert np.all(system.game.constraints(last.state[0, :, 1]) < 0)
+        again = loop.advance(5, 1)
+        assert loop.time == pytest.approx(done * h)
+        assert len(again.input) == 0
+        seen.append((agent, constraint, stage, done, last))
+    for other in seen[1:]:
+        assert other[:4] == seen[0][:4]
+        assert np.allclose(other[4].memory, seen[0][4].memory, rtol=0, atol=1e-9)
+        assert np.allclose(other[4].state, seen[0][4].state, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["continuous", "sampled"])
+def test_the_status_names_agent_and_constraint(mode):
+    system, h = drifting("mujoco", mode)
+    trajectory = Simulation([system], clock(h, 20.0, 5 * h, 5 * h)).run()
+    certificate = trajectory.certificates["robots"]
+    assert certificate.status == "estimate_left_feasible_set"
+    assert not certificate.holds
+    agent = certificate.message.split("'s estimates")[0]
+    assert agent in {f"agent {i}" for i in range(1, 6)}
+    assert "violated constraint 'gap of agent" in certificate.message
+
+
+# ----------------------------------------------------------------------------------- the start
+
+
+def test_estimates_outside_are_refused_at_the_start():
+    law = FullyDistributed(graphs.ring(5), 0.1)
+    state = robot_state(START)
+    for memory, agent in (
+        (law.initial_memory(START, 0.0), 1),  # the robots' boundary is at zero and beyond
+        (law.initial_memory(START, filtered=[*START[:3], 9.0, START[4]]), 4),
+    ):
+        with pytest.raises(InfeasibleStart, match=f"initial estimates of agent {agent}"):
+            robot_system(state, law=law, memory=memory)
+    # under partial information estimates may start anywhere
+    partial = PartialInformation(graphs.ring(5))
+    robot_system(state, law=partial, memory=partial.initial_memory(START, 0.0))
+
+
+def test_a_memory_of_another_shape_is_refused():
+    state = robot_state(START)
+    for law, memory in (
+        (PartialInformation(graphs.ring(5)), np.zeros(30)),
+        (FullyDistributed(graphs.ring(5), 0.1), np.zeros(25)),
+        (FullInformation(), np.zeros(5)),
+    ):
+        with pytest.raises(InvalidInput, match="law's memory has shape"):
+            robot_system(state, law=law, memory=memory)
+
+
+def scenario(controller, initial):
+    return Scenario.model_validate(
+        {
+            "systems": {
+                "robots": {
+                    "game": {"type": "velocity-synchronization"},
+                    "agents": {"type": "flexible-robot", "count": 5},
+                    "controller": controller,
+                    "initial": {"action": START.tolist(), **initial},
+                }
+            }
+        }
+    )
+
+
+def built(controller, initial):
+    table = scenario(controller, initial).systems["robots"]
+    return table.build("robots", "rk4")
+
+
+PARTIAL = {"information": "partial", "graph": "ring", "coupling": 2.0, "time_constant": 0.5}
+DISTRIBUTED = {"information": "distributed", "graph": "ring", "epsilon": 0.1, "gain": 0.5}
+
+
+@pytest.mark.parametrize("controller", [PARTIAL, DISTRIBUTED])
+def test_estimates_in_scenarios(controller):
+    rows = (START + np.linspace(-0.1, 0.1, 25).reshape(5, 5)).tolist()
+    profile = (START + 0.05).tolist()
+    for given, expected in (
+        ({}, np.tile(START, (5, 1))),
+        ({"estimate": 3.0}, np.full((5, 5), 3.0)),
+        ({"estimate": profile}, np.tile(profile, (5, 1))),
+        ({"estimate": rows}, rows),
+    ):
+        memory = built(controller, given).memory
+        assert np.array_equal(memory[:25].reshape(5, 5), expected)
+        if controller is DISTRIBUTED:
+            assert np.array_equal(memory[25:], START)
+    if controller is DISTRIBUTED:
+        z = built(controller, {"filtered": profile}).memory[25:]
+        assert np.array_equal(z, profile)
+        assert np.array_equal(built(controller, {"filtered": 3.0}).memory[25:], np.full(5, 3.0))
+    law = built(controller, {}).law
+    numbers = {"partial": ("coupling", "time_constant"), "distributed": ("epsilon", "gain")}
+    for key in numbers[controller["information"]]:
+        assert getattr(law, key) == controller[key]
+
+
+@pytest.mark.parametrize(
+    ("controller", "initial", "sentence"),
+    [
+        (
+            PARTIAL,
+            {"estimate": [1.0, 2.0]},
+            r"initial\.estimate.*\(2,\).*list of 5, or 5 lists of 5",
+        ),
+        (PARTIAL, {"estimate": [[1.0] * 5] * 4}, r"initial\.estimate.*\(4, 5\).*5 lists of 5"),
+        (PARTIAL, {"estimate": [[1.0] * 5, [1.0]]}, r"initial\.estimate.*different lengths"),
+        (PARTIAL, {"filtered": 3.0}, r"initial\.filtered.*partial law has no z"),
+        (DISTRIBUTED, {"filtered": [3.0]}, r"initial\.filtered.*\(1,\).*one number or a list of 5"),
+        ({"information": "full"}, {"estimate": 3.0}, r"initial\.estimate.*no estimates"),
+        ({"information": "full"}, {"filtered": 3.0}, r"initial\.filtered.*no z"),
+    ],
+)
+def test_misshapen_estimates_are_refused_in_one_sentence(controller, initial, sentence):
+    with pytest.raises(InvalidInput, match=sentence) as caught:
+        built(controller, initial)
+    assert str(caught.value).startswith("systems.robots.initial.")
+    assert "\n" not in str(caught.value)
+
+
+# ------------------------------------------------------------------------------------ the step
+
+
+def line_of_integrators(law, count, mode="continuous", integrator="rk4", engine="ode"):
+    game = velocity_game(count, V0, 3.0)
+    y = np.full(count, V0)
+    memory = law.initial_memory(y, y + 1e-3 * np.random.default_rng(0).normal(size=count))
+    if engine == "mujoco":
+        return robot_system(
+            robot_state(y), {key: [1.0] * count for key in UNEQUAL}, law=law, engine=engine,
+            mode=mode, integrator=integrator, memory=memory,
+        )  # fmt: skip
+    return System(
+        "line", game, integrators(count), law, 0.1, y[:, None], mode=mode, integrator=integrator,
+        memory=memory,
+    )  # fmt: skip
+
+
+def growth(system, h, steps=1000):
+    """Of the estimates' errors over so many steps, whatever the product thinks of the step."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(System, "_check_step", lambda self, clock: None)
+        _, _, memory, _ = run_loop(system, h, steps, every=steps)
+    count = system.game.agents**2
+    return np.max(np.abs(memory[-1, :count] - V0)) / np.max(np.abs(memory[0, :count] - V0))
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "euler"])
+@pytest.mark.parametrize("kind", ["partial", "distributed"])
+@pytest.mark.parametrize("graph", ["ring", "complete"])
+def test_the_largest_step_is_stable_and_a_tenth_more_is_not(kind, graph, integrator):
+    network = graphs.NAMED[graph](6)
+    if kind == "partial":
+        law, rate = PartialInformation(network, 2.0, 0.02), 2.0 / 0.02
+    else:
+        law, rate = FullyDistributed(network, 0.01, 0.1), 1 / 0.01
+    system = line_of_integrators(law, 6, integrator=integrator)
+    largest = system.largest_step()
+    values = np.linalg.eigvalsh(reference.laplacian(6, network.edges))
+    assert largest == pytest.approx(STABLE[integrator] / (rate * values[-1]), rel=1e-12)
+    assert growth(system, largest) < 1.0
+    assert growth(system, 1.1 * largest) > 1e3
+
+
+@pytest.mark.parametrize(("method", "name"), [("rk4", 2.785293563405282), ("euler", 2.0)])
+def test_the_methods_limits(method, name):
+    """|R(-z)| <= 1 up to the limit and not beyond: RK4's real root of R = 1, and 2."""
+    assert STABLE[method] <= name
+    assert STABLE[method] == pytest.approx(name, rel=2e-4)
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+@pytest.mark.parametrize("kind", ["partial", "distributed"])
+@pytest.mark.parametrize("count", [2, 5, 7])
+def test_a_step_outside_is_refused_and_the_named_one_is_accepted(count, kind, engine):
+    network = graphs.complete(count)
+    law = (
+        PartialInformation(network, 2.0, 0.2)
+        if kind == "partial"
+        else FullyDistributed(network, 0.1)
+    )
+    system = line_of_integrators(law, count, engine=engine)
+    with pytest.raises(InvalidInput, match="mode 'sampled'") as caught:
+        system._check_step(clock(1.01 * system.largest_step()))
+    message = str(caught.value)
+    assert message.startswith("simulation.timestep")
+    assert ("rosenbrock" in message) == (kind == "distributed" and engine == "ode")
+    named = float(message.split("steps of at most ")[1].split(" s;")[0])
+    system._check_step(clock(named))
+    assert named == pytest.approx(system.largest_step(), rel=1e-2)
+    assert line_of_integrators(law, count, "sampled", engine=engine).largest_step() == np.inf
+
+
+def test_refused_when_the_loop_is_made():
+    system = line_of_integrators(FullyDistributed(graphs.ring(5), 1e-3), 5)
+    with pytest.raises(InvalidInput, match=r"simulation\.timestep"):
+        system.closed_loop(clock(0.01))
