@@ -613,6 +613,28 @@ def test_a_constraint_that_is_not_convex_is_found():
     assert not theorem.lyapunov
 
 
+def test_theta_2_of_actions_of_several_entries():
+    """Bounds of a game with sizes 2, 1, 1, against pairs of profiles, one for each agent."""
+    rows, columns = np.indices((4, 4))
+    off = 0.1 * (rows + columns + 1) * (coupled(0.3).game.agent_of_action != 0)
+    off[2:] = 0.1 * (rows + columns + 1)[2:]
+    np.fill_diagonal(off, 0.0)
+    bounds = (np.eye(4) - off, 4.6 * np.eye(4) + off)  # for |y_a| <= 2
+    box = (np.full(4, -2.0), np.full(4, 2.0))
+    game = replace(coupled(0.3).game, jacobian_bounds=lambda _: bounds, box=box)
+    slopes = Slopes(game, box, np.zeros(4), feasible=False)
+    assert slopes.theta_2.label == "bounded"
+    assert slopes.theta_2.sampled <= slopes.theta_2.value < slopes.theta_1.value
+    rng = np.random.default_rng(0)
+    rows_of = game.agent_of_action
+    for _ in range(50):
+        own, others = rng.uniform(-2, 2, (2, 3, 4))
+        change = game.pseudo_gradient(own) - game.pseudo_gradient(others)
+        extended = change[rows_of, np.arange(4)]
+        distance = np.linalg.norm(own - others)
+        assert np.linalg.norm(extended) <= slopes.theta_2.value * distance + 1e-12
+
+
 def test_a_direction_that_is_not_monotone_is_found():
     box = (np.full(4, -2.0), np.full(4, 2.0))
     assert Slopes(coupled(-2.0).game, box, np.zeros(4), feasible=True).refuted
