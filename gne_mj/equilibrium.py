@@ -209,12 +209,12 @@ class Solver:
         alone = Free(self._nobody.agents[agent : agent + 1], own, position)
         block = slice(data.offsets[agent], data.offsets[agent + 1])
         with self._lock:
+            position.fill(-1)
             position[block] = np.arange(block.stop - block.start)
             point.y[:] = y
             ended = self._native.run(
                 data, alone, self._half_band, TO_ZERO, False, point, self._work, self._report
             )
-            position[block] = -1
             if ended != method.CONVERGED:
                 self._fail(ended, y)
             multipliers = np.zeros(len(point.multipliers))

@@ -6,6 +6,9 @@ and s = -g(y), where F has the free agents' own gradients: for all agents the pe
 The slacks s are unknowns of their own: they keep the digits that g(y) loses when it is small beside
 its terms. Iterates stay strictly inside.
 
+Steps are Newton's, shortened until the residuals' norm falls. Where only tiny steps do (along
+curved bounds, far from the path), the method goes back to a higher rho and is careful for a while.
+
 Newton's matrix dF/dy + sum_l lambda_l d2g_l + dg' diag(lambda / s) dg couples actions of agents
 that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.banded`).
 """
@@ -30,6 +33,12 @@ TO_BOUNDARY = 0.005  # share of a slack or multiplier that one step leaves at le
 DECREASE = 1e-4  # of the merit, relative to the step's length
 ROUNDING = 1e-14  # of the terms of g
 NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
+ALIGNED = 0.7  # cosine between -F and dphi from which on a point counts as near the path
+SHRINK = 0.1  # of rho, from one equilibrium to the next
+# So many steps in a row shorter than SHORT make the method careful: damped steps at one rho,
+# multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; if that
+# takes more than LONG steps, rho grows by GROW.
+PATIENCE, SHORT, CENTRED, LONG, GROW = 3, 0.1, 0.3, 30, 10.0
 
 
 class Free(NamedTuple):
@@ -97,13 +106,19 @@ def find_entries(data, free, work):
 
 
 @kernel
-def evaluate(game, data, free, point, work):
-    """Fill g, the Jacobian and the stationarity residual; False if not strictly inside."""
-    q, at = data.parameters, data.offsets
+def inside(game, data, free, y, work):
+    """Fill g; False if y is not strictly inside."""
     for k in range(len(free.constraints)):
-        work.g[k] = game.constraint(q, free.constraints[k], point.y)
+        work.g[k] = game.constraint(data.parameters, free.constraints[k], y)
         if not work.g[k] < 0.0:
             return False
+    return True
+
+
+@kernel
+def evaluate(game, data, free, point, work):
+    """Fill the Jacobian and the stationarity residual."""
+    q, at = data.parameters, data.offsets
     for entry in range(len(free.agents)):
         i = free.agents[entry]
         for a in range(at[i], at[i + 1]):
@@ -121,7 +136,6 @@ def evaluate(game, data, free, point, work):
             work.stationarity[r] += point.multipliers[k] * slope
             work.terms[r] += point.multipliers[k] * abs(slope)
         work.size[k] = size
-    return True
 
 
 @kernel
@@ -166,16 +180,19 @@ def spread(constraints, rho, point):
 
 
 @kernel
-def correct_slacks(constraints, least, before, point, work):
+def correct(constraints, rho, least, factor, before, point, work):
     """Set slacks that curvature has moved off -g to it; False if one is below its share of before.
 
     A difference that rounding explains is left: there the slack is the better of the two.
+    Multipliers are kept within a ``factor`` of rho / s.
     """
     for k in range(constraints):
         if abs(work.g[k] + point.slack[k]) > ROUNDING * max(work.size[k], point.slack[k]):
             point.slack[k] = -work.g[k]
         if not point.slack[k] >= least * before.slack[k]:
             return False
+        centre = rho / point.slack[k]
+        point.multipliers[k] = min(max(point.multipliers[k], centre / factor), centre * factor)
     return True
 
 
@@ -256,6 +273,15 @@ def longest(constraints, keep, point, work):
 
 
 @kernel
+def local_length(constraints, point, work):
+    """Length of the step relative to the distances to the bounds, all together."""
+    total = 0.0
+    for k in range(constraints):
+        total += (work.step_slack[k] / point.slack[k]) ** 2
+    return np.sqrt(total)
+
+
+@kernel
 def move(data, free, length, point, work):
     """Set the trial to the point that many steps on."""
     at = data.offsets
@@ -283,11 +309,12 @@ def accept(data, free, point, trial):
 
 @kernel
 def balance(count, constraints, free, highest, work):
-    """The rho at which the barrier pushes as hard as F pulls (at y* its own), at most ``highest``.
+    """Near the path its own rho, at which the barrier pushes as hard as F pulls; else ``highest``.
 
-    The stationarity residual must be F alone.
+    Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
+    stationarity residual must be F alone.
     """
-    pull, push = 0.0, 0.0
+    pull, push, along = 0.0, 0.0, 0.0
     for r in range(count):
         pull += work.stationarity[r] ** 2
         work.step[r] = 0.0
@@ -296,7 +323,9 @@ def balance(count, constraints, free, highest, work):
             work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
     for r in range(count):
         push += work.step[r] ** 2
-    return np.sqrt(pull / push) if pull < highest**2 * push else highest
+        along -= work.stationarity[r] * work.step[r]
+    aligned = along > ALIGNED * np.sqrt(pull * push)
+    return min(np.sqrt(pull / push), highest) if aligned else highest
 
 
 @kernel
@@ -309,8 +338,9 @@ def begin(game, data, free, count, path, known, point, work):
     if not known:
         for k in range(constraints):
             point.multipliers[k] = 0.0
-    if not evaluate(game, data, free, point, work):
+    if not inside(game, data, free, point.y, work):
         return 0.0
+    evaluate(game, data, free, point, work)
     for k in range(constraints):
         point.slack[k] = -work.g[k]
     if known:
@@ -338,46 +368,70 @@ def follow(game, data, free, half_band, path, known, point, work, report):
     if rho == 0.0:
         return OUTSIDE
     before, stalled = np.inf, 0
+    highest, shrink, slow, careful = max(rho, path.rho), SHRINK, 0, False
     for iteration in range(LARGEST_COUNT):
         residual = stationarity_error(count, work)
         feasible = max(residual, slack_error(constraints, point, work))
-        off = spread(constraints, rho, point)
-        # On the way only nearness to the path matters.
-        while rho > path.last_rho and feasible <= 10.0 * rho and off <= 0.9:
-            rho = max(path.last_rho, min(0.1 * rho, rho * np.sqrt(rho)))
-            off = spread(constraints, rho, point)
-        error = max(feasible, off * (path.tolerance / path.spread))
-        report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
-        report[COMPLEMENTARITY] = complementarity(constraints, point)
-        if rho == path.last_rho:
-            stalled = stalled + 1 if error > 0.5 * before else 0
-            before = error
-            if error <= path.tolerance or (stalled >= 2 and error <= ACCEPTED * path.tolerance):
-                return CONVERGED
+        off, near_enough = spread(constraints, rho, point), False
+        if not careful:
+            # On the way only nearness to the path matters.
+            while rho > path.last_rho and feasible <= 10.0 * rho and off <= 0.9:
+                highest = rho
+                rho = max(path.last_rho, min(shrink * rho, rho * np.sqrt(rho)))
+                off = spread(constraints, rho, point)
+            error = max(feasible, off * (path.tolerance / path.spread))
+            report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
+            report[COMPLEMENTARITY] = complementarity(constraints, point)
+            if rho == path.last_rho:
+                stalled = stalled + 1 if error > 0.5 * before else 0
+                before = error
+                enough = ACCEPTED * path.tolerance
+                near_enough = feasible <= enough and off <= max(8.0 * path.spread, enough)
+                if error <= path.tolerance or (stalled >= 2 and near_enough):
+                    return CONVERGED
         if not newton(game, data, free, count, rho, point, b, work):
             return SINGULAR
         now = merit(count, constraints, rho, point, work)
-        keep = min(TO_BOUNDARY, rho)
-        length = longest(constraints, keep, point, work)
+        distance = local_length(constraints, point, work)
+        if careful:
+            keep, factor, length = CENTRED, 1.0, 1.0 / (1.0 + distance)
+        else:
+            keep, factor = min(TO_BOUNDARY, rho), np.inf
+            length = longest(constraints, keep, point, work)
         found = False
         for _ in range(60):
             move(data, free, length, point, work)
-            if (
+            if inside(game, data, free, work.trial.y, work) and correct(
+                constraints, rho, keep, factor, point, work.trial, work
+            ):
                 evaluate(game, data, free, work.trial, work)
-                and correct_slacks(constraints, keep, point, work.trial, work)
-                and (
-                    max(feasible, off) <= NEAR
+                found = (
+                    careful
+                    or max(feasible, off) <= NEAR
                     or merit(count, constraints, rho, work.trial, work)
                     <= (1.0 - 2.0 * DECREASE * length) * now
                 )
-            ):
-                found = True
-                break
+                if found:
+                    break
             length *= 0.5
-        if not found:
-            near_enough = rho == path.last_rho and error <= ACCEPTED * path.tolerance
-            return CONVERGED if near_enough else NO_WAY_ON
-        accept(data, free, point, work.trial)
+        if found:
+            accept(data, free, point, work.trial)
+        elif near_enough:
+            return CONVERGED
+        slow = slow + 1 if careful or length < SHORT else 0
+        if careful:
+            careful = distance > CENTRED
+            if slow >= LONG:
+                highest = GROW * rho
+        elif slow >= PATIENCE or not found:
+            # Back to the last rho that was reached, and on from its equilibrium in smaller steps.
+            careful, slow, shrink = True, LONG, np.sqrt(shrink)
+        if careful and slow >= LONG:
+            slow, rho = 0, highest
+            inside(game, data, free, point.y, work)
+            for k in range(constraints):
+                point.multipliers[k] = rho / point.slack[k]
+            evaluate(game, data, free, point, work)
     return TOO_MANY
 
 
