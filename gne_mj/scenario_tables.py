@@ -228,7 +228,14 @@ class MixedAgents(_Table):
 
     def build(self) -> Agents:
         """The agents."""
-        return mixed.join([group.build() for group in self.groups])
+        built = []
+        for index, group in enumerate(self.groups):
+            try:
+                built.append(group.build())
+            except InvalidInput as error:
+                key = error.key.replace("agents", f"agents.groups.{index}", 1)
+                raise InvalidInput(key, error.value, error.expected) from None
+        return mixed.join(built)
 
 
 class BarrierTable(_Table):
