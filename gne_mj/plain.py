@@ -127,7 +127,7 @@ def is_plain(module: ModuleType) -> bool:
     """
     found = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
     natives = [name for name, function in found.items() if is_kernel(function)]
-    file = Path(module.__file__ or module.__name__).name
+    file = Path(getattr(module, "__file__", None) or module.__name__).name
     for name, arguments in FUNCTIONS.items():
         if name not in found:
             if not natives and name in _OPTIONAL:

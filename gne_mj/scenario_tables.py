@@ -339,14 +339,15 @@ class MixedAgents(_Table):
 
     def build(self, sizes: Sizes) -> Agents:
         """The agents, for actions of so many entries each."""
-        first = np.cumsum([0, *(group.count for group in self.groups)])
-        return mixed.join(
-            [
-                group.build(sizes[start : start + group.count])
-                for start, group in zip(first[:-1], self.groups, strict=True)
-            ],
-            _dimension(sizes),
-        )
+        first, built = 0, []
+        for index, group in enumerate(self.groups):
+            try:
+                built.append(group.build(sizes[first : first + group.count]))
+            except InvalidInput as error:
+                key = error.key.replace("agents", f"agents.groups.{index}", 1)
+                raise InvalidInput(key, error.value, error.expected) from None
+            first += group.count
+        return mixed.join(built, _dimension(sizes))
 
 
 class BarrierTable(_Table):

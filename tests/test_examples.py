@@ -194,7 +194,7 @@ def refused(capsys, monkeypatch, tmp_path, *arguments):
 
 GAME_MISTAKES = {
     # name: what is replaced by what, the exit status and words of the sentence
-    "mid-run": (
+    "raises": (
         "    power = 0.0\n",
         "    assert y[0] < 1.01, 'too much'\n    power = 0.0\n",
         1,
@@ -251,6 +251,12 @@ def test_mistakes_in_kernels(copied, tmp_path, capsys, monkeypatch, old, new, st
 
 
 LAW_MISTAKES = {
+    "mid-run": (
+        "    gradient =",
+        "    assert y[0] < 1.02, 'fast'\n    gradient =",
+        1,
+        "user_code_failed: mine.py, line 23, in action: AssertionError: fast",
+    ),
     "raises": ("    gradient =", "    1 / 0\n    gradient =", 1, "in action: ZeroDivisionError"),
     "shape": ("    return -np", "    return 0\n    return -np", 1, "5 numbers, not shape ()"),
     "rate": ("def rate(", "def rat(", 2, "both of these functions"),
@@ -258,6 +264,20 @@ LAW_MISTAKES = {
     "memory": ("    return y\n", "    return None\n", 1, "in initial_memory: it must return"),
     "parameter": ("gains, damping, tau", "gains, tau", 2, "'damping'"),
 }
+
+
+def test_a_failure_as_json(copied, tmp_path, capsys, monkeypatch):
+    path = tmp_path / "mine.py"
+    path.write_text("def action(game, rho, y, memory, **parameters):\n    return y[99]\n")
+    scenario = str(copied / "law/scenario.toml")
+    setting = f"controller.file={path}"
+    monkeypatch.setattr(sys, "argv", ["gne-mj", "run", scenario, "--json", "--set", setting])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    document = json.loads(capsys.readouterr().out)
+    assert ended.value.code == 1
+    assert document["status"] == "user_code_failed"
+    assert document["message"].startswith("mine.py, line 2, in action: IndexError")
 
 
 @pytest.mark.parametrize("mistake", LAW_MISTAKES)

@@ -76,6 +76,7 @@ def test_velocity_sensors_measure_what_the_joint_does(tmp_path, sensor, integrat
     assert np.all(inputs == forces)
 
 
+@pytest.mark.slow
 def test_estimates_of_a_partial_law_ride_along(tmp_path):
     def law():
         return PartialInformation(graphs.ring(5), coupling=2.0, time_constant=0.5)

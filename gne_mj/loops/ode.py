@@ -121,7 +121,9 @@ def runge_kutta_step(
 ):
     """One RK4 step of the whole closed loop, begun by begin_step; False if the run must end."""
     n = len(state)
-    k1, k2, k3, k4, trial = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    # of the state's own length, so that the memory behind the channels has its own too
+    k1, k2, k3, k4 = scratch[0, :n], scratch[1, :n], scratch[2, :n], scratch[3, :n]
+    trial = scratch[4, :n]
     # at stage 0 the law has acted already, and cannot fail
     rates(agent, law, game, problem, channels, time, 0, state, u, monitor, work, k1)
     for r in range(n):
@@ -177,7 +179,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
                     step += 1
                     continue
                 if clock.mode == CONTINUOUS:
-                    law.rate(problem, work.y, memory, scratch[0])
+                    law.rate(problem, work.y, memory, scratch[0, : len(memory)])
                 held_step(
                     agent, channels.parameters, states, clock.method, clock.h, state, u,
                     scratch[1],

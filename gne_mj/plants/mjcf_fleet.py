@@ -160,7 +160,7 @@ class MjcfPlant(Plant):
 
     def _check_limit(self, i: int, robot: RobotFile, actuator: int) -> None:
         """MuJoCo clamps silently; what the law asks for must not be changed unseen."""
-        model, limit = self.model, self.agents.input_limit[i]
+        model, limit = self.model, float(self.agents.input_limit[i])
         ranges = []
         if model.actuator_ctrllimited[actuator]:
             ranges.append(model.actuator_ctrlrange[actuator])
