@@ -250,7 +250,7 @@ def test_continuous_is_of_fourth_order(plant, law, graph):
     # the last halving whose error is above rounding and DOP853's own error
     measurable = [order for order, error in zip(orders, errors[1:], strict=True) if error > 3e-12]
     assert errors[-1] < 1e-11 or measurable
-    assert all(abs(order - 4.0) < 0.5 for order in measurable[-1:]), (errors, orders)
+    assert all(3.5 < order < 4.6 for order in measurable[-1:]), (errors, orders)
 
 
 def held_difference(case, mode, integrator, substeps, h=0.005, steps=200):
