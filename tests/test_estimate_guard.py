@@ -183,7 +183,11 @@ def test_estimates_in_scenarios(controller):
 @pytest.mark.parametrize(
     ("controller", "initial", "sentence"),
     [
-        (PARTIAL, {"estimate": [1.0, 2.0]}, r"initial\.estimate.*\(2,\).*list of 5, or 5 lists of 5"),
+        (
+            PARTIAL,
+            {"estimate": [1.0, 2.0]},
+            r"initial\.estimate.*\(2,\).*list of 5, or 5 lists",
+        ),
         (PARTIAL, {"estimate": [[1.0] * 5] * 4}, r"initial\.estimate.*\(4, 5\).*5 lists of 5"),
         (PARTIAL, {"estimate": [[1.0] * 5, [1.0]]}, r"initial\.estimate.*different lengths"),
         (PARTIAL, {"filtered": 3.0}, r"initial\.filtered.*partial law has no z"),
@@ -209,7 +213,8 @@ def clock_of(h):
 def line_of_integrators(law, count, mode="continuous", integrator="rk4", engine="ode"):
     game = velocity_game(count, V0, 3.0)
     y = np.full(count, V0)
-    memory = law.initial_memory(y, y + 1e-3 * np.random.default_rng(0).normal(size=count))
+    errors = 1e-3 * np.random.default_rng(0).normal(size=(count, count))
+    memory = law.initial_memory(y, y + errors)
     if engine == "mujoco":
         return robot_system(
             robot_state(y), {key: [1.0] * count for key in UNEQUAL}, law=law, engine=engine,
@@ -246,7 +251,7 @@ def test_the_largest_step_is_stable_and_a_tenth_more_is_not(kind, graph, integra
     values = np.linalg.eigvalsh(reference.laplacian(6, network.edges))
     assert largest == pytest.approx(STABLE[integrator] / (rate * values[-1]), rel=1e-12)
     assert growth(system, largest) < 1.0
-    assert growth(system, 1.1 * largest) > 1e3
+    assert growth(system, 1.1 * largest) > 100.0  # until it leaves the set
 
 
 @pytest.mark.parametrize(("method", "name"), [("rk4", 2.785293563405282), ("euler", 2.0)])
@@ -280,5 +285,5 @@ def test_a_step_outside_is_refused_and_the_named_one_is_accepted(count, kind, en
 
 def test_refused_when_the_loop_is_made():
     system = line_of_integrators(FullyDistributed(graphs.ring(5), 1e-3), 5)
-    with pytest.raises(InvalidInput, match="simulation.timestep"):
+    with pytest.raises(InvalidInput, match=r"simulation\.timestep"):
         system.closed_loop(clock(0.01))

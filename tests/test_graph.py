@@ -48,9 +48,7 @@ def test_refusals():
 
 @pytest.mark.parametrize("count", [2, 3, 10, 200])
 def test_extreme_eigenvalues_in_closed_form(count):
-    ring, line, complete = (
-        getattr(graphs, name)(count) for name in ("ring", "line", "complete")
-    )
+    ring, line, complete = (getattr(graphs, name)(count) for name in ("ring", "line", "complete"))
     turns = 2 - 2 * np.cos(2 * np.pi * np.arange(count) / count)
     if count > 2:
         assert ring.algebraic_connectivity == pytest.approx(turns[1], rel=1e-9)

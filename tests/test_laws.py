@@ -3,6 +3,8 @@
 from functools import cache
 from types import SimpleNamespace
 
+import block_reference
+import coupled_game
 import numpy as np
 import pytest
 from builders import (
@@ -19,8 +21,6 @@ from builders import (
     run_loop,
 )
 
-import block_reference
-import coupled_game
 import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
@@ -288,7 +288,12 @@ def test_distributed_rates_depend_on_neighbours_messages_only(kind, count, graph
 
 PARTIAL_NETWORKS = pytest.mark.parametrize(
     ("kind", "count", "graph"),
-    [("velocity", 5, "line"), ("velocity", 5, "ring"), ("osnr", 10, "line"), ("osnr", 10, "printed")],
+    [
+        ("velocity", 5, "line"),
+        ("velocity", 5, "ring"),
+        ("osnr", 10, "line"),
+        ("osnr", 10, "printed"),
+    ],
 )
 
 
@@ -438,9 +443,7 @@ def test_loops_of_actions_of_several_entries():
         )
         assert_same(u, expected_u)
         assert_same(rates[~own], expected.ravel()[~own])
-        u, rates = step(
-            game, FullyDistributed(graph, EPSILON, GAIN), y, pack_memory(estimates, z)
-        )
+        u, rates = step(game, FullyDistributed(graph, EPSILON, GAIN), y, pack_memory(estimates, z))
         expected_u, expected, expected_z = block_reference.fully_distributed(
             oracle, RHO, neighbours, GAIN, EPSILON, y, z, estimates
         )

@@ -117,9 +117,7 @@ def test_a_reset_simulation_is_not_started(information):
 @LAWS
 def test_a_batch_of_rows_equals_single_runs(information, mode):
     """One model and one law, rows with starts and estimates of their own."""
-    loops = [
-        loop_of(information, mode, start=START + 0.1 * row, memory=None) for row in range(3)
-    ]
+    loops = [loop_of(information, mode, start=START + 0.1 * row, memory=None) for row in range(3)]
     first = loops[0]
     batch = Batch(first.plant.model, nsim=3, nthread=2)
     for row, loop in enumerate(loops):
@@ -138,6 +136,7 @@ def test_a_batch_of_rows_equals_single_runs(information, mode):
     assert not np.array_equal(*batch.bind("act")[:2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
 def test_a_memory_of_a_single_entry_moves(integrator):
     """MuJoCo takes the rate of a single activation from the callback's result, not from act_dot."""
