@@ -46,9 +46,9 @@ def gradient(function, y):
 def barrier_gradient(game, rho, y):
     """sum_l rho / (-g_l) grad g_l [eq:logbarrier], (m,)."""
     total = np.zeros(len(y))
-    for index in range(game.p):
-        slope = gradient(lambda x, index=index: game.constraint(index, x), y)
-        total += rho / -game.constraint(index, y) * slope
+    for k in range(game.p):
+        slope = gradient(lambda x, k=k: game.constraint(k, x), y)
+        total += rho / -game.constraint(k, y) * slope
     return total
 
 

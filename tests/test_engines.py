@@ -248,9 +248,9 @@ def test_continuous_is_of_fourth_order(plant, law, graph):
     orders = np.log2(errors[:-1] / errors[1:])
     assert errors[-1] < 1e-7
     # the last halving whose error is above rounding and DOP853's own error
-    measurable = [order for order, error in zip(orders, errors[1:], strict=True) if error > 3e-12]
+    measurable = [order for order, error in zip(orders, errors[1:], strict=True) if error > 1e-12]
     assert errors[-1] < 1e-11 or measurable
-    assert all(abs(order - 4.0) < 0.5 for order in measurable[-1:]), (errors, orders)
+    assert all(3.5 < order < 4.6 for order in measurable[-1:]), (errors, orders)
 
 
 def held_difference(case, mode, integrator, substeps, h=0.005, steps=200):
@@ -289,6 +289,9 @@ def test_euler_in_mujoco_equals_a_plain_loop(law, mode, substeps):
 @pytest.mark.parametrize("plant", PLANTS[1:])
 def test_euler_of_ode_agents(plant, law):
     case, h, steps = Case(plant, law, "ring"), 0.005, 200
+    if plant == "robots":  # symplectic, as in MuJoCo
+        assert held_difference(case, "continuous", "euler", 1) < 1e-11
+        return
     flat, expected = case.start, [case.start]
     for _ in range(steps):
         flat = flat + h * case.rate(0.0, flat)

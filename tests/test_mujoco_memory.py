@@ -136,6 +136,7 @@ def test_a_batch_of_rows_equals_single_runs(information, mode):
     assert not np.array_equal(*batch.bind("act")[:2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
 def test_a_memory_of_a_single_entry_moves(integrator):
     """MuJoCo takes the rate of a single activation from the callback's result, not from act_dot."""

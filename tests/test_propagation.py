@@ -94,7 +94,7 @@ FORMS = pytest.mark.parametrize("form", [series, dense])
 
 
 @FORMS
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     st.integers(1, 40),
     st.integers(0, 60),
