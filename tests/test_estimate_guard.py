@@ -43,6 +43,9 @@ def drifting(engine, mode, epsilon=0.5, h=0.02, integrator="rk4"):
 
 
 @pytest.mark.parametrize(
+    "engines", [("mujoco",), pytest.param(("ode", "mujoco"), marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize(
     ("mode", "epsilon", "h", "integrator"),
     [
         ("continuous", 0.5, 0.01, "rk4"),
@@ -52,11 +55,9 @@ def drifting(engine, mode, epsilon=0.5, h=0.02, integrator="rk4"):
         ("sampled", 0.5, 0.02, "euler"),
     ],
 )
-def test_an_estimate_that_leaves_ends_the_run_in_both_engines(mode, epsilon, h, integrator):
+def test_an_estimate_that_leaves_ends_the_run(mode, epsilon, h, integrator, engines):
     game = reference.VelocityGame(V0, [2.0] * 5)
     seen = []
-    # Euler's method differs between MuJoCo and the ODE plant
-    engines = ("mujoco",) if integrator == "euler" else ("ode", "mujoco")
     for engine in engines:
         system, h = drifting(engine, mode, epsilon, h, integrator)
         loop = system.closed_loop(clock(h, 20.0, 5 * h))
