@@ -20,6 +20,7 @@ from gne_mj import interior_point as method
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
 from gne_mj.interior_point import Free, Iterate, Path, Work
+from gne_mj.plain import raise_pending
 
 TOLERANCE = 1e-12
 FIRST_RHO, LAST_RHO = 1.0, 1e-11  # of the path to rho -> 0
@@ -238,6 +239,7 @@ class Solver:
         return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
 
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
+        raise_pending()
         if ended == method.OUTSIDE:
             q, count = self._data.parameters, len(self._point.slack)
             g = np.array([self._kernels.constraint(q, k, y) for k in range(count)])

@@ -259,7 +259,8 @@ def _storage(plant: Plant, storage: Storage | Literal["agents"] | None) -> Stora
     """The storage function to check: the one given, or that of the plant's agents, if any."""
     if storage != "agents":
         return storage
-    return plant.agents.storage if plant.agents.knows_storage else None
+    known = getattr(plant.agents, "knows_storage", False)
+    return plant.agents.storage if known else None
 
 
 def _error(both: NDArray[np.float64]) -> NDArray[np.float64]:
