@@ -15,7 +15,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.barrier import own_weights, weighted_gradient
 from gne_mj.controllers.estimates import barrier_profile, estimate_rates, write_own_actions
 from gne_mj.controllers.law import Law, initial_estimates
 from gne_mj.controllers.propagation import propagate_estimates
@@ -115,19 +114,23 @@ def action(game, problem, y, weights, memory, work, u):
 def agent_action(game, data, settings, i, own_filter, own_row, work, u):
     """Action of agent i from what it has: z_i (m_i,) and its row (m,), its own action in place.
 
-    work.profile and work.own_weights are overwritten. Returns -1, or the constraint on or outside
+    work.profile is overwritten. Returns -1, or the constraint on or outside
     whose boundary the agent's filtered profile (z_i, **y**^i_-i) lies.
     """
-    first = data.offsets[i]
-    profile, weights = work.profile, work.own_weights
+    first, q, profile = data.offsets[i], data.parameters, work.profile
     barrier_profile(data, i, own_filter, own_row, profile)
-    outside = own_weights(game, data, settings[RHO], i, profile, weights)
-    if outside >= 0:
-        return outside
     for r in range(len(u)):
-        cost = game.cost_gradient(data.parameters, i, first + r, own_row)
-        barrier = weighted_gradient(game, data, i, first + r, profile, weights)
-        u[r] = -settings[GAIN] * (cost + barrier)
+        u[r] = game.cost_gradient(q, i, first + r, own_row)
+    for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
+        k = data.own_index[entry]
+        value = game.constraint(q, k, profile)
+        if not value < 0.0:
+            return k
+        weight = settings[RHO] / -value
+        for r in range(len(u)):
+            u[r] += weight * game.constraint_gradient(q, k, first + r, profile)
+    for r in range(len(u)):
+        u[r] *= -settings[GAIN]
     return -1
 
 
@@ -150,7 +153,7 @@ def propagate(problem, y, memory, scratch):
     agents = len(data.offsets) - 1
     m = data.offsets[agents]
     propagate_estimates(data, problem.graph, problem.propagator, y, memory, scratch)
-    remaining = np.exp(-problem.propagator.numbers[1])
+    remaining = problem.propagator.numbers[2]
     for r in range(agents * m, agents * m + m):
         own = y[r - agents * m]
         memory[r] = own + remaining * (memory[r] - own)

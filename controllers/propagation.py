@@ -27,7 +27,7 @@ class Propagator(NamedTuple):
 
     maps: np.ndarray  # (N, N, N), symmetric, row and column j of the j-th are zero
     coefficients: np.ndarray  # of the Chebyshev polynomials in 2 L_j / bound - 1
-    numbers: np.ndarray  # [bound on the spectrum of L_j, s]
+    numbers: np.ndarray  # [bound on the spectrum of L_j, s, exp(-s)]
 
 
 @kernel
@@ -38,7 +38,7 @@ def scratch_length(agents):
 
 def no_propagator() -> Propagator:
     """Of a law without estimates."""
-    return Propagator(np.zeros((0, 0, 0)), np.zeros(0), np.zeros(2))
+    return Propagator(np.zeros((0, 0, 0)), np.zeros(0), np.zeros(3))
 
 
 def propagator(graph: Graph, duration: float) -> Propagator:
@@ -49,7 +49,7 @@ def propagator(graph: Graph, duration: float) -> Propagator:
     # Anderson and Morley's bound; L_j is a principal submatrix, so it holds for all j.
     bound = float(np.max(degrees[pairs].sum(axis=1), initial=1))
     coefficients = _series(0.5 * bound * duration)
-    numbers = np.array([bound, duration])
+    numbers = np.array([bound, duration, np.exp(-duration)])
     work = len(coefficients) * (agents + 2 * len(pairs))
     if agents * agents <= work and agents <= 64:
         return Propagator(_dense(graph, duration), np.zeros(0), numbers)

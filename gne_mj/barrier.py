@@ -94,18 +94,3 @@ def weighted_gradient(game, data, i, a, y, weights):
         k = data.own_index[entry]
         total += weights[k] * game.constraint_gradient(data.parameters, k, a, y)
     return total
-
-
-@kernel
-def own_weights(game, data, rho, i, profile, weights):
-    """Fill weights[l] = rho / (-g_l) at a profile that agent i holds, for its own constraints.
-
-    Returns -1, or the first of them that is not strictly negative there.
-    """
-    for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
-        k = data.own_index[entry]
-        value = game.constraint(data.parameters, k, profile)
-        if not value < 0.0:
-            return k
-        weights[k] = rho / -value
-    return -1

@@ -62,7 +62,7 @@ def series(graph, duration):
 
 def dense(graph, duration):
     """The maps whatever the graph's size."""
-    numbers = np.array([np.nan, duration])
+    numbers = np.array([np.nan, duration, np.exp(-duration)])
     return Propagator(propagation._dense(graph, duration), np.zeros(0), numbers)
 
 

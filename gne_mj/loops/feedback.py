@@ -32,7 +32,6 @@ class Work(NamedTuple):
 
     g: np.ndarray  # (p,) constraint values at the last evaluation
     weights: np.ndarray  # (p,) rho / -g
-    own_weights: np.ndarray  # (p,) the same at an agent's own profile
     demand: np.ndarray  # (m,) what the law asks for
     profile: np.ndarray  # (m,) an agent's own profile
     y: np.ndarray  # (m,) outputs
@@ -46,7 +45,7 @@ class Work(NamedTuple):
 def work_sizes(actions, constraints, agents):
     """Lengths of the arrays of :class:`Work`, in its order."""
     m, p = actions, constraints
-    return p, p, p, m, m, m, m, m, 1, scratch_length(agents)
+    return p, p, m, m, m, m, m, 1, scratch_length(agents)
 
 
 def work(actions: int, constraints: int, agents: int) -> Work:

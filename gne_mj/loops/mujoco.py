@@ -32,6 +32,7 @@ from gne_mj.plants.mujoco import (
     NA,
     NU,
     NUSERDATA,
+    PLACES,
     PLANT_TABLE,
     ROOM,
     SIZES,
@@ -127,7 +128,7 @@ def parts_of(userdata, start, m, p, agents, states):
     monitor = userdata[start + MONITOR : at]
     u = userdata[at : at + m]
     at += m
-    n0, n1, n2, n3, n4, n5, n6, n7, n8, n9 = work_sizes(m, p, agents)
+    n0, n1, n2, n3, n4, n5, n6, n7, n8 = work_sizes(m, p, agents)
     a1 = at + n0
     a2 = a1 + n1
     a3 = a2 + n2
@@ -136,8 +137,7 @@ def parts_of(userdata, start, m, p, agents, states):
     a6 = a5 + n5
     a7 = a6 + n6
     a8 = a7 + n7
-    a9 = a8 + n8
-    end = a9 + n9
+    end = a8 + n8
     work = Work(
         userdata[at:a1],
         userdata[a1:a2],
@@ -147,8 +147,7 @@ def parts_of(userdata, start, m, p, agents, states):
         userdata[a5:a6],
         userdata[a6:a7],
         userdata[a7:a8],
-        userdata[a8:a9],
-        userdata[a9:end],
+        userdata[a8:end],
     )
     size = m * states
     memory = userdata[end + 2 * size :]
@@ -202,8 +201,9 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
             agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
             stage, storage, state, memory, u, monitor, work,
         )  # fmt: skip
+        places = integers(table, PLACES)
         for r in range(m):
-            ctrl[fleet.actuator_of(table, r)] = work.u[r] if acts else 0.0
+            ctrl[fleet.actuator_of(places, r)] = work.u[r] if acts else 0.0
 
     def remember(model, data, actuator):
         _ = source

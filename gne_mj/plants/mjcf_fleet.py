@@ -48,9 +48,9 @@ def gather(at, data, table, state):
 
 
 @kernel
-def actuator_of(table, r):
+def actuator_of(places, r):
     """Which entry of ctrl is the input of channel r."""
-    return integers(table, PLACES)[r * PLACES_COUNT + ACTUATOR]
+    return places[r * PLACES_COUNT + ACTUATOR]
 
 
 @kernel
