@@ -2,7 +2,7 @@
 
 MuJoCo evaluates control at every stage of its integrator. The callback counts these evaluations
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
-(:func:`gne_mj.loops.ode.begin_step`); later ones, in mode `continuous`, only act. In that mode the
+(:func:`gne_mj.loops.ode.look`); later ones, in mode `continuous`, only act. In that mode the
 law's memory is in ``act``, moved by MuJoCo's integrator at the rates that a second callback gives;
 in mode `sampled` it is in ``userdata``, where nothing but the law moves it. What else is kept from
 call to call is in ``userdata`` as well; both are part of MuJoCo's state. userdata holds [mark,
@@ -24,7 +24,7 @@ from gne_mj.graph import GraphData
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
 from gne_mj.loops.feedback import Problem, Work, work_sizes
-from gne_mj.loops.ode import CONTINUOUS, Clock, begin_step, look
+from gne_mj.loops.ode import CONTINUOUS, Clock, look
 from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mujoco import (
@@ -272,10 +272,10 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         for r in range(m):
             x = state[r * states : (r + 1) * states]
             storage += agent.storage(channels.parameters[r], x, channels.rest[r])
-        return begin_step(
-            agent, law, game, problem_in(table), channels,
-            Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0), step, storage, state,
-            memory, u, monitor, work,
+        clock = Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0)
+        return look(
+            agent, law, game, problem_in(table), channels, clock, step * clock.h, step, 0, storage,
+            state, memory, u, monitor, work,
         )  # fmt: skip
 
     return (

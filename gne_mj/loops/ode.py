@@ -51,27 +51,30 @@ def stored(agent, channels, state):
 
 
 @kernel
-def begin_step(
-    agent, law, game, problem, channels, clock, step, storage, state, memory, u, monitor, work
-):
-    """Measure, act and observe at the start of a step; u is changed. False if the run must end.
-
-    storage is V^{x*} of the agents now (see :func:`stored`).
-    """
-    return look(
-        agent, law, game, problem, channels, clock, step * clock.h, step, 0, storage, state,
-        memory, u, monitor, work,
-    )  # fmt: skip
-
-
-@kernel
 def look(
     agent, law, game, problem, channels, clock, time, step, stage, storage, state, memory, u,
     monitor, work,
 ):  # fmt: skip
-    """The same at any stage of a step: at a later one (mode continuous) only work.u is filled.
+    """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
-    One kernel for both keeps MuJoCo's callback small, which is most of its speed.
+    One kernel for all stages keeps loops and MuJoCo's callback small, which is most of their speed
+    and of the time to compile them.
+
+    Args:
+        agent, law, game: modules of kernels.
+        problem, channels, clock: as the loop has them.
+        time: at the stage, in s.
+        step: which step this is.
+        stage: 0 at its start; later ones are looked at in mode continuous only.
+        storage: V^{x*} of the agents now (see :func:`stored`); read at stage 0.
+        state: flat, channel after channel, at the stage.
+        memory: the law's at the stage; own actions are written into it, and in mode sampled it
+            moves on when a control period has passed.
+        u: (m,) input that acts; changed at stage 0.
+        monitor, work: changed.
+
+    Returns:
+        False if the run must end; the exit is then latched in the monitor.
     """
     y = work.y
     measure(agent, state, channels.rest.shape[1], y)
@@ -96,59 +99,29 @@ def look(
 
 
 @kernel
-def rates(agent, law, game, problem, channels, time, stage, state, u, monitor, work, out):
-    """Fill out with the rate of the flat state in mode continuous; False if the run must end.
-
-    At the later stages of a step u is first overwritten by the law's action there; at stage 0
-    begin_step has just done so.
-    """
+def rates(agent, law, problem, channels, state, work, out):
+    """Fill out with the rate of the flat state, the law having acted there (work.y, work.u)."""
     m, states = channels.rest.shape
-    y, memory = work.y, state[m * states :]
-    if stage > 0:
-        measure(agent, state, states, y)
-        if not feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
-            return False
     for r in range(m):
         x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
-        agent.rate(channels.parameters[r], x, u[r], rate)
-    law.rate(problem, y, memory, out[m * states :])
-    return True
+        agent.rate(channels.parameters[r], x, work.u[r], rate)
+    law.rate(problem, work.y, state[m * states :], out[m * states :])
 
 
 @kernel
-def runge_kutta_step(
-    agent, law, game, problem, channels, time, h, state, u, monitor, work, scratch
-):
-    """One RK4 step of the whole closed loop, begun by begin_step; False if the run must end."""
-    n = len(state)
-    # of the state's own length, so that the memory behind the channels has its own too
-    k1, k2, k3, k4 = scratch[0, :n], scratch[1, :n], scratch[2, :n], scratch[3, :n]
-    trial = scratch[4, :n]
-    # at stage 0 the law has acted already, and cannot fail
-    rates(agent, law, game, problem, channels, time, 0, state, u, monitor, work, k1)
-    for r in range(n):
-        trial[r] = state[r] + 0.5 * h * k1[r]
-    half = time + 0.5 * h
-    if not rates(agent, law, game, problem, channels, half, 1, trial, work.u, monitor, work, k2):
-        return False
-    for r in range(n):
-        trial[r] = state[r] + 0.5 * h * k2[r]
-    if not rates(agent, law, game, problem, channels, half, 2, trial, work.u, monitor, work, k3):
-        return False
-    for r in range(n):
-        trial[r] = state[r] + h * k3[r]
-    if not rates(
-        agent, law, game, problem, channels, time + h, 3, trial, work.u, monitor, work, k4
-    ):
-        return False
-    for r in range(n):
-        state[r] += h / 6.0 * (k1[r] + 2.0 * k2[r] + 2.0 * k3[r] + k4[r])
-    return True
+def stage_state(stage, h, state, k, trial):
+    """Fill trial with the flat state at a stage of RK4, given the rates at the stages before it."""
+    length = h if stage == 3 else 0.5 * h
+    for r in range(len(state)):
+        trial[r] = state[r] + length * k[stage - 1, r]
 
 
 @cache
-def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, Any]:
-    """The native loop and its last observation, for an agent type, a law and a game."""
+def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
+    """The native loop for an agent type, a law and a game.
+
+    With ``every`` = 0 it observes the present state, and does not move on.
+    """
     source = source_key(agent, law, game)
 
     @compiled
@@ -158,49 +131,45 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
     ):  # fmt: skip
         _ = source
         m, states = channels.rest.shape
-        memory = state[m * states :]
+        n, h = len(state), clock.h
+        stages = 4 if clock.mode == CONTINUOUS and clock.method == RK4 else 1
+        # of the state's own length, so that the memory behind the channels has its own too
+        k, trial = scratch[:4], scratch[4, :n]
         for sample in range(len(samples_u)):
-            for substep in range(every):
+            for substep in range(max(every, 1)):
                 storage = stored(agent, channels, state)
-                if not begin_step(
-                    agent, law, game, problem, channels, clock, step, storage, state, memory, u,
-                    monitor, work,
-                ):  # fmt: skip
-                    return sample + (substep > 0), step
-                if substep == 0:
-                    copy(state, samples_state[sample])
-                    copy(u, samples_u[sample])
-                if clock.mode == CONTINUOUS and clock.method == RK4:
-                    if not runge_kutta_step(
-                        agent, law, game, problem, channels, step * clock.h, clock.h, state, u,
-                        monitor, work, scratch,
+                for stage in range(stages):
+                    now = state
+                    if stage > 0:
+                        stage_state(stage, h, state, k, trial)
+                        now = trial
+                    time = step * h + (0.0, 0.5 * h, 0.5 * h, h)[stage]
+                    if not look(
+                        agent, law, game, problem, channels, clock, time, step, stage, storage,
+                        now, now[m * states :], u, monitor, work,
                     ):  # fmt: skip
-                        return sample + 1, step
-                    step += 1
-                    continue
-                if clock.mode == CONTINUOUS:
-                    law.rate(problem, work.y, memory, scratch[0, : len(memory)])
-                held_step(
-                    agent, channels.parameters, states, clock.method, clock.h, state, u,
-                    scratch[1],
-                )  # fmt: skip
-                if clock.mode == CONTINUOUS:
-                    for r in range(len(memory)):
-                        memory[r] += clock.h * scratch[0, r]
+                        # a step that began inside has its row, even if a later stage left
+                        return sample + (substep > 0 or stage > 0), step
+                    if substep == 0 and stage == 0:
+                        copy(state, samples_state[sample])
+                        copy(u, samples_u[sample])
+                    if clock.mode == CONTINUOUS and every > 0:
+                        rates(agent, law, problem, channels, now, work, k[stage, :n])
+                if every == 0:
+                    return sample + 1, step
+                if stages == 4:
+                    for r in range(n):
+                        rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
+                        state[r] += h / 6.0 * rise
+                else:
+                    held_step(agent, channels.parameters, states, clock.method, h, state, u, trial)
+                    if clock.mode == CONTINUOUS:  # Euler's method for the memory
+                        for r in range(m * states, n):
+                            state[r] += h * k[0, r]
                 step += 1
         return len(samples_u), step
 
-    @compiled
-    def finish(problem, channels, clock, step, state, u, monitor, work):
-        _ = source
-        m, states = channels.rest.shape
-        storage = stored(agent, channels, state)
-        return begin_step(
-            agent, law, game, problem, channels, clock, step, storage, state, state[m * states :],
-            u, monitor, work,
-        )  # fmt: skip
-
-    return advance, finish
+    return advance
 
 
 class OdeLoop(ClosedLoop):
@@ -226,7 +195,7 @@ class OdeLoop(ClosedLoop):
         state: NDArray[np.float64],
         memory: NDArray[np.float64],
     ) -> None:
-        self._advance, self._finish = build(agent, law, game)
+        self._advance = build(agent, law, game)
         self._fixed = (problem, channels, clock)
         self._clock = clock
         self._shape = state.shape
@@ -256,10 +225,12 @@ class OdeLoop(ClosedLoop):
 
     def finish(self) -> Samples:
         """See the base class."""
-        inside = self._finish(
-            *self._fixed, self._step, self._state, self._u, self.monitor, self._work
-        )
-        u = self._u if inside else np.full_like(self._u, np.nan)
+        states, inputs = np.empty((1, len(self._state))), np.empty((1, len(self._u)))
+        done, _ = self._advance(
+            *self._fixed, self._step, 0, self._state, self._u, self.monitor, self._work,
+            self._scratch, states, inputs,
+        )  # fmt: skip
+        u = self._u if done else np.full_like(self._u, np.nan)
         return self._samples(self._state[None].copy(), u[None].copy())
 
     def _samples(self, states: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
