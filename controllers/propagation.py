@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ive
 
+from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
 from gne_mj.native import kernel
 
@@ -20,6 +21,7 @@ from gne_mj.native import kernel
 BLOCK = 64
 # The series ends where what is left out is below this, relative to the errors' size.
 _LEFT_OUT = 1e-15
+_LONGEST = 1e8  # half the bound times s: some 90,000 terms
 
 
 class Propagator(NamedTuple):
@@ -48,10 +50,19 @@ def propagator(graph: Graph, duration: float) -> Propagator:
     pairs = np.array(graph.edges, dtype=np.int64).reshape(-1, 2)
     # Anderson and Morley's bound; L_j is a principal submatrix, so it holds for all j.
     bound = float(np.max(degrees[pairs].sum(axis=1), initial=1))
-    coefficients = _series(0.5 * bound * duration)
     numbers = np.array([bound, duration, np.exp(-duration)])
-    work = len(coefficients) * (agents + 2 * len(pairs))
-    if agents * agents <= work and agents <= 64:
+    half = 0.5 * bound * duration
+    few = agents <= 64  # so that their maps stay small
+    if few and half > 100.0:
+        return Propagator(_dense(graph, duration), np.zeros(0), numbers)
+    if half > _LONGEST:
+        raise InvalidInput(
+            "simulation.control_period",
+            f"{duration:.3g} time constants of the estimates",
+            f"{agents} agents on this graph allow at most {2.0 * _LONGEST / bound:.3g}",
+        )
+    coefficients = _series(half)
+    if few and agents * agents <= len(coefficients) * (agents + 2 * len(pairs)):
         return Propagator(_dense(graph, duration), np.zeros(0), numbers)
     return Propagator(np.zeros((0, 0, 0)), coefficients, numbers)
 

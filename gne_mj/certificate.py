@@ -263,6 +263,8 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "largest_rise": rise,
         "largest_rise_time": float(monitor[watch.STORAGE_RISE_TIME]) if rise > 0 else None,
         "monotone": rise <= ROUNDING * max(start, 1.0),
+        "observed_until": float(monitor[watch.TIME]),
+        "left": bool(monitor[watch.EXIT] != watch.INSIDE),
     }
 
 

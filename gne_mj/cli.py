@@ -468,6 +468,7 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
         "Lyapunov function": "not known of MJCF robots"
         if not lyapunov["known"]
         else ("never rose" if lyapunov["monotone"] else "rose")
+        + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
         + f" (largest rise {lyapunov['largest_rise']:.2g}; "
         + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"

@@ -23,7 +23,8 @@ class InvalidInput(GneError, ValueError):
 
     def __init__(self, key: str, value: object, expected: str) -> None:
         self.key, self.value, self.expected = key, value, expected
-        super().__init__(f"{key}: got {value!r}, but {expected}")
+        given = "nothing is given" if value is None else f"got {value!r}"
+        super().__init__(f"{key}: {given}, but {expected}")
 
 
 class InfeasibleStart(GneError, ValueError):

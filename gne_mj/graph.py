@@ -57,7 +57,8 @@ class Graph:
             raise InvalidInput(
                 "controller.graph",
                 f"{len(self.edges)} edges in {parts} parts",
-                f"the graph must be connected; agent 1 cannot reach agent {shown}",
+                f"the graph must be connected; agent 1 cannot reach"
+                f" agent{'s' if len(apart) > 1 else ''} {shown}",
             )
 
     @cached_property

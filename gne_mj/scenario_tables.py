@@ -60,9 +60,24 @@ class _Table(BaseModel):
                     raise PydanticCustomError(
                         "unknown_key",
                         "{name} is not a key here; {hint}",
-                        {"name": repr(key), "hint": nearest(str(key), cls.model_fields)},
+                        {"name": repr(key), "hint": cls._hint(str(key))},
                     )
         return values
+
+    @classmethod
+    def _hint(cls, key: str) -> str:
+        """Where a key that is unknown here belongs, or the nearest one that is known here."""
+        for choice in ("type", "information"):
+            for other in all_tables() if choice in cls.model_fields else ():
+                if choice in other.model_fields and key in other.model_fields:
+                    (own,) = get_args(cls.model_fields[choice].annotation)
+                    (theirs,) = get_args(other.model_fields[choice].annotation)
+                    example = " (--set 'controller={...}')" if choice == "information" else ""
+                    return (
+                        f"it belongs to {choice} = '{theirs}', not to '{own}'; to change the"
+                        f" {choice} give the whole table{example}"
+                    )
+        return nearest(key, cls.model_fields)
 
 
 class VelocityGame(_Table):
@@ -652,14 +667,20 @@ def _per_agent(
     return np.broadcast_to(values, (count,)).copy()
 
 
-def union_tags() -> set[str]:
-    """What may stand in the keys that choose among tables, such as "osnr" in ``game.type``."""
-    tags: set[str] = set()
+def all_tables() -> list[type[_Table]]:
+    """Every kind of table."""
+    found: list[type[_Table]] = []
     waiting: list[type[_Table]] = [_Table]
     while waiting:
         table = waiting.pop()
+        found.append(table)
         waiting.extend(table.__subclasses__())
-        for key in ("type", "information"):
-            if key in table.model_fields:
-                tags.update(get_args(table.model_fields[key].annotation))
-    return tags
+    return found
+
+
+def union_tags() -> set[str]:
+    """What may stand in the keys that choose among tables, such as "osnr" in ``game.type``."""
+    keys = ("type", "information")
+    fields = [table.model_fields[key] for table in all_tables() for key in keys
+              if key in table.model_fields]  # fmt: skip
+    return {tag for field in fields for tag in get_args(field.annotation)}

@@ -191,22 +191,23 @@ def summary(solution: Solution) -> list[str]:
         f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
         for k in solution.active
     ]
+    unit = f" {game.action_unit}" if game.action_unit else ""
     lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
     for point in solution.penalised:
         numbers = _compared(game, point)
         epsilon = numbers["epsilon"]
         lines += [
             f"  penalised equilibrium at rho = {numbers['rho']:g}",
-            f"    {game.action_name:16} {_listed(point.equilibrium.action)} {game.action_unit}",
+            f"    {game.action_name:16} {_listed(point.equilibrium.action)}{unit}",
             f"    {'multipliers':16} {_listed(point.equilibrium.multipliers)}",
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
             f" p rho = {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}",
-            f"    {'distance':16} {point.distance:.4g} {game.action_unit} to the variational GNE",
+            f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
     lines += [
         "  variational GNE",
-        f"    {game.action_name:16} {_listed(variational.action)} {game.action_unit}",
+        f"    {game.action_name:16} {_listed(variational.action)}{unit}",
         f"    {'active':16} {len(binding)} of {game.constraints_count} constraints"
         + (f": {_shortened(binding)}" if binding else ""),
         f"    {'residual':16} stationarity {variational.residual:.1e}, complementarity"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.barrier import LogBarrier
-from gne_mj.controllers import Law
+from gne_mj.controllers import Law, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.equilibrium import Equilibrium, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 # Largest step times rate of decay that a method is stable for, on the negative real axis
 STABLE = {"rk4": 2.785, "euler": 2.0}
+# The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
+ROSENBROCK_AGENTS = 200
 
 
 @dataclass(frozen=True)
@@ -185,6 +187,13 @@ class System:
             )
         if self.engine == "ode" and own_model:
             raise InvalidInput(f"{key}.engine", self.engine, "MJCF robots run on 'mujoco'")
+        if self.integrator == "rosenbrock" and self.game.agents > ROSENBROCK_AGENTS:
+            raise InvalidInput(
+                f"{key}.integrator",
+                self.integrator,
+                f"it keeps N x N x N numbers and is for up to {ROSENBROCK_AGENTS} agents, not"
+                f" {self.game.agents}; use mode 'sampled'",
+            )
         if self.integrator == "rosenbrock" and (
             self.law.information != "distributed"
             or self.mode != "continuous"
@@ -201,6 +210,8 @@ class System:
 
         Explicit methods are stable for c lambda_max / tau (or lambda_max / epsilon) times the step
         up to a constant of the method; lambda_max bounds the grounded Laplacians' eigenvalues.
+        Under partial information the action pulls an agent of mass M as an estimate of mass tau is
+        pulled, so that the lesser of both counts.
         """
         law = self.law
         if law.graph is None or law.estimate_rate == 0.0 or self.mode != "continuous":
@@ -209,12 +220,16 @@ class System:
             return np.inf
         # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
         fastest = max(1.0, law.graph.largest_eigenvalue)
-        return STABLE[self.integrator] / (fastest * law.estimate_rate)
+        rate = law.estimate_rate
+        mobility = getattr(self.agents.kind, "mobility", None)
+        if isinstance(law, PartialInformation) and mobility is not None:
+            rate = max(rate, law.coupling * float(np.max(mobility(self.agents.parameters))))
+        return STABLE[self.integrator] / (fastest * rate)
 
     def _check_step(self, clock: Clock) -> None:
         largest = self.largest_step()
         if clock.timestep > largest:
-            others = "mode 'sampled' has no such limit"
+            others = "in mode 'sampled' estimates have no such limit"
             if self.law.information == "distributed" and self.engine == "ode":
                 others = "integrator 'rosenbrock' and mode 'sampled' have no such limit"
             raise InvalidInput(

@@ -1,7 +1,7 @@
 """Slow, obvious oracles of the mathematics, for the tests to compare the product with.
 
 Everything here is written from the paper alone (labels such as [eq:GNE] are those of `paper.tex`,
-its misprints settled as in DESIGN section 1) with plain loops, NumPy and SciPy. Nothing is
+its misprints settled as in docs/equations.md) with plain loops, NumPy and SciPy. Nothing is
 imported from the package under test, nor numba, nor mujoco: agreement between the two is
 evidence only as long as they share no code.
 

@@ -289,6 +289,19 @@ def test_a_step_outside_is_refused_and_the_named_one_is_accepted(count, kind, en
     assert line_of_integrators(law, count, "sampled", engine=engine).largest_step() == np.inf
 
 
+def test_light_agents_limit_the_step_as_light_estimates_do():
+    """With M < tau the pull on the agents is the faster one: by the column's own matrix."""
+    law = PartialInformation(graphs.complete(5), coupling=2000.0, time_constant=10.0)
+    laplacian = graphs.complete(5).laplacian
+    column = np.diag([1.0, 0.1, 0.1, 0.1, 0.1]) @ (
+        2000.0 * laplacian
+    )  # agent 1 and estimates of it
+    fastest = np.max(np.linalg.eigvals(column).real)
+    largest = line_of_integrators(law, 5).largest_step()
+    assert largest <= 2.785 / fastest
+    assert largest > 0.5 * 2.785 / fastest
+
+
 def test_refused_when_the_loop_is_made():
     system = line_of_integrators(FullyDistributed(graphs.ring(5), 1e-3), 5)
     with pytest.raises(InvalidInput, match=r"simulation\.timestep"):

@@ -100,6 +100,7 @@ def shared():
     return y
 
 
+@pytest.mark.slow
 def test_a_game_of_ones_own_shares_the_feeder(copied, tmp_path):
     """Plain functions and the same ones as kernels; 4 s are enough to compare them."""
     arguments = ("--set", "simulation.duration=4")
@@ -137,6 +138,7 @@ def test_the_kernels_are_the_plain_functions_with_a_mark():
     assert fast.count("@kernel") == 7
 
 
+@pytest.mark.slow
 def test_a_law_of_ones_own(copied, tmp_path):
     report, plain = run(copied, "law/scenario.toml", tmp_path / "plain")
     fast = ("--set", f"controller.file={copied / 'law/damped_fast.py'}")

@@ -107,7 +107,7 @@ def test_sampled_holds_the_input_over_the_control_period(numbers, engine):
     assert relative_error(u[:-1], held[: len(u) - 1]) < 1e-11
 
 
-@pytest.mark.parametrize("count", [1, 2, 500])
+@pytest.mark.parametrize("count", [1, 2, pytest.param(500, marks=pytest.mark.slow)])
 def test_any_number_of_robots(count):
     rng = np.random.default_rng(count)
     numbers = {name: rng.uniform(0.5, 2.0, count) for name in EQUAL}

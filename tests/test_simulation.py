@@ -189,7 +189,13 @@ def test_systems_do_not_wait_for_one_that_left():
     assert trajectory["robots"]["time"].to_numpy()[-1] < 20.0
 
 
-@pytest.mark.parametrize("agents", [integrators(10), pi_cascades(10)], ids=["int", "pi"])
+@pytest.mark.parametrize(
+    "agents",
+    [
+        pytest.param(integrators(10), id="int", marks=pytest.mark.slow),
+        pytest.param(pi_cascades(10), id="pi"),
+    ],
+)
 @pytest.mark.parametrize("mode", ["continuous", "sampled"])
 @pytest.mark.parametrize("law", ["full", "distributed"])
 def test_osnr_under_every_law_ends_at_the_same_equilibrium(agents, mode, law):
@@ -218,7 +224,7 @@ class WildGuess(FullyDistributed):
         return memory
 
 
-@pytest.mark.parametrize("integrator", ["rosenbrock", "rk4"])
+@pytest.mark.parametrize("integrator", [pytest.param("rosenbrock", marks=pytest.mark.slow), "rk4"])
 def test_an_estimate_that_leaves_is_a_status_of_its_own(integrator):
     state = robot_state(np.full(4, V0))
     numbers = {name: values[:4] for name, values in EQUAL.items()}

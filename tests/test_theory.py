@@ -722,6 +722,7 @@ def trial(epsilon, system, timing):
     return loop.monitor[watch.EXIT] == watch.INSIDE
 
 
+@pytest.mark.slow
 def test_the_search_brackets_an_epsilon():
     system = osnr(distributed(epsilon=0.05, gain=1.0), integrator="rosenbrock")
     timing = clock(0.01, 0.1)

@@ -162,7 +162,9 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
                         rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
                         state[r] += h / 6.0 * rise
                 else:
-                    held_step(agent, channels.parameters, states, clock.method, h, state, u, trial)
+                    held_step(
+                        agent, channels.parameters, states, clock.method, h, state, u, scratch[4]
+                    )
                     if clock.mode == CONTINUOUS:  # Euler's method for the memory
                         for r in range(m * states, n):
                             state[r] += h * k[0, r]

@@ -59,6 +59,11 @@ def is_passive(parameters):
     return all(kind.is_passive(own) for kind, own in by_type(parameters))
 
 
+def mobility(parameters):
+    """dy'/du of each channel, grouped by type, (m,)."""
+    return np.concatenate([kind.mobility(own) for kind, own in by_type(parameters)])
+
+
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'."""

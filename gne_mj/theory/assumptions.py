@@ -40,9 +40,12 @@ def costs(system: System, slopes: Slopes) -> Assumption:
     if not slopes.monotone:
         status = FAILS if slopes.refuted and slopes.label == EXACT else UNKNOWN
         return Assumption(label, status, "convexity of the costs is not certain where mu is not")
-    hessian = system.barrier.hessian(system.start)
-    floor = 1e-12 * np.max(np.abs(hessian))
-    if not positive_definite(hessian - floor * np.eye(game.actions)):
+    # What the barrier's curvature spans does not depend on how near each bound is: all weigh alike.
+    slopes_of = game.constraint_jacobian(system.start)
+    ones = np.ones(game.constraints_count)
+    span = slopes_of.T @ slopes_of + game.weighted_constraint_hessian(system.start, ones)
+    floor = 1e-12 * np.max(np.abs(span))
+    if not positive_definite(span - floor * np.eye(game.actions)):
         return Assumption(
             label, FAILS, "phi is not strictly convex: some actions are in no constraint's reach"
         )
@@ -63,7 +66,11 @@ def costs(system: System, slopes: Slopes) -> Assumption:
     points = profiles(game, system.start, game.box, 20, feasible=True)
     curvature = [_curvatures(system, y) for y in points]
     if all(np.all(c == 0.0) for c in curvature):
-        return Assumption(label, status, "costs convex, constraints affine" + compact)
+        own = game.kernels.__name__.startswith("gne_mj.games.")
+        seen = "" if own else f" at {len(points)} sampled profiles, which is no proof"
+        return Assumption(
+            label, status if own else ASSUMED, f"costs convex, constraints affine{seen}{compact}"
+        )
     least = min(float(np.linalg.eigvalsh(c).min()) for c in curvature)
     if least < -1e-6:
         return Assumption(label, FAILS, f"a constraint's second derivative has {least:.3g}")

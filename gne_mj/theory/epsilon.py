@@ -73,7 +73,8 @@ def search_epsilon(
     good = bad = epsilon = law.epsilon
     while True:
         following = factor * epsilon
-        if following < LEAST * law.epsilon or following > MOST * clock.duration:
+        too_long = factor > 1.0 and following > MOST * clock.duration
+        if following < LEAST * law.epsilon or too_long:
             note = f"{following:.4g} s was not tried"
             break
         try:

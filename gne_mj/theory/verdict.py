@@ -39,14 +39,15 @@ def guaranteed(theorem: Theorem) -> list[str]:
     if theorem.status == CERTIFIED:
         return [
             f"in continuous time every shared constraint holds for all time{as_long}{provided}",
-            f"y(t) tends to the penalised equilibrium, {limit}",
-            "the Lyapunov function never rises",
+            f"y(t) tends to the penalised equilibrium, {limit}{as_long}{provided}",
+            f"the Lyapunov function never rises{as_long}{provided}",
         ]
     if theorem.status == CONDITIONAL:
         return [
             "for all epsilon below some epsilon* > 0, in continuous time, every shared constraint"
             f" holds for all time{as_long}{provided}",
-            f"for them the penalised equilibrium is exponentially stable, {limit}",
+            f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}"
+            f"{provided}",
         ]
     if not theorem.obstacles:
         return ["nothing of this run; the same law in continuous time is covered by the theorem"]

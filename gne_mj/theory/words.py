@@ -135,7 +135,8 @@ def _epsilon(epsilon: dict[str, Any], status: str) -> str:
     if search is None:
         return text + " (--search-epsilon tries)"
     inside, outside = search["inside"], search["outside"]
-    text += f". By {len(search['trials'])} trial runs from this start: "
+    count = len(search["trials"])
+    text += f". By {count} trial run{'s' if count > 1 else ''} from this start: "
     text += "none stayed inside" if inside is None else f"{inside:.4g} s stays inside"
     if outside is not None:
         text += f", {outside:.4g} s does not"
@@ -150,9 +151,10 @@ def _estimates(estimates: dict[str, Any]) -> str:
             f"{side}, least margin {estimates['margin']:.6g} (agent {estimates['agent']},"
             f" {estimates['constraint']})"
         )
-    return (
-        f"at most {estimates['largest_distance_from_actions']:.6g} from y(0); they may be outside"
-    )
+    distance = estimates["largest_distance_from_actions"]
+    if distance == 0.0:
+        return "they equal y(0)"
+    return f"at most {distance:.6g} from y(0); under partial information they need not lie inside"
 
 
 def _periods(g: dict[str, Any]) -> str:
