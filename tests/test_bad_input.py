@@ -65,7 +65,7 @@ CASES = {
     "not connected": (
         "osnr",
         ["controller.graph=[[1,2],[3,4]]"],
-        ["controller.graph", "connected", "agent 1 cannot reach agent 3"],
+        ["controller.graph", "connected", "agent 1 cannot reach agents 3"],
     ),
     "edge out of range": (
         "osnr",

@@ -36,7 +36,7 @@ def test_random_trees_with_extra_edges(count, random):
 
 
 def test_refusals():
-    with pytest.raises(InvalidInput, match="agent 1 cannot reach agent 3, 4"):
+    with pytest.raises(InvalidInput, match="agent 1 cannot reach agents 3, 4"):
         graphs.Graph(4, ((0, 1), (2, 3)))
     with pytest.raises(InvalidInput, match="joins two agents"):
         graphs.Graph(2, ((0, 0), (0, 1)))
@@ -95,5 +95,5 @@ def test_a_large_graph_stays_sparse():
     graph = graphs.ring(5000)
     assert graph.sparse_laplacian.nnz == 3 * 5000
     assert len(graph.data.neighbour) == 2 * 5000
-    with pytest.raises(InvalidInput, match=r"agent 1 cannot reach agent 3, 4, 5, 6, 7, \.\.\."):
+    with pytest.raises(InvalidInput, match=r"agent 1 cannot reach agents 3, 4, 5, 6, 7, \.\.\."):
         graphs.Graph(5000, ((0, 1),))

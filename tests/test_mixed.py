@@ -157,7 +157,10 @@ def test_a_mixed_scenario_converges():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"agents": {"type": "mixed"}}, "systems.all.agents.groups: got None"),
+        (
+            {"agents": {"type": "mixed"}},
+            "systems.all.agents.groups: nothing is given, but this key must be given",
+        ),
         ({"agents": {"type": "mixed", "groups": []}}, "systems.all.agents.groups: got"),
         (
             {"agents": {"type": "mixed", "groups": [{"type": "robot", "count": 1}]}},

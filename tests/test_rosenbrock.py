@@ -164,7 +164,7 @@ def expected(system, agent, game, times, epsilon, gain):
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-3, 1e-5])
-@pytest.mark.parametrize("kind", ["integrator", "pi_cascade"])
+@pytest.mark.parametrize("kind", [pytest.param("integrator", marks=pytest.mark.slow), "pi_cascade"])
 def test_channels_agree_with_scipy(kind, epsilon):
     agents, oracle = {
         "integrator": (integrators(3), reference.Integrator()),

@@ -736,6 +736,7 @@ def test_the_search_brackets_an_epsilon():
     assert all(stayed == trial(epsilon, system, timing) for epsilon, stayed in found.trials)
 
 
+@pytest.mark.slow
 def test_the_search_says_where_it_ends():
     timing = clock(0.002, 0.004)
     endless = search_epsilon(osnr(distributed(epsilon=0.03), integrator="rosenbrock"), timing)
