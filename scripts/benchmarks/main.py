@@ -16,12 +16,13 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=25, help="turns of which the median counts")
     parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
     options = parser.parse_args()
-    rows = [*fleet.rows(options.runs), *twin.rows(options.runs), *solver.rows(options.runs)]
-    text = table(rows, options.runs)
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    else:
-        print(text)
+    rows: list[dict[str, str]] = []
+    for group in (fleet, solver, twin):
+        rows.extend(group.rows(options.runs))
+        if options.out:  # after each group, so that an interruption keeps what was measured
+            options.out.write_text(table(rows, options.runs), encoding="utf-8")
+    if not options.out:
+        print(table(rows, options.runs))
 
 
 def table(rows: list[dict[str, str]], runs: int) -> str:
