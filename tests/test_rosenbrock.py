@@ -180,6 +180,7 @@ def test_channels_agree_with_scipy(kind, epsilon):
     assert abs(want[-1, 0] - 0.2) > 5e-3  # something happened
 
 
+@pytest.mark.slow
 def test_robots_agree_with_scipy():
     y = np.array([1.0, 0.5, 1.5])
     numbers = {key: values[:3] for key, values in UNEQUAL.items()}
