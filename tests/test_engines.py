@@ -30,7 +30,6 @@ from gne_mj.loops import monitor as watch
 from gne_mj.system import System
 
 COUPLING, TAU, EPSILON, GAIN = 2.0, 0.5, 0.1, 0.1
-DELTA = np.full(5, 3.0)
 LAWS = ("full", "partial", "distributed")
 PLANTS = (
     "robots in MuJoCo", "robots", "integrators in a line", "integrators as channels",
@@ -48,7 +47,7 @@ class Case:
 
     def __post_init__(self):
         channels = self.plant in PLANTS[3:]
-        self.count = 10 if channels else 5
+        self.count = 10 if channels or self.graph == "printed" else 5
         self.network = graphs.NAMED[self.graph](self.count)
         self.laplacian = reference.laplacian(self.count, self.network.edges)
         rng = np.random.default_rng(len(self.plant + self.law + self.graph))
@@ -60,12 +59,15 @@ class Case:
             y = 0.7 * self.oracle.power_limit * rng.dirichlet(np.full(10, 20.0))
             spread = 0.01
         else:
-            self.game, self.oracle = velocity_game(5, V0, DELTA), reference.VelocityGame(V0, DELTA)
-            y = V0 + np.cumsum(rng.uniform(-0.7, 0.7, 5) * DELTA)
+            delta = np.full(self.count, 3.0)
+            self.game = velocity_game(self.count, V0, delta)
+            self.oracle = reference.VelocityGame(V0, delta)
+            y = V0 + np.cumsum(rng.uniform(-0.7, 0.7, self.count) * delta)
             spread = 0.1
         if self.plant.startswith("robots"):
-            self.agents, self.agent = robots(UNEQUAL), reference_robots(UNEQUAL)
-            self.state = random_robot_state(rng, 0.4 * DELTA, spread=0.5)
+            numbers = {name: values * (self.count // 5) for name, values in UNEQUAL.items()}
+            self.agents, self.agent = robots(numbers), reference_robots(numbers)
+            self.state = random_robot_state(rng, 0.4 * delta, spread=0.5)
             y = self.state[:, 1]
         elif self.plant.startswith("integrators"):
             self.agents, self.agent = integrators(self.count), reference.Integrator()
@@ -189,9 +191,7 @@ class Remembering:
 
 def matrix():
     for plant in PLANTS:
-        names = ["line", "ring", "complete"]
-        if plant in PLANTS[3:]:
-            names.append("printed")
+        names = ("line", "ring", "complete", "printed")  # the last one with ten agents
         yield plant, "full", "line"
         for law in LAWS[1:]:
             for graph in names:
