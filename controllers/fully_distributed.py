@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.estimates import barrier_profile, estimate_rates, write_own_actions
-from gne_mj.controllers.law import Law, initial_estimates
+from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.errors import InvalidInput
@@ -40,10 +40,7 @@ class FullyDistributed(Law):
     gain: float = 1.0
 
     def __post_init__(self) -> None:
-        for key in ("epsilon", "gain"):
-            value = getattr(self, key)
-            if not (np.isfinite(value) and value > 0):
-                raise InvalidInput(f"controller.{key}", value, "it must be positive and finite")
+        check_positive(self, "epsilon", "gain")
 
     @property
     def kernels(self) -> ModuleType:
@@ -114,8 +111,8 @@ def action(game, problem, y, weights, memory, work, u):
 def agent_action(game, data, settings, i, own_filter, own_row, work, u):
     """Action of agent i from what it has: z_i (m_i,) and its row (m,), its own action in place.
 
-    work.profile is overwritten. Returns -1, or the constraint on or outside
-    whose boundary the agent's filtered profile (z_i, **y**^i_-i) lies.
+    work.profile is overwritten. Returns -1, or the constraint on or outside whose boundary the
+    agent's filtered profile (z_i, **y**^i_-i) lies.
     """
     first, q, profile = data.offsets[i], data.parameters, work.profile
     barrier_profile(data, i, own_filter, own_row, profile)

@@ -102,6 +102,18 @@ class Law(ABC):
         return propagator(self.graph, self.estimate_rate * period)
 
 
+def check_positive(law: Law, *keys: str) -> None:
+    """Refuse a law with one of these numbers not positive and finite.
+
+    Raises:
+        InvalidInput: names the first such key.
+    """
+    for key in keys:
+        value = getattr(law, key)
+        if not (np.isfinite(value) and value > 0):
+            raise InvalidInput(f"controller.{key}", value, "it must be positive and finite")
+
+
 def initial_estimates(
     agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
 ) -> NDArray[np.float64]:

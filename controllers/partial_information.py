@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.estimates import estimate_rates, write_own_actions
-from gne_mj.controllers.law import Law, initial_estimates
+from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
-from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
 from gne_mj.native import kernel
 
@@ -44,10 +43,7 @@ class PartialInformation(Law):
     time_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        for key in ("coupling", "time_constant"):
-            value = getattr(self, key)
-            if not (np.isfinite(value) and value > 0):
-                raise InvalidInput(f"controller.{key}", value, "it must be positive and finite")
+        check_positive(self, "coupling", "time_constant")
 
     @property
     def kernels(self) -> ModuleType:

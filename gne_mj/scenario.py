@@ -132,7 +132,12 @@ def _first(error: ValidationError) -> InvalidInput:
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
         detail = max(same[1:], key=lambda d: len(d["loc"]))
     tags = union_tags() | {"float", "str", "list", "literal"}
-    where = [str(part) for part in detail["loc"] if str(part).split("[")[0] not in tags]
+    where = [
+        str(part)
+        for depth, part in enumerate(detail["loc"])
+        # at this depth stands a system's name, which may be that of a tag
+        if depth == 1 or str(part).split("[")[0] not in tags
+    ]
     value = detail["input"]
     context = detail.get("ctx", {})
     kind = detail["type"]

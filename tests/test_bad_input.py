@@ -222,6 +222,17 @@ def test_a_broken_file(tmp_path):
         load_scenario(path)
 
 
+def test_a_system_may_be_called_like_a_type():
+    tables = {"systems": {"osnr": {"game": {"type": "osnr"}, "agents": {"type": "pi-cascade"}}}}
+    with pytest.raises(InvalidInput, match=r"systems\.osnr\.agents\.count: nothing is given"):
+        load_scenario(tables)
+
+
+def test_a_key_of_another_information_structure_says_whose_it_is():
+    with pytest.raises(InvalidInput, match="belongs to information = 'distributed', not to 'full'"):
+        load_scenario("osnr", {"controller.information": "full"})
+
+
 def test_errors_keep_their_parts():
     with pytest.raises(InvalidInput) as caught:
         load_scenario("velocity-sync", {"barrier.rho": -1.0})

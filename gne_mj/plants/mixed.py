@@ -60,8 +60,11 @@ def is_passive(parameters):
 
 
 def mobility(parameters):
-    """dy'/du of each channel, grouped by type, (m,)."""
-    return np.concatenate([kind.mobility(own) for kind, own in by_type(parameters)])
+    """dy'/du of each channel, (m,); parameters (m, 6)."""
+    found = np.empty(len(parameters))
+    for kind, own in by_type(parameters):
+        found[parameters[:, 0] == TYPES.index(kind)] = kind.mobility(own)
+    return found
 
 
 @kernel

@@ -1,0 +1,10 @@
+"""The tables of a scenario file: what may stand where, and what is built from it.
+
+Each table has the fields that a user may set, with their units, and a ``build`` that makes the
+object they describe.
+"""
+
+from gne_mj.scenario_tables.scenario import Scenario, SystemTable
+from gne_mj.scenario_tables.table import union_tags
+
+__all__ = ["Scenario", "SystemTable", "union_tags"]

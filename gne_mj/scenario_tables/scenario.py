@@ -1,0 +1,228 @@
+"""The whole of a scenario file: the shared clock and the systems on it."""
+
+import re
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from gne_mj.errors import InvalidInput
+from gne_mj.plants import flexible_robot
+from gne_mj.plants.agents import Agents
+from gne_mj.scenario_tables.agents import (
+    IntegratorAgents,
+    MixedAgents,
+    MjcfAgents,
+    PiCascadeAgents,
+    PlanarRobotAgents,
+    RobotAgents,
+)
+from gne_mj.scenario_tables.controllers import (
+    CustomController,
+    DistributedController,
+    FullController,
+    PartialController,
+)
+from gne_mj.scenario_tables.games import (
+    CournotGame,
+    CustomGame,
+    OsnrGame,
+    VelocityConsensusGame,
+    VelocityGame,
+)
+from gne_mj.scenario_tables.table import PerAction, Sizes, Table, per_action
+from gne_mj.simulation import Simulation
+from gne_mj.system import Clock, System
+
+
+class BarrierTable(Table):
+    """[eq:logbarrier]"""
+
+    rho: float = Field(0.1, gt=0)
+
+
+class PlantTable(Table):
+    """What moves the agents."""
+
+    engine: Literal["mujoco", "ode"] | None = Field(
+        None, description="'ode' if left out, but 'mujoco' for MJCF robots"
+    )
+    integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
+        None, description="in place of the simulation's"
+    )
+
+
+class InitialTable(Table):
+    """The start; what is left out rests, relaxed, at the default actions."""
+
+    action: PerAction | None = Field(None, description="y(0)")
+    extension: PerAction | None = Field(None, description="robots: x1(0) in m")
+    appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
+    position: PerAction | None = Field(None, description="robots: d(0) in m")
+    integral: PerAction | None = Field(None, description="PI cascade: s(0)")
+    estimate: float | list[float] | list[list[float]] | None = Field(
+        None, description="one number, a profile that all agents hold, or one profile each; y(0)"
+    )
+    filtered: PerAction | None = Field(None, description="distributed law: z(0); y(0) if left out")
+
+    def build(
+        self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """(m, states): at rest at y(0), but for what is given."""
+        y = default() if self.action is None else per_action("initial.action", self.action, sizes)
+        state = agents.equilibrium(y)
+        names = [name for name, _ in agents.kind.STATES]
+        if agents.kind is flexible_robot:
+            state[:, names.index("position")] = _places(sizes)
+        for key in ("extension", "appendage_velocity", "position", "integral"):
+            given = getattr(self, key)
+            if given is None:
+                continue
+            if key not in names:
+                raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
+            state[:, names.index(key)] = per_action(f"initial.{key}", given, sizes)
+        return state
+
+
+class SystemTable(Table):
+    """One game with its agents."""
+
+    game: Annotated[
+        VelocityGame | VelocityConsensusGame | OsnrGame | CournotGame | CustomGame,
+        Field(discriminator="type"),
+    ]
+    agents: Annotated[
+        RobotAgents
+        | PlanarRobotAgents
+        | IntegratorAgents
+        | PiCascadeAgents
+        | MixedAgents
+        | MjcfAgents,
+        Field(discriminator="type"),
+    ]
+    barrier: BarrierTable = BarrierTable()
+    controller: Annotated[
+        FullController | PartialController | DistributedController | CustomController,
+        Field(discriminator="information"),
+    ] = FullController(information="full")
+    plant: PlantTable = PlantTable()
+    initial: InitialTable = InitialTable()
+
+    def build(self, name: str, integrator_name: str) -> System:
+        """The system, with the simulation's integrator unless it names its own."""
+        count = self.agents.count
+        try:
+            game = self.game.build(count)
+            agents = self.agents.build(game.sizes)
+            law = self.controller.build(game)
+            state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
+            filtered = self.initial.filtered
+            memory = law.initial_memory(
+                state[:, agents.kind.OUTPUT],
+                self.initial.estimate,
+                None if filtered is None else per_action("initial.filtered", filtered, game.sizes),
+            )
+        except InvalidInput as error:
+            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
+        return System(
+            name=name,
+            game=game,
+            agents=agents,
+            law=law,
+            rho=self.barrier.rho,
+            state=state,
+            memory=memory,
+            mode=self.controller.mode,
+            engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
+            integrator=self.plant.integrator or integrator_name,
+        )
+
+
+class SimulationTable(Table):
+    """The clock that all systems share."""
+
+    duration: float = Field(30.0, gt=0, description="s")
+    timestep: float = Field(0.002, gt=0, description="s")
+    control_period: float | None = Field(
+        None, gt=0, description="s, for mode sampled; the timestep if left out"
+    )
+    integrator: Literal["rk4", "euler"] = "rk4"
+    tolerance: float = Field(1e-3, gt=0, description="on max |y - y*|, for status converged")
+    seed: int = Field(0, ge=0)
+
+
+class RecordingTable(Table):
+    """What is kept."""
+
+    period: float = Field(0.05, gt=0, description="s between samples")
+
+
+class Scenario(Table):
+    """A whole run: systems on one clock."""
+
+    description: str = ""
+    simulation: SimulationTable = SimulationTable()
+    recording: RecordingTable = RecordingTable()
+    systems: dict[str, SystemTable] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names(self) -> "Scenario":
+        for name in self.systems:
+            if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+                raise PydanticCustomError(
+                    "name", "a system's name has letters, digits, '-' and '_' only"
+                )
+        return self
+
+    def clock(self) -> Clock:
+        """The shared clock."""
+        simulation = self.simulation
+        try:
+            return Clock(
+                duration=simulation.duration,
+                timestep=simulation.timestep,
+                control_period=simulation.control_period or simulation.timestep,
+                sample_period=self.recording.period,
+            )
+        except InvalidInput as error:
+            if error.key == "simulation.sample_period":
+                raise InvalidInput("recording.period", error.value, error.expected) from None
+            raise
+
+    def system_objects(self) -> list[System]:
+        """The systems, checked.
+
+        Raises:
+            InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
+        """
+        integrator = self.simulation.integrator
+        return [table.build(name, integrator) for name, table in self.systems.items()]
+
+    def simulation_object(self) -> Simulation:
+        """The scenario, ready to run.
+
+        Raises:
+            InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
+        """
+        clock = self.clock()
+        return Simulation(
+            self.system_objects(),
+            clock,
+            tolerance=self.simulation.tolerance,
+            seed=self.simulation.seed,
+            source=self.model_dump_json(exclude_none=True),
+        )
+
+
+def _places(sizes: Sizes) -> NDArray[np.float64]:
+    """(m,) positions in m, 1.5 m apart: behind each other, or in the rows of a square."""
+    count, dimension = len(sizes), max(sizes)
+    places = np.zeros((count, dimension))
+    number = np.arange(count)
+    side = count if dimension == 1 else int(np.ceil(np.sqrt(count)))
+    places[:, 0] = -1.5 * (number % side)
+    places[:, 1:2] = -1.5 * (number // side)[:, None]
+    return places[np.arange(dimension) < np.array(sizes)[:, None]]

@@ -1,0 +1,124 @@
+"""What all tables of a scenario file share: their checks, and numbers given for each agent."""
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic_core import PydanticCustomError
+
+from gne_mj.errors import InvalidInput, nearest
+
+# One number for all agents, or one each
+PerAgent = float | list[float]
+
+
+# m_i, the entries of each agent's action
+Sizes = tuple[int, ...]
+
+
+# Of what every entry of an action has: one number for all; where an action is a vector, one vector
+# for all agents or a list of them; else one number for each agent
+PerAction = float | list[float] | list[list[float]]
+
+
+class Table(BaseModel):
+    """A TOML table: unknown keys and numbers that are not finite are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, values: Any) -> Any:
+        if isinstance(values, Mapping):
+            for key in values:
+                if key not in cls.model_fields:
+                    raise PydanticCustomError(
+                        "unknown_key",
+                        "{name} is not a key here; {hint}",
+                        {"name": repr(key), "hint": cls._hint(str(key))},
+                    )
+        return values
+
+    @classmethod
+    def _hint(cls, key: str) -> str:
+        """Where a key that is unknown here belongs, or the nearest one that is known here."""
+        for choice in ("type", "information"):
+            for other in all_tables() if choice in cls.model_fields else ():
+                if choice in other.model_fields and key in other.model_fields:
+                    (own,) = get_args(cls.model_fields[choice].annotation)
+                    (theirs,) = get_args(other.model_fields[choice].annotation)
+                    example = " (--set 'controller={...}')" if choice == "information" else ""
+                    return (
+                        f"it belongs to {choice} = '{theirs}', not to '{own}'; to change the"
+                        f" {choice} give the whole table{example}"
+                    )
+        return nearest(key, cls.model_fields)
+
+
+def all_tables() -> list[type[Table]]:
+    """Every kind of table."""
+    found: list[type[Table]] = []
+    waiting: list[type[Table]] = [Table]
+    while waiting:
+        table = waiting.pop()
+        found.append(table)
+        waiting.extend(table.__subclasses__())
+    return found
+
+
+def union_tags() -> set[str]:
+    """What may stand in the keys that choose among tables, such as "osnr" in ``game.type``."""
+    keys = ("type", "information")
+    fields = [table.model_fields[key] for table in all_tables() for key in keys
+              if key in table.model_fields]  # fmt: skip
+    return {tag for field in fields for tag in get_args(field.annotation)}
+
+
+def dimension_of(sizes: Sizes) -> int:
+    """Channels of each agent, where all have as many; else each channel is taken by itself."""
+    return sizes[0] if len(set(sizes)) == 1 else 1
+
+
+def per_agent(
+    key: str, given: PerAgent, count: int, *, positive: bool = False
+) -> NDArray[np.float64]:
+    """(count,) numbers, one an agent.
+
+    Raises:
+        InvalidInput: naming ``key``, for another number of them, or one that should be positive.
+    """
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim == 1 and len(values) != count:
+        raise InvalidInput(
+            key, given, f"it must be one number or a list of {count}, one for each agent"
+        )
+    if positive and np.any(values <= 0):
+        raise InvalidInput(key, given, "it must be positive")
+    return np.broadcast_to(values, (count,)).copy()
+
+
+def per_action(key: str, given: PerAction, sizes: Sizes) -> NDArray[np.float64]:
+    """(m,) numbers, agent by agent.
+
+    Raises:
+        InvalidInput: naming ``key``, for lists of other lengths.
+    """
+    count, dimension = len(sizes), dimension_of(sizes)
+    vectors: list[Any] = []
+    if isinstance(given, list):
+        if any(isinstance(entry, list) for entry in given):
+            vectors = given
+        elif max(sizes) > 1:
+            vectors = [given] * count
+    if not vectors:
+        return np.repeat(per_agent(key, given, count), sizes)  # type: ignore[arg-type]
+    if tuple(map(len, vectors)) != tuple(sizes):
+        one = f"one list of {dimension} for all agents, or " if dimension > 1 else ""
+        raise InvalidInput(
+            key,
+            given,
+            f"it must be one number, {one}a list of {count} lists, one for each agent",
+        )
+    return np.concatenate(vectors, dtype=np.float64)
