@@ -96,6 +96,8 @@ def save_path(solution: Solution, file: Path) -> None:
     with plt.rc_context(_STYLE):
         figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
         for index, (label, values) in enumerate(lines.items()):
+            nowhere = not np.any(np.asarray(values) > 0.0)  # log scales have no place for zero
+            label += " (zero)" if nowhere else ""
             axes.loglog(rho, values, label=label, **_line_style(index))
         axes.set_xlabel("penalty parameter $\\rho$")
         axes.legend()
