@@ -221,9 +221,8 @@ class System:
         # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
         fastest = max(1.0, law.graph.largest_eigenvalue)
         rate = law.estimate_rate
-        mobility = getattr(self.agents.kind, "mobility", None)
-        if isinstance(law, PartialInformation) and mobility is not None:
-            rate = max(rate, law.coupling * float(np.max(mobility(self.agents.parameters))))
+        if isinstance(law, PartialInformation) and self.agents.mobility is not None:
+            rate = max(rate, law.coupling * float(np.max(self.agents.mobility)))
         return STABLE[self.integrator] / (fastest * rate)
 
     def _check_step(self, clock: Clock) -> None:

@@ -84,7 +84,7 @@ def loop_at(game, law, y, memory, h=1.0):
 
 def step(game, law, y, memory):
     """u and the memory's rate at a state: an Euler step of length 1 adds exactly one rate."""
-    memory = own_actions_in(memory, y)
+    memory = own_actions_in(memory, y, game.agent_of_action)
     loop = loop_at(game, law, y, memory)
     first = loop.advance(1, 1)
     assert loop.monitor[watch.EXIT] == watch.INSIDE
@@ -96,11 +96,11 @@ def step(game, law, y, memory):
     return u, last.memory[0] - memory
 
 
-def own_actions_in(memory, y):
+def own_actions_in(memory, y, owner):
     """The memory as the law keeps it: each agent's own action in its own block."""
     memory, m = memory.copy(), len(y)
     if len(memory):
-        memory[: m * m].reshape(m, m)[np.diag_indices(m)] = y
+        memory[owner * m + np.arange(m)] = y
     return memory
 
 

@@ -38,7 +38,7 @@ from gne_mj.theory import Slopes, Theorem, certify, search_epsilon, words
 from gne_mj.theory.constants import profiles
 from gne_mj.theory.coupling import coupling, least_coupling, needed_connectivity
 from gne_mj.theory.gain import decay_rate, least_beta, required_gain
-from gne_mj.theory.periods import linear_period, mobility, push_period
+from gne_mj.theory.periods import linear_period, push_period
 
 STEP = clock(0.002)
 
@@ -672,8 +672,8 @@ def test_estimates_of_the_distributed_law_start_in_a_ball_inside():
 
 def test_mobility_is_one_over_the_mass():
     system = robot_system(robot_state(FIVE), UNEQUAL)
-    np.testing.assert_allclose(mobility(system), 1 / np.array(UNEQUAL["main_mass"]))
-    np.testing.assert_array_equal(mobility(osnr(distributed())), np.ones(10))
+    np.testing.assert_allclose(system.agents.mobility, 1 / np.array(UNEQUAL["main_mass"]))
+    np.testing.assert_array_equal(osnr(distributed()).agents.mobility, np.ones(10))
 
 
 def test_rules_for_one_robot_near_its_bound():

@@ -27,6 +27,7 @@ from gne_mj.loops.ode import measure, stored
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
 from gne_mj.loops.stage_system import StageSystem, linearise, prepare, solve_stage, stage_system
 from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj.plants.agents import input_columns
 from gne_mj.plants.ode import Channels
 
 # How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
@@ -363,7 +364,7 @@ class RosenbrockLoop(ClosedLoop):
             greatest=np.abs(state).max(axis=0),
             exit=np.zeros(watch.HEADER),
             u=np.zeros(m),
-            system=stage_system(_input_columns(agent, channels), agents),
+            system=stage_system(input_columns(agent, channels.parameters), agents),
         )
         self.monitor = np.zeros(watch.length(m, constraints))
 
@@ -405,16 +406,3 @@ class RosenbrockLoop(ClosedLoop):
             input=inputs,
             memory=states[:, size:],
         )
-
-
-def _input_columns(agent: ModuleType, channels: Channels) -> NDArray[np.float64]:
-    """G of each channel, (m, states): the agents are affine in u, with constant G."""
-    columns = np.zeros(channels.rest.shape)
-    origin = np.zeros(channels.rest.shape[1])
-    for q, column in zip(channels.parameters, columns, strict=True):
-        without = np.zeros_like(origin)
-        agent.rate(q, origin, 0.0, without)
-        agent.rate(q, origin, 1.0, column)
-        column -= without
-    columns.flags.writeable = False
-    return columns

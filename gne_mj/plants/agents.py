@@ -1,7 +1,7 @@
 """A group of agents of one type: what has state, and knows nothing of games and controllers."""
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from types import ModuleType
 from typing import Any, Self
 
@@ -73,6 +73,13 @@ class Agents:
             input_limit=np.tile(self.input_limit, copies),
         )
 
+    @cached_property
+    def mobility(self) -> NDArray[np.float64] | None:
+        """dy'/du of each channel, shape (m,), as 1/M of a robot; None where no ODE is known."""
+        if not hasattr(self.kind, "rate"):
+            return None
+        return input_columns(self.kind, self.parameters)[:, self.kind.OUTPUT]
+
     @property
     def knows_storage(self) -> bool:
         """Whether the type has a storage function; without one, ``storage`` is zero."""
@@ -98,6 +105,19 @@ class Agents:
         rows = state.reshape(-1, *shape)
         _native(self.kind)[1](self.parameters, rows, rest, out.reshape(len(rows), self.channels))
         return out
+
+
+def input_columns(kind: ModuleType, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """G of each channel, shape (m, states): x' is affine in u, with constant G."""
+    columns = np.zeros((len(parameters), len(kind.STATES)))
+    origin = np.zeros(len(kind.STATES))
+    for q, column in zip(parameters, columns, strict=True):
+        without = np.zeros_like(origin)
+        kind.rate(q, origin, 0.0, without)
+        kind.rate(q, origin, 1.0, column)
+        column -= without
+    columns.flags.writeable = False
+    return columns
 
 
 @cache

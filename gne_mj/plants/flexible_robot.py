@@ -53,11 +53,6 @@ def energy_balance(parameters):
     return storage, dissipation
 
 
-def mobility(parameters):
-    """dy'/du of each channel, (m,); 1/M."""
-    return 1.0 / parameters[:, 0]
-
-
 @kernel
 def pull(q, x):
     """Force of spring and damper on the appendage, in N (the main mass feels its opposite)."""

@@ -34,11 +34,6 @@ def energy_balance(parameters):
     return ones, 0.0 * ones
 
 
-def mobility(parameters):
-    """dy'/du of each channel, (m,); 1 for y' = u."""
-    return np.ones(len(parameters))
-
-
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'."""

@@ -59,14 +59,6 @@ def is_passive(parameters):
     return all(kind.is_passive(own) for kind, own in by_type(parameters))
 
 
-def mobility(parameters):
-    """dy'/du of each channel, (m,); parameters (m, 6)."""
-    found = np.empty(len(parameters))
-    for kind, own in by_type(parameters):
-        found[parameters[:, 0] == TYPES.index(kind)] = kind.mobility(own)
-    return found
-
-
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'."""

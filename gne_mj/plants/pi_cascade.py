@@ -32,11 +32,6 @@ def energy_balance(parameters):
     return np.moveaxis(storage, -1, 0), np.moveaxis(dissipation, -1, 0)
 
 
-def mobility(parameters):
-    """dy'/du of each channel, (m,); 1, as u enters y' directly."""
-    return np.ones(len(parameters))
-
-
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'."""

@@ -20,23 +20,9 @@ from gne_mj.system import System
 Array = NDArray[np.float64]
 
 
-def mobility(system: System) -> Array | None:
-    """1/M of every channel: how much dy/dt jumps with u; None where the agents do not tell."""
-    kind = system.agents.kind
-    if not hasattr(kind, "rate"):
-        return None
-    found = np.empty(system.game.actions)
-    for r, (q, x) in enumerate(zip(system.agents.parameters, system.state, strict=True)):
-        at_rest, pushed = np.zeros(len(x)), np.zeros(len(x))
-        kind.rate(q, x, 0.0, at_rest)
-        kind.rate(q, x, 1.0, pushed)
-        found[r] = (pushed - at_rest)[kind.OUTPUT]
-    return found
-
-
 def push_period(system: System, y: Array) -> float | None:
     """The first rule at a feasible profile y (m,), for games with bounds on gaps."""
-    bounds, inverse = system.game.gap_bounds, mobility(system)
+    bounds, inverse = system.game.gap_bounds, system.agents.mobility
     if bounds is None or inverse is None:
         return None
     gaps = np.sqrt(np.maximum(system.game.constraints(y) + bounds**2, 0.0))
@@ -50,7 +36,7 @@ def push_period(system: System, y: Array) -> float | None:
 
 def linear_period(system: System, y: Array) -> float | None:
     """The second rule at a feasible profile y (m,)."""
-    inverse = mobility(system)
+    inverse = system.agents.mobility
     if inverse is None:
         return None
     game, law = system.game, system.law
