@@ -252,6 +252,7 @@ def exit_of(loop):
     return (*codes.astype(int), loop.monitor[watch.EXIT_TIME])
 
 
+@pytest.mark.slow
 def test_an_estimate_that_leaves():
     # Agent 0 hears at once that channel 1 sends more than it thought, and only through agent 1,
     # who is as wrong as itself, that channel 2 sends less: in between its sum exceeds the limit.
@@ -270,6 +271,7 @@ def test_an_estimate_that_leaves():
     assert len(ours.advance(5, 1).input) == 0  # it has ended
 
 
+@pytest.mark.slow
 def test_the_true_profile_leaves():
     # With estimates slower than the actions everyone goes on spending power that is not there.
     law = Misled(graphs.line(3), 1e3, 5.0, estimates=((0.01,) * 3,) * 3)
@@ -286,6 +288,7 @@ def test_a_start_with_an_estimate_outside_is_refused():
         channels(integrators(3), 0, law=law)
 
 
+@pytest.mark.slow
 def test_close_to_the_boundary():
     law = distributed("line", 1e-4, 1.0, 5)
     system = robot_system(
