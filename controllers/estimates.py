@@ -3,10 +3,53 @@
 A law's memory holds the estimates as N rows of length m: row i is agent i's full-length vector
 **y**^i, which it sends to its neighbours. Its own block is no estimate but its own action, which
 the law writes there before anything else at every evaluation (:func:`write_own_actions`).
+
+Where messages can be lost or late, the memory has one more row for each link of the graph (each
+agent's neighbours in turn): what came over it last. Then that is what an agent has of a neighbour.
 """
 
-from gne_mj.controllers.settings import RATE
+import numpy as np
+
+from gne_mj.controllers.propagation import propagate_estimates
+from gne_mj.controllers.settings import LINKS, RATE
 from gne_mj.native import kernel
+
+
+@kernel
+def heard_at(problem, m, link):
+    """Where in the memory an agent has a neighbour's row: the row itself, or what came last."""
+    links = int(problem.settings[LINKS])
+    return links + link * m if links > 0 else problem.graph.neighbour[link] * m
+
+
+@kernel
+def move_estimates(problem, y, memory, scratch):
+    """Move the estimates over one control period with the outputs held at y (m,).
+
+    By the exact solution, or, where messages are sent once a period and can be lost, by the exact
+    solution of each agent's own row with what it heard last.
+    """
+    if problem.settings[LINKS] > 0.0:
+        _relax(problem, len(y), memory)
+    else:
+        propagate_estimates(problem.data, problem.graph, problem.propagator, y, memory, scratch)
+
+
+@kernel
+def _relax(problem, m, memory):
+    """Each row towards the mean of what its agent heard last; own blocks stay."""
+    at, graph = problem.data.offsets, problem.graph
+    for i in range(len(at) - 1):
+        first, last = graph.pointer[i], graph.pointer[i + 1]
+        if last > first:
+            stays = np.exp(-problem.propagator.numbers[1] * (last - first))
+            for r in range(m):
+                if problem.data.owner[r] != i:
+                    mean = 0.0
+                    for link in range(first, last):
+                        mean += memory[heard_at(problem, m, link) + r]
+                    mean /= last - first
+                    memory[i * m + r] = mean + stays * (memory[i * m + r] - mean)
 
 
 @kernel
@@ -15,6 +58,16 @@ def write_own_actions(data, y, memory):
     m = len(y)
     for r in range(m):
         memory[data.owner[r] * m + r] = y[r]
+
+
+@kernel
+def clear_others(data, i, out):
+    """Zero the entries of out (m,) that belong to other agents in the cost of agent i."""
+    for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+        j = data.cost_index[member]
+        if j != i:
+            for r in range(data.offsets[j], data.offsets[j + 1]):
+                out[r] = 0.0
 
 
 @kernel

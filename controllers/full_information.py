@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
-from gne_mj.native import kernel
+from gne_mj.native import copy, kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +32,36 @@ def action(game, problem, y, weights, memory, work, u):
     at = data.offsets
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
-            gradient = game.cost_gradient(data.parameters, i, a, y)
-            u[a] = -gradient - weighted_gradient(game, data, i, a, y, weights)
+            barrier = weighted_gradient(game, data, i, a, y, weights)
+            u[a] = -pull(game, problem, i, a, y, memory) - barrier
     return -1
+
+
+@kernel
+def prepare(problem, first, last, y, memory):
+    """Nothing to prepare."""
+
+
+@kernel
+def pull(game, problem, i, a, y, memory):
+    """What entry a of agent i's action is driven by besides the barrier, at y (m,)."""
+    return game.cost_gradient(problem.data.parameters, i, a, y)
+
+
+@kernel
+def add_pull_slope(game, problem, i, a, y, memory, out):
+    """Add dpull/dy to out (m,), which is touched for agents in the cost only."""
+    game.add_cost_hessian(problem.data.parameters, i, a, y, 1.0, out)
+
+
+@kernel
+def own_profile(problem, i, y, memory, profile):
+    """Fill profile (m,) with the others' actions as agent i's barrier reads them: measured.
+
+    Returns by how much its own block moves with its own action: fully.
+    """
+    copy(y, profile)
+    return 1.0
 
 
 @kernel

@@ -15,13 +15,18 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.controllers.estimates import barrier_profile, estimate_rates, write_own_actions
+from gne_mj.controllers.estimates import (
+    barrier_profile,
+    clear_others,
+    estimate_rates,
+    move_estimates,
+    write_own_actions,
+)
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
-from gne_mj.controllers.propagation import propagate_estimates
-from gne_mj.controllers.settings import EPSILON, GAIN, RHO
+from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
-from gne_mj.native import kernel
+from gne_mj.native import copy, kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +100,7 @@ def action(game, problem, y, weights, memory, work, u):
     at = data.offsets
     agents = len(at) - 1
     m = at[agents]
-    z = memory[agents * m :]
+    z = memory[agents * m : agents * m + m]
     write_own_actions(data, y, memory)
     for i in range(agents):
         first, last = at[i], at[i + 1]
@@ -111,6 +116,8 @@ def action(game, problem, y, weights, memory, work, u):
 def agent_action(game, data, settings, i, own_filter, own_row, work, u):
     """Action of agent i from what it has: z_i (m_i,) and its row (m,), its own action in place.
 
+    The penalty is that of work.now, which may fall in time.
+
     work.profile is overwritten. Returns -1, or the constraint on or outside whose boundary the
     agent's filtered profile (z_i, **y**^i_-i) lies.
     """
@@ -120,15 +127,56 @@ def agent_action(game, data, settings, i, own_filter, own_row, work, u):
         u[r] = game.cost_gradient(q, i, first + r, own_row)
     for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
         k = data.own_index[entry]
-        value = game.constraint(q, k, profile)
-        if not value < 0.0:
+        room = -game.constraint(q, k, profile) - data.tightening[k]
+        if not room > 0.0:
             return k
-        weight = settings[RHO] / -value
+        weight = work.now[PENALTY] / room
         for r in range(len(u)):
             u[r] += weight * game.constraint_gradient(q, k, first + r, profile)
     for r in range(len(u)):
         u[r] *= -settings[GAIN]
     return -1
+
+
+@kernel
+def prepare(problem, first, last, y, memory):
+    """Put the actions of agents ``first`` to ``last`` - 1 where ``pull`` reads them."""
+    at, m = problem.data.offsets, len(y)
+    for r in range(at[first], at[last]):
+        memory[problem.data.owner[r] * m + r] = y[r]
+
+
+@kernel
+def pull(game, problem, i, a, y, memory):
+    """What drives entry a of agent i's action besides the barrier, its row having y_i."""
+    m = len(y)
+    row = memory[i * m : (i + 1) * m]
+    return problem.settings[GAIN] * game.cost_gradient(problem.data.parameters, i, a, row)
+
+
+@kernel
+def add_pull_slope(game, problem, i, a, y, memory, out):
+    """Add dpull/dy to out (m,): the estimates stay, so that only own actions count."""
+    m = len(y)
+    row = memory[i * m : (i + 1) * m]
+    game.add_cost_hessian(problem.data.parameters, i, a, row, problem.settings[GAIN], out)
+    clear_others(problem.data, i, out)
+
+
+@kernel
+def own_profile(problem, i, y, memory, profile):
+    """Fill profile (m,) with what agent i's barrier reads: its estimates, and where z_i will be.
+
+    Its own block is z_i after a control period with y_i held. Returns by how much that moves with
+    the action it is held at.
+    """
+    at, m = problem.data.offsets, len(y)
+    agents = len(at) - 1
+    stays = problem.propagator.numbers[2]
+    copy(memory[i * m : (i + 1) * m], profile)
+    for r in range(at[i], at[i + 1]):
+        profile[r] = y[r] + stays * (memory[agents * m + r] - y[r])
+    return 1.0 - stays
 
 
 @kernel
@@ -149,7 +197,7 @@ def propagate(problem, y, memory, scratch):
     data = problem.data
     agents = len(data.offsets) - 1
     m = data.offsets[agents]
-    propagate_estimates(data, problem.graph, problem.propagator, y, memory, scratch)
+    move_estimates(problem, y, memory, scratch)
     remaining = problem.propagator.numbers[2]
     for r in range(agents * m, agents * m + m):
         own = y[r - agents * m]

@@ -60,6 +60,7 @@ class Law(ABC):
         numbers = np.ones(settings.COUNT)
         numbers[settings.RHO] = rho
         numbers[settings.RATE] = self.estimate_rate
+        numbers[settings.LINKS] = 0.0
         return numbers
 
     def initial_memory(

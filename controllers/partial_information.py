@@ -19,12 +19,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.barrier import weighted_gradient
-from gne_mj.controllers.estimates import estimate_rates, write_own_actions
+from gne_mj.controllers.estimates import (
+    clear_others,
+    estimate_rates,
+    heard_at,
+    move_estimates,
+    write_own_actions,
+)
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
-from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
 from gne_mj.graph import Graph
-from gne_mj.native import kernel
+from gne_mj.native import copy, kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,25 +82,54 @@ def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) from the true barrier's weights (p,) and each agent's own profile."""
     data = problem.data
     at = data.offsets
-    agents, m = len(at) - 1, len(y)
-    coupling = problem.settings[COUPLING]
     write_own_actions(data, y, memory)
-    for i in range(agents):
-        profile = memory[i * m : (i + 1) * m]
+    for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
-            cost = game.cost_gradient(data.parameters, i, a, profile)
             barrier = weighted_gradient(game, data, i, a, y, weights)
-            u[a] = -cost - barrier - coupling * heard(problem.graph, m, y, memory, i, a)
+            u[a] = -pull(game, problem, i, a, y, memory) - barrier
     return -1
 
 
 @kernel
-def heard(graph, m, y, memory, i, a):
+def prepare(problem, first, last, y, memory):
+    """Put the actions of agents ``first`` to ``last`` - 1 where ``pull`` reads them."""
+    at, m = problem.data.offsets, len(y)
+    for r in range(at[first], at[last]):
+        memory[problem.data.owner[r] * m + r] = y[r]
+
+
+@kernel
+def pull(game, problem, i, a, y, memory):
+    """What drives entry a of agent i's action besides the barrier, its row having y_i (m,)."""
+    m = len(y)
+    row = memory[i * m : (i + 1) * m]
+    cost = game.cost_gradient(problem.data.parameters, i, a, row)
+    return cost + problem.settings[COUPLING] * heard(problem, y, memory, i, a)
+
+
+@kernel
+def heard(problem, y, memory, i, a):
     """R_i sum_j (**y**^i - **y**^j): an own action less what the neighbours take it to be."""
     total = 0.0
-    for entry in range(graph.pointer[i], graph.pointer[i + 1]):
-        total += y[a] - memory[graph.neighbour[entry] * m + a]
+    for link in range(problem.graph.pointer[i], problem.graph.pointer[i + 1]):
+        total += y[a] - memory[heard_at(problem, len(y), link) + a]
     return total
+
+
+@kernel
+def add_pull_slope(game, problem, i, a, y, memory, out):
+    """Add dpull/dy to out (m,): the estimates stay, so that only own actions count."""
+    data, graph, m = problem.data, problem.graph, len(y)
+    game.add_cost_hessian(data.parameters, i, a, memory[i * m : (i + 1) * m], 1.0, out)
+    clear_others(data, i, out)
+    out[a] += problem.settings[COUPLING] * (graph.pointer[i + 1] - graph.pointer[i])
+
+
+@kernel
+def own_profile(problem, i, y, memory, profile):
+    """As under full information: the barrier is measured."""
+    copy(y, profile)
+    return 1.0
 
 
 @kernel
@@ -107,7 +141,7 @@ def rate(problem, y, memory, out):
 @kernel
 def propagate(problem, y, memory, scratch):
     """Move the estimates over one control period with the outputs held at y."""
-    propagate_estimates(problem.data, problem.graph, problem.propagator, y, memory, scratch)
+    move_estimates(problem, y, memory, scratch)
 
 
 @kernel

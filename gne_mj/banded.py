@@ -5,6 +5,8 @@ column c. Rows have 3 b + 1 entries: partial pivoting fills b more diagonals on 
 b = n - 1 it is a dense matrix.
 """
 
+import numpy as np
+
 from gne_mj.native import kernel
 
 
@@ -53,3 +55,40 @@ def solve(band, n, b, pivots, x):
         for c in range(k + 1, min(k + 2 * b, n - 1) + 1):
             value -= band[k, c - k + b] * x[c]
         x[k] = value / band[k, b]
+
+
+@kernel
+def factorise_definite(band, n, b):
+    """LU factors in place without pivoting; False if a pivot is not positive.
+
+    For matrices whose symmetric part is positive definite, as those of strongly monotone
+    equations: all leading minors are positive, so none is needed. Rows have 2 b + 1 entries;
+    diagonals are left as their reciprocals.
+    """
+    for k in range(n):
+        if not 0.0 < band[k, b] < np.inf:
+            return False
+        inverse = 1.0 / band[k, b]
+        band[k, b] = inverse
+        for r in range(k + 1, min(k + b, n - 1) + 1):
+            factor = band[r, k - r + b] * inverse
+            band[r, k - r + b] = factor
+            if factor != 0.0:
+                for c in range(1, min(b, n - 1 - k) + 1):
+                    band[r, k + c - r + b] -= factor * band[k, c + b]
+    return True
+
+
+@kernel
+def solve_definite(band, n, b, x):
+    """Replace the right-hand side in x by the solution; band from ``factorise_definite``."""
+    for r in range(1, n):
+        value = x[r]
+        for k in range(max(0, r - b), r):
+            value -= band[r, k - r + b] * x[k]
+        x[r] = value
+    for r in range(n - 1, -1, -1):
+        value = x[r]
+        for c in range(r + 1, min(r + b, n - 1) + 1):
+            value -= band[r, c - r + b] * x[c]
+        x[r] = value * band[r, b]

@@ -2,10 +2,12 @@
 
 Its gradient is sum_l w_l dg_l/dy with the weights w_l = rho / (-g_l(y)), which at the penalised
 equilibrium are the multipliers. Outside the interior phi is infinite and has no gradient: the
-kernels report that and never clip a constraint's value.
+kernels report that and never clip a constraint's value. A game that is tightened by t >= 0 has a
+barrier of g + t < 0 in place of g < 0. The penalty may fall in time (:class:`Schedule`).
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +15,56 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
+
+# Entries of a schedule's numbers, and its kinds
+KIND, START, FLOOR, FALL = range(4)
+CONSTANT, EXPONENTIAL, RECIPROCAL, HALVING = range(4)
+SCHEDULES = {"exponential": EXPONENTIAL, "reciprocal": RECIPROCAL, "halving": HALVING}
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How the penalty falls from its value at the start to a floor, with time constant T.
+
+    Args:
+        kind: "exponential", rho(t) = start exp(-t/T); "reciprocal", start / (1 + t/T); "halving",
+            start / 2^k from k T to (k + 1) T. Never below the floor.
+        start: rho(0), positive.
+        floor: positive, at most ``start``.
+        time_constant: T in s, positive.
+    """
+
+    kind: Literal["exponential", "reciprocal", "halving"]
+    start: float
+    floor: float
+    time_constant: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in SCHEDULES:
+            raise InvalidInput("barrier.schedule", self.kind, f"choose from {list(SCHEDULES)}")
+        for key in ("floor", "time_constant"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value > 0):
+                raise InvalidInput(f"barrier.{key}", value, "it must be positive and finite")
+        if self.floor > self.start:
+            raise InvalidInput(
+                "barrier.floor", self.floor, f"it must not exceed rho(0), {self.start:g}"
+            )
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """For native code: [KIND, START, FLOOR, FALL]."""
+        return np.array([SCHEDULES[self.kind], self.start, self.floor, 1.0 / self.time_constant])
+
+    def at(self, time: ArrayLike) -> NDArray[np.float64]:
+        """rho at times in s, of any shape."""
+        numbers = self.numbers
+        return np.vectorize(lambda t: rho_at(numbers, t), otypes=[np.float64])(time)
+
+
+def constant(rho: float) -> NDArray[np.float64]:
+    """The numbers of a penalty that does not change."""
+    return np.array([CONSTANT, rho, rho, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +90,7 @@ class LogBarrier:
 
     def value(self, y: ArrayLike) -> float:
         """phi(y), infinite on and outside the boundary."""
-        g = self.game.constraints(y)
+        g = self.game.constraints(y) + self.game.margins
         if not np.all(g < 0):
             return np.inf
         return float(-self.rho * np.sum(np.log(-g)))
@@ -49,9 +101,10 @@ class LogBarrier:
         Raises:
             ValueError: y is not strictly inside.
         """
-        g = self.game.constraints(y)
+        g = self.game.constraints(y) + self.game.margins
         if not np.all(g < 0):
-            worst, value = self.game.tightest(y)
+            worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
+            value = float(g[worst])
             raise ValueError(
                 f"the barrier has no gradient at a profile with"
                 f" {self.game.constraint_names[worst]} at g = {value:.6g}"
@@ -71,17 +124,35 @@ class LogBarrier:
 
 
 @kernel
-def evaluate_constraints(game, data, rho, y, g, weights):
-    """Fill g with g(y) and weights with rho / (-g); return -1, or the first g_l not negative.
+def rho_at(schedule, time):
+    """The penalty at a time in s, from a schedule's numbers."""
+    kind, start = schedule[KIND], schedule[START]
+    if kind == CONSTANT:
+        return start
+    elapsed = time * schedule[FALL]
+    if kind == EXPONENTIAL:
+        value = start * np.exp(-elapsed)
+    elif kind == RECIPROCAL:
+        value = start / (1.0 + elapsed)
+    else:
+        value = start * 2.0 ** -np.floor(elapsed)
+    return max(value, schedule[FLOOR])
 
-    A value that is not a number counts as not negative.
+
+@kernel
+def evaluate_constraints(game, data, rho, y, g, weights):
+    """Fill g with g(y) and weights with rho / (-g - t); return -1, or the first g + t >= 0.
+
+    A value that is not a number counts as not negative. Where a constraint is not tightened
+    (t = 0) that is g itself.
     """
     outside = -1
     for k in range(len(g)):
         value = game.constraint(data.parameters, k, y)
+        room = -value - data.tightening[k]
         g[k] = value
-        weights[k] = rho / -value
-        if not value < 0.0 and outside < 0:
+        weights[k] = rho / room
+        if not room > 0.0 and outside < 0:
             outside = k
     return outside
 

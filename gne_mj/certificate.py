@@ -35,6 +35,10 @@ class Certificate:
             rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long as no input limit is
             met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
+        exit: where the run left, the law and the input that led there; None if it did not.
+        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, how far
+            outputs were from their prediction at control instants, periods in which dy+/du was not
+            positive; None in other modes.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
     """
 
@@ -47,6 +51,8 @@ class Certificate:
     settling_time: float | None
     lyapunov: dict[str, Any]
     actuators: dict[str, Any]
+    exit: dict[str, Any] | None
+    implicit: dict[str, Any] | None
     steps: int
     end_time: float
     wall_time: float
@@ -104,6 +110,8 @@ def certify_run(
         settling_time=_settling_time(time, distance),
         lyapunov=_lyapunov(system, monitor),
         actuators=_actuators(system, monitor),
+        exit=_exit_report(system, monitor),
+        implicit=_implicit(system, monitor),
         steps=int(monitor[watch.STEPS]),
         end_time=float(time[-1]),
         wall_time=wall_time,
@@ -148,18 +156,72 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     if code == watch.DIVERGED:
         return "diverged", f"an output or input is no longer a usable number ({value:g}) {at}"
     constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
+    if monitor[watch.EXIT_BETWEEN] > 0:
+        at += ", between two control instants"
     if code == watch.LEFT_SET:
         return (
             "left_feasible_set",
             f"constraint '{constraint}' was violated {at}: g = {value:.6g}, not negative",
         )
     agent = int(monitor[watch.EXIT_AGENT]) + 1
+    if agent == 0:
+        tightened = np.any(game.margins)
+        return (
+            "estimate_left_feasible_set",
+            f"the measured profile violated constraint '{constraint}'"
+            f"{', tightened,' if tightened else ''} {at}: g{' + t' if tightened else ''} ="
+            f" {value:.6g}, not negative, so the law has no action there",
+        )
     return (
         "estimate_left_feasible_set",
         f"agent {agent}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g}, not"
         " negative, so its law has no action there (a smaller epsilon or gain keeps estimates"
         " closer to the actions)",
     )
+
+
+def _exit_report(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+    """What led to an exit: the last input that was held, and under which law."""
+    if monitor[watch.EXIT] == watch.INSIDE:
+        return None
+    m, p = system.game.actions, system.game.constraints_count
+    at = int(watch.inputs_at(p)) + 5 * m
+    constraint = int(monitor[watch.EXIT_CONSTRAINT])
+    known = monitor[watch.EXIT] != watch.DIVERGED
+    agent = int(monitor[watch.EXIT_AGENT]) + 1
+    return {
+        "time": float(monitor[watch.EXIT_TIME]),
+        "stage": int(monitor[watch.EXIT_STAGE]) + 1,
+        "at_control_instant": not monitor[watch.EXIT_BETWEEN] > 0,
+        "constraint": system.game.constraint_names[constraint] if known else None,
+        "value": float(monitor[watch.EXIT_VALUE]),
+        "estimates_of_agent": agent or None,
+        "information": system.law.information,
+        "mode": system.mode,
+        "last_input": monitor[at : at + m].tolist(),
+    }
+
+
+def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+    if system.mode != "implicit":
+        return None
+    solutions = int(monitor[watch.SOLUTIONS])
+
+    def when(entry: int, time: int) -> float | None:
+        return float(monitor[time]) if monitor[entry] > 0 else None
+
+    return {
+        "decentralised": system.decentralised,
+        "solutions": solutions,
+        "mean_newton_steps": float(monitor[watch.SOLVER_STEPS]) / max(solutions, 1),
+        "most_newton_steps": int(monitor[watch.MOST_STEPS]),
+        "not_accurate": int(monitor[watch.UNSOLVED]),
+        "first_not_accurate": when(watch.UNSOLVED, watch.UNSOLVED_TIME),
+        "largest_prediction_error": float(monitor[watch.PREDICTION]),
+        "largest_prediction_error_time": when(watch.PREDICTION, watch.PREDICTION_TIME),
+        "periods_not_monotone": int(monitor[watch.NOT_MONOTONE]),
+        "first_not_monotone": when(watch.NOT_MONOTONE, watch.NOT_MONOTONE_TIME),
+    }
 
 
 def _worst(
@@ -218,7 +280,8 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        variational = variational_equilibrium(system.game, penalised)
+        game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
+        variational = variational_equilibrium(game, penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:

@@ -56,6 +56,21 @@ def certify(
             "--search-epsilon", help="Find by trial runs the largest epsilon that stays inside."
         ),
     ] = False,
+    period: Annotated[
+        bool,
+        typer.Option(
+            "--search-period",
+            help="Mode implicit: find by trial runs the longest period that stays inside between"
+            " the control instants too.",
+        ),
+    ] = False,
+    push: Annotated[
+        bool,
+        typer.Option(
+            "--search-push",
+            help="Mode implicit: find by trial runs the smallest push that leaves the set.",
+        ),
+    ] = False,
 ) -> None:
     """Tell what the theory guarantees for a scenario's systems, and what it does not."""
     from dataclasses import asdict, replace
@@ -63,7 +78,7 @@ def certify(
     from gne_mj.errors import InvalidInput
     from gne_mj.scenario import load_scenario
     from gne_mj.theory import certify as examine
-    from gne_mj.theory import search_epsilon, words
+    from gne_mj.theory import search_epsilon, search_period, search_push, words
 
     loaded = load_scenario(scenario, _settings(set_))
     clock = loaded.clock()
@@ -78,6 +93,18 @@ def certify(
                 found = asdict(search_epsilon(system, clock, tell))
             epsilon = {**(reports[system.name].epsilon or {}), "search": found}
             reports[system.name] = replace(reports[system.name], epsilon=epsilon)
+    for option, wanted, key, hunt in (
+        ("--search-period", period, "period_search", search_period),
+        ("--search-push", push, "push_search", search_push),
+    ):
+        searched = [s for s in systems if wanted and reports[s.name].held is not None]
+        if wanted and not searched:
+            raise InvalidInput(option, scenario, "no system is in mode 'implicit'")
+        for system in searched:
+            with _working(as_json, f"searching for {system.name}") as tell:
+                found = asdict(hunt(system, clock, tell))
+            held = {**(reports[system.name].held or {}), key: found}
+            reports[system.name] = replace(reports[system.name], held=held)
     if as_json:
         print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
     else:
@@ -217,7 +244,7 @@ def passivity(
     reports = {}
     for name in loaded.systems if system is None else (system,):
         with _working(as_json, _PREPARING):
-            built = loaded.systems[name].build(name, loaded.simulation.integrator)
+            built = loaded.systems[name].build(name, loaded.simulation)
             reports[name] = examine(
                 plants_of(built.agents, built.engine, built.integrator),
                 loaded.simulation.timestep,

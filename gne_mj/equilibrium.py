@@ -145,13 +145,13 @@ class Solver:
         self._kernels, self._native = game.kernels, method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
-        position, self._half_band = _order(game)
+        position, self._half_band = order(game)
         agents, constraints = np.arange(game.agents), np.arange(p)
         agents.flags.writeable = constraints.flags.writeable = False
         self._everyone = Free(agents, constraints, position)
         self._nobody = Free(agents, constraints, np.full(m, -1))
         self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
-        entries = int(np.sum(np.diff(game.data.offsets)[game.data.member_index]))
+        entries = len(game.actions_in_constraints[1])
         self._work = Work(
             trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
             g=np.zeros(p),
@@ -243,6 +243,7 @@ class Solver:
         if ended == method.OUTSIDE:
             q, count = self._data.parameters, len(self._point.slack)
             g = np.array([self._kernels.constraint(q, k, y) for k in range(count)])
+            g += self._data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(
                 self._name, "start", self._constraint_names[worst], float(g[worst])
@@ -256,7 +257,7 @@ class Solver:
         raise SolverError(reason, error, iterations)
 
 
-def _order(game: Game) -> tuple[NDArray[np.int64], int]:
+def order(game: Game) -> tuple[NDArray[np.int64], int]:
     """Each action's row in Newton's matrix and the matrix's half bandwidth, kept small.
 
     Two agents are coupled if one is in the other's cost or both are in one constraint.
@@ -265,10 +266,10 @@ def _order(game: Game) -> tuple[NDArray[np.int64], int]:
     costs = _incidence(data.cost_pointer, data.cost_index, n)
     members = _incidence(data.member_pointer, data.member_index, n)
     coupled = csr_array(costs + costs.T + members.T @ members)
-    order = reverse_cuthill_mckee(coupled, symmetric_mode=True)
+    sequence = reverse_cuthill_mckee(coupled, symmetric_mode=True)
     sizes = np.diff(data.offsets)
     first = np.empty(n, dtype=np.int64)  # row of each agent's first action
-    first[order] = np.cumsum(sizes[order]) - sizes[order]
+    first[sequence] = np.cumsum(sizes[sequence]) - sizes[sequence]
     position = first[game.agent_of_action] + np.arange(game.actions)
     position -= data.offsets[game.agent_of_action]
     row, column = coupled.nonzero()

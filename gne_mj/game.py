@@ -18,11 +18,12 @@ agent, a and b entries of a profile (a belonging to agent i) and l a constraint,
 :class:`Game` joins such a module with its parameters and with who appears where.
 """
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +52,7 @@ class GameData(NamedTuple):
     member_index: np.ndarray
     own_pointer: np.ndarray  # agent i -> the constraints that contain y_i
     own_index: np.ndarray
+    tightening: np.ndarray  # (p,) t >= 0: the barrier guards g + t < 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,8 @@ class Game:
         agent_name: what an agent is, e.g. "robot".
         axes: names of the entries of an agent's action; "1", "2", ... if left out.
         quantities: what follows from the actions and is recorded and drawn beside them.
+        tightening: t >= 0, shape (p,), by which the barrier keeps farther away, in the
+            constraints' own units: it guards g + t < 0. None for 0.
 
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
@@ -103,6 +107,7 @@ class Game:
     agent_name: str = "agent"
     axes: tuple[str, ...] = ()
     quantities: tuple[Quantity, ...] = ()
+    tightening: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         self._check()
@@ -141,6 +146,23 @@ class Game:
         if not all(len(members) for members in self.in_constraint):
             raise InvalidInput("game.in_constraint", [], "every constraint contains an agent")
 
+    def tightened(self, tightening: ArrayLike) -> Self:
+        """The same game with a barrier of g + t < 0; t >= 0, one number or (p,)."""
+        margin = np.broadcast_to(tightening, (self.constraints_count,)).astype(np.float64)
+        if not np.all(np.isfinite(margin)) or np.any(margin < 0):
+            raise InvalidInput("tightening", tightening, "it must be finite and not negative")
+        game = copy.copy(self)  # not `replace`, which would take plain functions for kernels
+        game.__dict__.pop("data", None)  # holds the old one
+        object.__setattr__(game, "tightening", margin)
+        return game
+
+    @property
+    def margins(self) -> NDArray[np.float64]:
+        """t, shape (p,), zero where nothing is tightened."""
+        if self.tightening is None:
+            return np.zeros(self.constraints_count)
+        return self.tightening
+
     @property
     def agents(self) -> int:
         """N."""
@@ -171,10 +193,19 @@ class Game:
             *_compress(ordered),
             *_compress(self.in_constraint),
             *_compress(own),
+            self.margins.copy(),
         )
         for array in arrays:
             array.flags.writeable = False
         return GameData(*arrays)
+
+    @cached_property
+    def actions_in_constraints(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which entries of dg/dy can differ from zero, in compressed rows: (p + 1,) and actions."""
+        at = self.data.offsets
+        rows = [[a for i in agents for a in range(at[i], at[i + 1])]
+                for agents in self.in_constraint]  # fmt: skip
+        return _compress(rows)
 
     @cached_property
     def own_constraints(self) -> NDArray[np.int64]:

@@ -109,7 +109,8 @@ def find_entries(data, free, work):
 def inside(game, data, free, y, work):
     """Fill g; False if y is not strictly inside."""
     for k in range(len(free.constraints)):
-        work.g[k] = game.constraint(data.parameters, free.constraints[k], y)
+        l = free.constraints[k]
+        work.g[k] = game.constraint(data.parameters, l, y) + data.tightening[l]
         if not work.g[k] < 0.0:
             return False
     return True

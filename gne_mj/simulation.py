@@ -5,7 +5,7 @@ import threading
 import time as real_time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,14 +192,14 @@ class _Run:
         if self._times and len(self._times[-1]) and self._times[-1][-1] >= self.loop.time:
             self._times[-1] = self._times[-1][:-1]
             last = self._samples[-1]
-            self._samples[-1] = Samples(last.state[:-1], last.input[:-1], last.memory[:-1])
+            self._samples[-1] = Samples(*(getattr(last, each.name)[:-1] for each in fields(last)))
 
     def recorded(self) -> tuple[NDArray[np.float64], Samples]:
-        return np.concatenate(self._times), Samples(
-            state=np.concatenate([part.state for part in self._samples]),
-            input=np.concatenate([part.input for part in self._samples]),
-            memory=np.concatenate([part.memory for part in self._samples]),
+        parts = (
+            np.concatenate([getattr(part, each.name) for part in self._samples])
+            for each in fields(Samples)
         )
+        return np.concatenate(self._times), Samples(*parts)
 
 
 @contextmanager

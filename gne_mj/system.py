@@ -2,21 +2,37 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.barrier import LogBarrier
+from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import Law, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.equilibrium import Equilibrium, penalised_equilibrium
-from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.equilibrium import Equilibrium, order, penalised_equilibrium
+from gne_mj.controllers.settings import LINKS
+from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
+from gne_mj.faults import (
+    Bias,
+    Fault,
+    Noise,
+    SensorDelay,
+    for_native,
+    links_memory,
+    message_delay,
+    sensor_delay,
+    strikes_messages,
+)
 from gne_mj.game import Game
+from gne_mj.loops import explicit, faultless, joint, local
+from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
-from gne_mj.loops.feedback import Problem
+from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
 from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.loops.ode import Clock as LoopClock
+from gne_mj.margins import Disturbance, influence
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -39,7 +55,7 @@ class Clock:
     Args:
         duration: how long to run.
         timestep: integration step.
-        control_period: how long an input is held in mode sampled; a multiple of the step.
+        control_period: how long an input is held in the held modes; a multiple of the step.
         sample_period: between recorded samples; a multiple of the step.
     """
 
@@ -76,14 +92,20 @@ class System:
         game: the game.
         agents: one channel for each action of the game.
         law: the feedback law.
-        rho: the barrier's penalty parameter.
+        rho: the barrier's penalty parameter; with a schedule the value that it falls to.
         state: (m, states) of the agents' channels at the start; the outputs strictly inside.
         memory: of the law at the start; if left out, estimates and z equal y(0). Under the fully
             distributed law all profiles at which agents evaluate the barrier must be inside.
-        mode: "continuous" or "sampled".
+        mode: "continuous", "sampled" or "implicit".
         engine: "ode", or "mujoco" for flexible robots.
         integrator: "rk4" or "euler"; for engine "ode" and the fully distributed law in mode
             continuous also "rosenbrock", which is adaptive and does not mind a small epsilon.
+        schedule: how the penalty falls to rho in time; None if it does not change.
+        decentralised: mode implicit: each agent finds its input alone and keeps to its share of
+            what is left of every bound (:mod:`gne_mj.loops.local`).
+        faults: what goes wrong (:mod:`gne_mj.faults`).
+        seed: of what is random in the faults.
+        disturbance: what the game's tightening is meant to cover; None if nothing is declared.
 
     Raises:
         InvalidInput: parts that do not fit together.
@@ -100,6 +122,11 @@ class System:
     engine: str = "ode"
     integrator: str = "rk4"
     memory: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    schedule: Schedule | None = None
+    decentralised: bool = False
+    faults: tuple[Fault, ...] = ()
+    seed: int = 0
+    disturbance: Disturbance | None = None
     barrier: LogBarrier = field(init=False)
 
     def __post_init__(self) -> None:
@@ -123,11 +150,18 @@ class System:
                 self.law.graph.agents,
                 f"the game has {self.game.agents} agents",
             )
-        if self.mode == "sampled" and not self.law.propagates:
+        if self.mode != "continuous" and not self.law.propagates:
             raise InvalidInput(
                 f"systems.{self.name}.controller.mode",
                 self.mode,
                 "a plain law with a memory runs in mode 'continuous'",
+            )
+        if self.mode == "implicit" and not hasattr(self.law.kernels, "add_pull_slope"):
+            raise InvalidInput(
+                f"systems.{self.name}.controller.mode",
+                self.mode,
+                "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
+                " with; use mode 'sampled'",
             )
         if not np.all(np.isfinite(self.state)):
             raise InvalidInput(
@@ -136,15 +170,7 @@ class System:
         for quantity in self.game.quantities:  # wrong shapes are better found before a run
             quantity.at(self.start[None], self.game.entries(quantity))
             quantity.bounds(self.game.entries(quantity))
-        worst, value = self.game.tightest(self.start)
-        if not value < 0.0:
-            names = self.game.constraint_names
-            raise InfeasibleStart(
-                f"systems.{self.name}.initial.action",
-                f"initial {self.game.action_name} {np.round(self.start[:6], 4).tolist()}",
-                names[worst],
-                value,
-            )
+        self._check_start()
         expected = self.law.initial_memory(self.start)
         if not len(self.memory):
             object.__setattr__(self, "memory", expected)
@@ -156,6 +182,46 @@ class System:
             )
         self._check_memory()
         self._check_engine()
+        self._check_faults()
+
+    def _check_faults(self) -> None:
+        key = f"systems.{self.name}.faults"
+        if self.faults and self.integrator == "rosenbrock":
+            raise InvalidInput(key, "given", "integrator 'rosenbrock' knows none; use 'rk4'")
+        held = strikes_messages(self.faults) or sensor_delay(self.faults) > 0
+        if held and self.mode == "continuous":
+            raise InvalidInput(
+                key,
+                "messages or late sensors",
+                "they go by control periods: use mode 'sampled' or 'implicit'",
+            )
+        if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
+            for fault in self.faults:
+                if isinstance(fault, Noise | Bias | SensorDelay):
+                    raise InvalidInput(
+                        key,
+                        type(fault).__name__.lower(),
+                        "mode 'implicit' predicts MJCF robots from their whole true state, which"
+                        " such sensors would not tell; use mode 'sampled'",
+                    )
+        try:
+            for_native(self.faults, self.game, self.law.graph, self.seed)
+        except InvalidInput as error:
+            raise InvalidInput(
+                f"systems.{self.name}.{error.key}", error.value, error.expected
+            ) from None
+
+    def _check_start(self) -> None:
+        key = f"systems.{self.name}.initial.action"
+        what = f"initial {self.game.action_name} {np.round(self.start[:6], 4).tolist()}"
+        worst, value = self.game.tightest(self.start)
+        if not value < 0.0:
+            raise InfeasibleStart(key, what, self.game.constraint_names[worst], value)
+        tight = self.game.constraints(self.start) + self.game.margins
+        worst = int(np.argmax(tight))
+        if not tight[worst] < 0.0:
+            name = f"{self.game.constraint_names[worst]}, tightened by {self.game.margins[worst]:g},"
+            raise InfeasibleStart(key, what, name, float(tight[worst]))
 
     def _check_memory(self) -> None:
         if not np.all(np.isfinite(self.memory)):
@@ -164,7 +230,7 @@ class System:
             )
         data = self.game.data
         profiles = self.law.barrier_profiles(self.game.agent_of_action, self.memory)
-        for i, g in enumerate(self.game.constraints(profiles)):
+        for i, g in enumerate(self.game.constraints(profiles) + self.game.margins):
             own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
             outside = own[~(g[own] < 0.0)]
             if len(outside):
@@ -177,6 +243,12 @@ class System:
 
     def _check_engine(self) -> None:
         key = f"systems.{self.name}.plant"
+        if self.schedule is not None and self.integrator == "rosenbrock":
+            raise InvalidInput(
+                f"{key}.integrator",
+                self.integrator,
+                "it is for a penalty that does not change in time; use 'rk4'",
+            )
         own_model = isinstance(self.agents, MjcfRobots)
         if self.engine == "mujoco" and not own_model and self.agents.kind is not flexible_robot:
             raise InvalidInput(
@@ -202,7 +274,8 @@ class System:
             raise InvalidInput(
                 f"{key}.integrator",
                 self.integrator,
-                "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4'",
+                "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4' or"
+                " 'euler'",
             )
 
     def largest_step(self) -> float:
@@ -239,6 +312,45 @@ class System:
                 f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
             )
 
+    def _check_slopes(self, clock: Clock) -> None:
+        """Refuse periods over which dy+/du is not positive, where that is known exactly."""
+        if self.mode != "implicit" or isinstance(self.agents, MjcfRobots):
+            return
+        steps = clock.steps(clock.control_period)
+        effect = influence(self.agents, clock.timestep, self.integrator, steps)
+        worst = int(np.argmin(effect.least_slope))
+        if effect.exact and not effect.least_slope[worst] > 0:
+            agent = int(self.game.agent_of_action[worst]) + 1
+            raise InvalidInput(
+                "simulation.control_period",
+                clock.control_period,
+                f"over it the output of agent {agent} of '{self.name}' does not rise with its input"
+                f" (dy+/du = {effect.least_slope[worst]:.4g}), which mode 'implicit' needs; make it"
+                " shorter",
+            )
+
+    @property
+    def acting(self) -> ModuleType:
+        """The module that finds the law's input."""
+        if self.mode != "implicit":
+            return explicit
+        # Agents that know others by estimates only cannot but act by themselves.
+        return local if self.decentralised or self.law.information == "distributed" else joint
+
+    @cached_property
+    def rows(self) -> Order:
+        """Rows of the matrices of mode implicit; one agent's at a time if agents act alone."""
+        if self.acting is explicit:
+            return NO_ORDER
+        if self.acting is local:
+            position, half_band = np.arange(self.game.actions), max(self.game.sizes) - 1
+        else:
+            position, half_band = order(self.game)
+        band = np.array([half_band, int(self.decentralised)])
+        start, column = self.game.actions_in_constraints
+        within = np.repeat(np.arange(self.game.constraints_count), np.diff(start))
+        return Order(position, band, start, column, within)
+
     @property
     def start(self) -> NDArray[np.float64]:
         """y(0), shape (m,)."""
@@ -246,21 +358,37 @@ class System:
 
     @cached_property
     def equilibrium(self) -> Equilibrium:
-        """The penalised equilibrium, from y(0)."""
-        return penalised_equilibrium(self.game, self.rho, self.start)
+        """The penalised equilibrium, from y(0); where that is too near a bound, from the middle."""
+        try:
+            return penalised_equilibrium(self.game, self.rho, self.start)
+        except SolverError:
+            if self.game.box is None:
+                raise
+            middle = 0.5 * (self.game.box[0] + self.game.box[1])
+            if not np.all(self.game.constraints(middle) + self.game.margins < 0):
+                raise
+            return penalised_equilibrium(self.game, self.rho, middle)
 
-    def closed_loop(self, clock: Clock) -> ClosedLoop:
+    def closed_loop(self, clock: Clock, plant: "MujocoPlant | None" = None) -> ClosedLoop:
         """The native loop, at its start.
 
+        Args:
+            clock: how to step.
+            plant: engine "mujoco": a fleet of the same robots with the same room, such as an
+                earlier loop's, to use once more in place of a new one. Its step becomes the
+                clock's.
+
         Raises:
-            InvalidInput: a step that the estimates' dynamics do not allow.
+            InvalidInput: a step that the estimates' dynamics do not allow, or a control period
+                over which an agent's output does not rise with its input, mode implicit.
         """
-        loop = self._closed_loop(clock)
+        loop = self._closed_loop(clock, plant)
         loop.keeps = self
         return loop
 
-    def _closed_loop(self, clock: Clock) -> ClosedLoop:
+    def _closed_loop(self, clock: Clock, plant: "MujocoPlant | None") -> ClosedLoop:
         self._check_step(clock)
+        self._check_slopes(clock)
         rest = self.agents.equilibrium(self.equilibrium.action)
         problem = Problem(
             data=self.game.data,
@@ -269,21 +397,47 @@ class System:
             limit=self.agents.input_limit,
             equilibrium=self.equilibrium.action,
             propagator=(
-                self.law.propagator(clock.control_period)
-                if self.mode == "sampled"
-                else no_propagator()
+                no_propagator()
+                if self.mode == "continuous"
+                else self.law.propagator(clock.control_period)
             ),
+            schedule=np.zeros(4) if self.schedule is None else self.schedule.numbers,
+            order=self.rows,
+            faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
-        laws, game = self.law.kernels, self.game.kernels
+        laws, game, m = self.law.kernels, self.game.kernels, self.game.actions
         period, mode = clock.steps(clock.control_period), MODES[self.mode]
+        acting, faults, memory = self.acting, faultless, self.memory
+        if self.faults:
+            faults = native_faults
+        if strikes_messages(self.faults):
+            assert self.law.graph is not None
+            problem.settings[LINKS] = len(memory)
+            heard = links_memory(self.law.graph, m, memory, message_delay(self.faults))
+            memory = np.concatenate([memory, heard])
+        late = sensor_delay(self.faults)
+        sizes = Sizes(
+            history=(late + 1) * m * (self.agents.states + 1) if late else 0,
+            solver=acting.solver_length(
+                m, self.game.constraints_count,
+                len(self.game.actions_in_constraints[1]), self.agents.states,
+                int(self.rows.band[0]),
+            ),
+        )  # fmt: skip
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop, room
 
-            plant = self._mujoco_plant(
-                clock.timestep, *room(self.game, self.agents, len(self.memory), mode)
+            if plant is None:
+                needed = room(self.game, self.agents, len(memory), mode, sizes)
+                fleet = self._mujoco_plant(clock.timestep, *needed)
+            else:
+                fleet = plant
+                plant.model.opt.timestep = plant.timestep = clock.timestep
+                plant.reset(self.state)
+            return MujocoLoop(
+                fleet, laws, game, problem, rest, mode, period, memory, acting, faults, sizes
             )
-            return MujocoLoop(plant, laws, game, problem, rest, mode, period, self.memory)
         channels = Channels(self.agents.parameters, rest)
         kind = self.agents.kind
         if self.integrator == "rosenbrock" and self.law.graph is not None:
@@ -294,7 +448,10 @@ class System:
                 self.state, self.memory,
             )  # fmt: skip
         loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
-        return OdeLoop(kind, laws, game, problem, channels, loop_clock, self.state, self.memory)
+        return OdeLoop(
+            kind, laws, game, problem, channels, loop_clock, self.state, memory, acting, faults,
+            sizes,
+        )  # fmt: skip
 
     def _mujoco_plant(
         self, timestep: float, userdata: int, memory: int

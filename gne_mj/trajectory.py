@@ -196,12 +196,35 @@ def _dataset(
             estimates,
             {**unit, "long_name": "what each agent takes the actions to be"},
         )
-        if samples.memory.shape[1] > game.agents * m:
+        if system.law.information == "distributed":
             variables["filtered_action"] = (
                 ("time", axis),
-                samples.memory[:, game.agents * m :],
+                samples.memory[:, game.agents * m : (game.agents + 1) * m],
                 {**unit, "long_name": "z"},
             )
+    if samples.seen.shape[1]:
+        variables["measurement"] = (
+            ("time", axis),
+            samples.seen,
+            {**unit, "long_name": "outputs as the law read them for the input of that time"},
+        )
+        variables["acting_input"] = (
+            ("time", axis),
+            samples.acts,
+            {**variables["input"][2], "long_name": "input with pushes, as it moved the plant"},
+        )
+    if system.schedule is not None:
+        variables["penalty"] = (
+            ("time",),
+            system.schedule.at(time),
+            {"long_name": "penalty rho", "units": ""},
+        )
+    if np.any(game.margins):
+        variables["tightening"] = (
+            ("constraint",),
+            game.margins,
+            {"long_name": "t: the barrier guards g + t < 0"},
+        )
     numbers = np.arange(1, game.agents + 1)
     coordinates: dict[str, Any] = {
         "time": ("time", time, {"units": "s"}),
@@ -222,6 +245,7 @@ def _dataset(
             "quantities": json.dumps([quantity.name for quantity in game.quantities]),
             "information": system.law.information,
             "mode": system.mode,
+            "decentralised": int(system.decentralised),
             "engine": system.engine,
             "integrator": system.integrator,
             "rho": system.rho,

@@ -15,7 +15,7 @@ from scipy.optimize import minimize, minimize_scalar
 import reference
 from gne_mj import banded
 from gne_mj.equilibrium import (
-    _order,
+    order,
     _solver,
     best_response,
     measured_epsilon,
@@ -281,7 +281,7 @@ def test_unknowns_are_ordered_for_a_narrow_band():
         in_constraint=[list(pair) for pair in following.items()],
         constraint_names=tuple(f"{pair}" for pair in following.items()),
     )  # fmt: skip
-    position, half_band = _order(game)
+    position, half_band = order(game)
     assert sorted(position) == list(range(100))
     assert np.array_equal(position[1::2], position[::2] + 1)
     assert half_band == 3

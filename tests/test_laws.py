@@ -28,6 +28,7 @@ from gne_mj.controllers.propagation import no_propagator
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.controllers.settings import PENALTY
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
 from gne_mj.loops.ode import CONTINUOUS, Clock, OdeLoop
@@ -237,7 +238,9 @@ def ask(game, law, y, weights, memory):
     action, rate = native(law.kernels, game.kernels)
     u, rates = np.full(len(y), np.nan), np.full(len(memory), np.nan)
     problem = problem_of(game, law)
-    code = action(problem, y, weights, memory, work(len(y), len(weights), game.agents), u)
+    scratch = work(len(y), len(weights), game.agents)
+    scratch.now[PENALTY] = RHO
+    code = action(problem, y, weights, memory, scratch, u)
     rate(problem, y, memory, rates)
     return code, u, rates
 

@@ -28,7 +28,7 @@ from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.ode import SAMPLED, Clock, OdeLoop
+from gne_mj.loops.ode import HELD, Clock, OdeLoop
 from gne_mj.plants.ode import RK4, Channels
 from gne_mj.system import System
 
@@ -126,7 +126,7 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
         law.propagator(period),
     )
     channels = Channels(np.zeros((10, 0)), np.zeros((10, 1)))
-    loop_clock = Clock(period / substeps, substeps, SAMPLED, RK4)
+    loop_clock = Clock(period / substeps, substeps, HELD, RK4)
     agents = integrators(10)
     loop = OdeLoop(
         agents.kind, law.kernels, game.kernels, problem, channels, loop_clock, y[:, None], memory

@@ -15,11 +15,16 @@ class Samples:
         state: (samples, m, states) of the agents' channels.
         input: (samples, m) delivered inputs.
         memory: (samples, k) the law's memory (k = 0 for a static law).
+        seen: (samples, m) outputs as the law read them for that input; (samples, 0) in a run
+            without faults.
+        acts: (samples, m) inputs with pushes, which moved the plant; likewise.
     """
 
     state: NDArray[np.float64]
     input: NDArray[np.float64]
     memory: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    acts: NDArray[np.float64]
 
 
 class ClosedLoop(ABC):

@@ -26,7 +26,18 @@ SATURATED = 13  # 1 once an input was limited
 SATURATED_TIME = 14  # when that was first
 SATURATED_ACTION = 15
 SATURATED_DEMAND = 16
-HEADER = 17
+EXIT_BETWEEN = 17  # 1: the exit was not at a control instant
+# Mode implicit
+SOLUTIONS = 18  # inputs that were solved for
+SOLVER_STEPS = 19  # of Newton's method, in all
+MOST_STEPS = 20  # for one input
+UNSOLVED = 21  # solutions that are not accurate (though inside)
+UNSOLVED_TIME = 22  # when that was first
+PREDICTION = 23  # greatest |y - predicted y| at a control instant
+PREDICTION_TIME = 24
+NOT_MONOTONE = 25  # periods with dy+/du not positive in some channel
+NOT_MONOTONE_TIME = 26
+HEADER = 27
 
 INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED = 0, 1, 2, 3
 
@@ -59,6 +70,32 @@ def leave(monitor, code, time, agent, constraint, value, stage):
         monitor[EXIT_CONSTRAINT] = constraint
         monitor[EXIT_VALUE] = value
         monitor[EXIT_STAGE] = stage
+
+
+@kernel
+def compare(monitor, time, y, ahead):
+    """Note how far the outputs y (m,) are from those predicted for this control instant."""
+    for r in range(len(y)):
+        distance = abs(y[r] - ahead[r])
+        if not distance <= monitor[PREDICTION]:
+            monitor[PREDICTION] = distance
+            monitor[PREDICTION_TIME] = time
+
+
+@kernel
+def count_solution(monitor, time, steps, accurate, least):
+    """Note one solution of mode implicit: Newton steps, accuracy, least secant over slope."""
+    monitor[SOLUTIONS] += 1.0
+    monitor[SOLVER_STEPS] += steps
+    monitor[MOST_STEPS] = max(monitor[MOST_STEPS], steps)
+    if not accurate:
+        if monitor[UNSOLVED] == 0.0:
+            monitor[UNSOLVED_TIME] = time
+        monitor[UNSOLVED] += 1.0
+    if not least > 0.0:
+        if monitor[NOT_MONOTONE] == 0.0:
+            monitor[NOT_MONOTONE_TIME] = time
+        monitor[NOT_MONOTONE] += 1.0
 
 
 @kernel

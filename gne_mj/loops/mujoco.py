@@ -4,7 +4,7 @@ MuJoCo evaluates control at every stage of its integrator. The callback counts t
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
 (:func:`gne_mj.loops.ode.look`); later ones, in mode `continuous`, only act. In that mode the
 law's memory is in ``act``, moved by MuJoCo's integrator at the rates that a second callback gives;
-in mode `sampled` it is in ``userdata``, where nothing but the law moves it. What else is kept from
+in the held modes it is in ``userdata``, where nothing but the law moves it. What else is kept from
 call to call is in ``userdata`` as well; both are part of MuJoCo's state. userdata holds [mark,
 address of the table, the fleet's own, step, stage, monitor, input held, scratch arrays, flat state
 at the step's start, flat state at a later stage, memory].
@@ -21,9 +21,18 @@ from gne_mj.controllers.propagation import Propagator
 from gne_mj.errors import EngineError
 from gne_mj.game import Game, GameData
 from gne_mj.graph import GraphData
+from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import Problem, Work, work_sizes
+from gne_mj.loops.feedback import (
+    FAULT_COLUMNS,
+    Faults,
+    Order,
+    Problem,
+    Sizes,
+    Work,
+    work_sizes,
+)
 from gne_mj.loops.ode import CONTINUOUS, Clock, look
 from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
@@ -56,7 +65,7 @@ from gne_mj.plants.native_mujoco import (
     step_address,
     table_of,
 )
-from gne_mj.plants.ode import Channels
+from gne_mj.plants.ode import METHODS, Channels
 
 if TYPE_CHECKING:
     from gne_mj.plants.mjcf_fleet import MjcfPlant
@@ -66,17 +75,22 @@ if TYPE_CHECKING:
 GAME = PLANT_TABLE
 GRAPH = GAME + len(GameData._fields)
 PROPAGATOR = GRAPH + len(GraphData._fields)
-SETTINGS, LIMIT, EQUILIBRIUM, PARAMETERS, REST, STEP, CLOCK = range(PROPAGATOR + 3, PROPAGATOR + 10)
+SCHEDULE = PROPAGATOR + 3
+ORDER = SCHEDULE + 1
+FAULTS = ORDER + len(Order._fields)
+SETTINGS, LIMIT, EQUILIBRIUM, PARAMETERS, REST, STEP, CLOCK = range(FAULTS + 3, FAULTS + 10)
+# Entries of STEP: what a loop is made of
+ACTIONS, CONSTRAINTS, AGENTS, EVALUATIONS, PERIOD, MODE, HISTORY, SOLVER, METHOD = range(9)
 
 # Entries of userdata behind the fleet's own
 STEP_NOW, STAGE_NOW, MONITOR = range(3)
 
 
 @kernel
-def room_needed(m, p, agents, states):
+def room_needed(m, p, agents, states, history, solver):
     """Entries of userdata that a loop needs behind the fleet's own."""
     total = MONITOR + watch.length(m, p) + m + 2 * m * states
-    for size in work_sizes(m, p, agents):
+    for size in work_sizes(m, p, agents, history, solver):
         total += size
     return total
 
@@ -94,6 +108,7 @@ def problem_in(table):
         integers(table, GAME + 6),
         integers(table, GAME + 7),
         integers(table, GAME + 8),
+        floats(table, GAME + 9),
     )
     graph = GraphData(integers(table, GRAPH), integers(table, GRAPH + 1))
     agents = len(data.offsets) - 1
@@ -110,7 +125,34 @@ def problem_in(table):
         floats(table, LIMIT),
         floats(table, EQUILIBRIUM),
         propagator,
+        floats(table, SCHEDULE),
+        Order(
+            integers(table, ORDER),
+            integers(table, ORDER + 1),
+            integers(table, ORDER + 2),
+            integers(table, ORDER + 3),
+            integers(table, ORDER + 4),
+        ),
+        faults_in(table),
     )
+
+
+@kernel
+def faults_in(table):
+    """The run's faults, from a simulation's table."""
+    rows = floats(table, FAULTS)
+    return Faults(
+        rows.reshape((len(rows) // FAULT_COLUMNS, FAULT_COLUMNS)),
+        integers(table, FAULTS + 1),
+        floats(table, FAULTS + 2),
+    )
+
+
+@kernel
+def clock_in(table):
+    """How the loop steps, from a simulation's table."""
+    steps = integers(table, STEP)
+    return Clock(floats(table, CLOCK)[0], steps[PERIOD], steps[MODE], steps[METHOD])
 
 
 @kernel
@@ -122,13 +164,16 @@ def channels_in(table, m, states):
 
 
 @kernel
-def parts_of(userdata, start, m, p, agents, states):
+def parts_of(userdata, start, steps, states):
     """Views into userdata: monitor, input, scratch, flat states at the start and later, memory."""
+    m, p, agents = steps[ACTIONS], steps[CONSTRAINTS], steps[AGENTS]
     at = start + MONITOR + watch.length(m, p)
     monitor = userdata[start + MONITOR : at]
     u = userdata[at : at + m]
     at += m
-    n0, n1, n2, n3, n4, n5, n6, n7, n8 = work_sizes(m, p, agents)
+    n0, n1, n2, n3, n4, n5, n6, n7, n8, n9, n10, n11, n12, n13 = work_sizes(
+        m, p, agents, steps[HISTORY], steps[SOLVER]
+    )
     a1 = at + n0
     a2 = a1 + n1
     a3 = a2 + n2
@@ -137,7 +182,12 @@ def parts_of(userdata, start, m, p, agents, states):
     a6 = a5 + n5
     a7 = a6 + n6
     a8 = a7 + n7
-    end = a8 + n8
+    a9 = a8 + n8
+    a10 = a9 + n9
+    a11 = a10 + n10
+    a12 = a11 + n11
+    a13 = a12 + n12
+    end = a13 + n13
     work = Work(
         userdata[at:a1],
         userdata[a1:a2],
@@ -147,7 +197,12 @@ def parts_of(userdata, start, m, p, agents, states):
         userdata[a5:a6],
         userdata[a6:a7],
         userdata[a7:a8],
-        userdata[a8:end],
+        userdata[a8:a9],
+        userdata[a9:a10],
+        userdata[a10:a11],
+        userdata[a11:a12],
+        userdata[a12:a13],
+        userdata[a13:end],
     )
     size = m * states
     memory = userdata[end + 2 * size :]
@@ -156,15 +211,22 @@ def parts_of(userdata, start, m, p, agents, states):
 
 
 @cache
-def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, ...]:
+def build(
+    at: Offsets,
+    fleet: ModuleType,
+    law: ModuleType,
+    game: ModuleType,
+    acting: ModuleType,
+    faults: ModuleType,
+) -> tuple[Any, ...]:
     """The callbacks for control and memory, the native loop and its last observation.
 
     Args:
         at: where MuJoCo keeps what.
         fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
-        law, game: modules of kernels.
+        law, game, acting, faults: modules of kernels, as :func:`gne_mj.loops.ode.look` has them.
     """
-    agent = fleet.AGENT
+    agent, plant = fleet.AGENT, fleet.AHEAD
     states = len(agent.STATES)
     source = source_key(fleet, agent, law, game)
 
@@ -175,12 +237,11 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         if table <= 0:
             return
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m, p, agents = steps[0], steps[1], steps[2]
-        stages, period, mode = steps[3], steps[4], steps[5]
+        m, stages, mode = steps[ACTIONS], steps[EVALUATIONS], steps[MODE]
         ctrl = field(struct, at.ctrl, sizes[NU])
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
         start = sizes[ROOM]
-        monitor, u, work, state, later, memory = parts_of(userdata, start, m, p, agents, states)
+        monitor, u, work, state, later, memory = parts_of(userdata, start, steps, states)
         if mode == CONTINUOUS:
             memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
         step, stage = np.int64(userdata[start + STEP_NOW]), np.int64(userdata[start + STAGE_NOW])
@@ -189,7 +250,8 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         userdata[start + STAGE_NOW] = 0 if last else stage + 1
         if stage > 0 and mode != CONTINUOUS:
             return
-        h = floats(table, CLOCK)[0]
+        problem, clock = problem_in(table), clock_in(table)
+        h = clock.h
         time = step * h
         if stage > 0:
             time += h if stage == 3 else 0.5 * h
@@ -197,13 +259,15 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         fleet.gather(at, struct, table, state)
         channels = channels_in(table, m, states)
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
-        acts = monitor[watch.EXIT] == watch.INSIDE and look(
-            agent, law, game, problem_in(table), channels, Clock(h, period, mode, 0), time, step,
+        context = (at, address_of(model), struct, table)
+        good = monitor[watch.EXIT] == watch.INSIDE and look(
+            acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
             stage, storage, state, memory, u, monitor, work,
         )  # fmt: skip
         places = integers(table, PLACES)
+        acts = faults.push(problem, clock, step, work.u, work.acts)
         for r in range(m):
-            ctrl[fleet.actuator_of(places, r)] = work.u[r] if acts else 0.0
+            ctrl[fleet.actuator_of(places, r)] = acts[r] if good else 0.0
 
     def remember(model, data, actuator):
         _ = source
@@ -214,17 +278,19 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         sizes, steps = integers(table, SIZES), integers(table, STEP)
         rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
-        parts = parts_of(userdata, sizes[ROOM], steps[0], steps[1], steps[2], states)
+        parts = parts_of(userdata, sizes[ROOM], steps, states)
         memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
         law.rate(problem_in(table), parts[2].y, memory, rates)
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
     def advance(
-        mj_step, model, data, qpos, qvel, act, userdata, start, m, p, agents, restores, every,
-        before, samples_state, samples_u, samples_memory,
+        mj_step, model, data, qpos, qvel, act, userdata, start, restores, every,
+        before, samples_state, samples_u, samples_memory, samples_seen, samples_acts,
     ):  # fmt: skip
         _ = source
-        monitor, u, _work, state, _later, memory = parts_of(userdata, start, m, p, agents, states)
+        table = table_of(at, model, data)
+        steps, problem, clock = integers(table, STEP), problem_in(table), clock_in(table)
+        monitor, u, work, state, _later, memory = parts_of(userdata, start, steps, states)
         nq, nv = len(qpos), len(qvel)
         done = 0
         for sample in range(len(samples_u)):
@@ -248,6 +314,11 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
                 if substep == 0:
                     copy(u, samples_u[sample])
                     copy(state, samples_state[sample])
+                    step = np.int64(userdata[start + STEP_NOW]) - 1
+                    faults.record(
+                        agent, problem, clock, step, state, u, work, samples_seen[sample],
+                        samples_acts[sample],
+                    )  # fmt: skip
                     copy(before[nq + nv :] if restores else memory, samples_memory[sample])
                 if left:
                     return sample + 1, done
@@ -258,12 +329,10 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         _ = source
         table = table_of(at, model, data)
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m = steps[0]
+        m = steps[ACTIONS]
         userdata = field(data, at.userdata, sizes[NUSERDATA])
-        monitor, u, work, state, _later, memory = parts_of(
-            userdata, sizes[ROOM], m, steps[1], steps[2], states
-        )
-        if steps[5] == CONTINUOUS:
+        monitor, u, work, state, _later, memory = parts_of(userdata, sizes[ROOM], steps, states)
+        if steps[MODE] == CONTINUOUS:
             memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
         fleet.gather(at, data, table, state)
         channels = channels_in(table, m, states)
@@ -272,10 +341,10 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
         for r in range(m):
             x = state[r * states : (r + 1) * states]
             storage += agent.storage(channels.parameters[r], x, channels.rest[r])
-        clock = Clock(floats(table, CLOCK)[0], steps[4], steps[5], 0)
+        clock, context = clock_in(table), (at, model, data, table)
         return look(
-            agent, law, game, problem_in(table), channels, clock, step * clock.h, step, 0, storage,
-            state, memory, u, monitor, work,
+            acting, faults, plant, context, agent, law, game, problem_in(table), channels, clock,
+            step * clock.h, step, 0, storage, state, memory, u, monitor, work,
         )  # fmt: skip
 
     return (
@@ -286,15 +355,20 @@ def build(at: Offsets, fleet: ModuleType, law: ModuleType, game: ModuleType) -> 
     )
 
 
-def room(game: Game, agents: Agents, memory: int, mode: int) -> tuple[int, int]:
+def room(
+    game: Game, agents: Agents, memory: int, mode: int, sizes: Sizes = Sizes()
+) -> tuple[int, int]:
     """Entries of userdata, and of act, that a plant must leave for this game's loop.
 
     Args:
         game, agents: of the loop.
         memory: length of the law's memory.
-        mode: CONTINUOUS or SAMPLED of :mod:`gne_mj.loops.ode`.
+        mode: CONTINUOUS or HELD of :mod:`gne_mj.loops.ode`.
+        sizes: of the scratch arrays that depend on the kind of loop.
     """
-    needed = room_needed(game.actions, game.constraints_count, game.agents, agents.states)
+    needed = room_needed(
+        game.actions, game.constraints_count, game.agents, agents.states, *sizes
+    )
     return (int(needed), memory) if mode == CONTINUOUS else (int(needed) + memory, 0)
 
 
@@ -306,9 +380,11 @@ class MujocoLoop(ClosedLoop):
         law, game: modules of kernels.
         problem: what the law reads.
         rest: (m, states) equilibrium, from which V is measured.
-        mode: CONTINUOUS or SAMPLED of :mod:`gne_mj.loops.ode`.
-        period: steps per control period, mode sampled.
+        mode: CONTINUOUS or HELD of :mod:`gne_mj.loops.ode`.
+        period: steps per control period, held modes.
         memory: the law's, at the start.
+        acting, faults: modules of kernels, see :func:`gne_mj.loops.ode.look`.
+        sizes: of the scratch arrays that they need.
     """
 
     def __init__(
@@ -321,21 +397,28 @@ class MujocoLoop(ClosedLoop):
         mode: int,
         period: int,
         memory: NDArray[np.float64],
+        acting: ModuleType = explicit,
+        faults: ModuleType = faultless,
+        sizes: Sizes = Sizes(),
     ) -> None:
         self.plant = plant
         m = plant.agents.channels
         p, agents = len(problem.data.member_pointer) - 1, len(problem.data.offsets) - 1
         at = offsets()
         self._control, self._remember, self._advance, self._finish = build(
-            at, plant.kernels, law, game
+            at, plant.kernels, law, game, acting, faults
         )
-        steps = [m, p, agents, STAGES[plant.integrator], period, mode]
+        method = METHODS[plant.integrator]
+        steps = [m, p, agents, STAGES[plant.integrator], period, mode, *sizes, method]
         self._table = Table(
             [
                 *plant.table_arrays,
                 *problem.data,
                 *problem.graph,
                 *problem.propagator,
+                problem.schedule,
+                *problem.order,
+                *problem.faults,
                 problem.settings,
                 problem.limit,
                 problem.equilibrium,
@@ -346,10 +429,9 @@ class MujocoLoop(ClosedLoop):
             ]
         )
         data = plant.data
+        self._faulty = int(faults is not faultless)
         data.userdata[:] = 0.0
-        sizes = plant.table_arrays[SIZES]
-        self._start = int(sizes[ROOM])
-        self._sizes = (m, p, agents)
+        self._start = int(plant.table_arrays[SIZES][ROOM])
         moved = mode == CONTINUOUS and len(memory) > 0  # by the integrator
         place = data.act if moved else data.userdata
         self._memory = place[len(place) - len(memory) :]
@@ -383,6 +465,8 @@ class MujocoLoop(ClosedLoop):
             np.empty((samples, m * agents.states)),
             np.empty((samples, m)),
             np.empty((samples, len(self._memory))),
+            np.empty((samples, m * self._faulty)),
+            np.empty((samples, m * self._faulty)),
         )
         self._check_mark()
         first = self._step
@@ -391,14 +475,13 @@ class MujocoLoop(ClosedLoop):
         with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
             done, steps = self._advance(
                 step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
-                self._memory, data.userdata, self._start, *self._sizes, restores, every, before,
-                *recorded,
+                self._memory, data.userdata, self._start, restores, every, before, *recorded,
             )  # fmt: skip
         # The callback counts steps, but one that ended in an exit was not taken.
         data.userdata[self._start + STEP_NOW] = first + steps
         data.time = self.time
-        states, inputs, memories = (rows[:done] for rows in recorded)
-        return Samples(states.reshape(-1, m, agents.states), inputs, memories)
+        states, *others = (rows[:done] for rows in recorded)
+        return Samples(states.reshape(-1, m, agents.states), *others)
 
     def finish(self) -> Samples:
         """See the base class."""
@@ -407,7 +490,8 @@ class MujocoLoop(ClosedLoop):
         self._check_mark()
         inside = self._finish(self.plant.model._address, data._address, self._step)
         u = self._u if inside else np.full_like(self._u, np.nan)
-        return Samples(state[None], u[None].copy(), self._memory[None].copy())
+        struck = np.full((1, len(u) * self._faulty), np.nan)
+        return Samples(state[None], u[None].copy(), self._memory[None].copy(), struck, struck)
 
     def _mark(self) -> None:
         self.plant.data.userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address

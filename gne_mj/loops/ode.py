@@ -1,9 +1,9 @@
 """The fixed-step closed loop of ODE agents: any law, any agents, Runge-Kutta 4 or Euler.
 
 In mode `continuous` the law (and the rates of its memory) are evaluated at every stage of the
-integrator. In mode `sampled` the law is evaluated once per control period and held; at the next
-control instant its memory first moves exactly over the period that has passed, with the outputs
-held at their values at the period's start.
+integrator. In the held modes, `sampled` and `implicit`, an input is found once per control period
+and held; at the next control instant the law's memory first moves exactly over the period that has
+passed, with the outputs held at their values at the period's start.
 """
 
 from functools import cache
@@ -13,21 +13,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import Problem, feedback, inside, work
+from gne_mj.loops.feedback import Problem, Sizes, inside, work
 from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj.plants import held_map
 from gne_mj.plants.ode import RK4, Channels, held_step
 
-CONTINUOUS, SAMPLED = 0, 1
-MODES = {"continuous": CONTINUOUS, "sampled": SAMPLED}
+# Mode implicit is held like sampled; what differs is how the input is found, a module of its own
+CONTINUOUS, HELD = 0, 1
+MODES = {"continuous": CONTINUOUS, "sampled": HELD, "implicit": HELD}
 
 
 class Clock(NamedTuple):
     """How a loop steps."""
 
     h: float  # step in s
-    period: int  # steps per control period, mode sampled
+    period: int  # steps per control period, held modes
     mode: int
     method: int
 
@@ -52,8 +55,8 @@ def stored(agent, channels, state):
 
 @kernel
 def look(
-    agent, law, game, problem, channels, clock, time, step, stage, storage, state, memory, u,
-    monitor, work,
+    acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
+    storage, state, memory, u, monitor, work,
 ):  # fmt: skip
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
@@ -61,6 +64,10 @@ def look(
     and of the time to compile them.
 
     Args:
+        acting: module that finds the law's input, :mod:`gne_mj.loops.explicit` and its like.
+        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
+        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
+        context: what that module needs of the engine.
         agent, law, game: modules of kernels.
         problem, channels, clock: as the loop has them.
         time: at the stage, in s.
@@ -68,7 +75,7 @@ def look(
         stage: 0 at its start; later ones are looked at in mode continuous only.
         storage: V^{x*} of the agents now (see :func:`stored`); read at stage 0.
         state: flat, channel after channel, at the stage.
-        memory: the law's at the stage; own actions are written into it, and in mode sampled it
+        memory: the law's at the stage; own actions are written into it, and in the held modes it
             moves on when a control period has passed.
         u: (m,) input that acts; changed at stage 0.
         monitor, work: changed.
@@ -78,17 +85,25 @@ def look(
     """
     y = work.y
     measure(agent, state, channels.rest.shape[1], y)
-    if clock.mode == CONTINUOUS or step % clock.period == 0:
+    instant = clock.mode == CONTINUOUS or step % clock.period == 0
+    if not inside(game, problem, time, stage, y, work, monitor):
+        if not instant:
+            monitor[watch.EXIT_BETWEEN] = 1.0
+        return False
+    if instant:
         if clock.mode != CONTINUOUS:
             if work.stands[0] < step:  # a control period has passed
                 law.propagate(problem, work.held, memory, work.scratch)
                 work.stands[0] = step
             copy(y, work.held)
-        if not feedback(law, game, problem, time, stage, y, memory, work, monitor, work.u):
+        faults.begin(agent, problem, clock, step, stage, state, memory, work)
+        if not acting.act(
+            faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
+            state, memory, work, monitor,
+        ):  # fmt: skip
             return False
+        faults.deliver(problem, clock, step, stage, work)
     else:
-        if not inside(game, problem, time, stage, y, work, monitor):
-            return False
         copy(u, work.u)
     if stage == 0:
         before = work.u if clock.mode == CONTINUOUS else u
@@ -99,12 +114,12 @@ def look(
 
 
 @kernel
-def rates(agent, law, problem, channels, state, work, out):
-    """Fill out with the rate of the flat state, the law having acted there (work.y, work.u)."""
+def rates(agent, law, problem, channels, state, u, work, out):
+    """Fill out with the rate of the flat state under u (m,), the law having acted (work.y)."""
     m, states = channels.rest.shape
     for r in range(m):
         x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
-        agent.rate(channels.parameters[r], x, work.u[r], rate)
+        agent.rate(channels.parameters[r], x, u[r], rate)
     law.rate(problem, work.y, state[m * states :], out[m * states :])
 
 
@@ -117,7 +132,13 @@ def stage_state(stage, h, state, k, trial):
 
 
 @cache
-def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
+def build(
+    agent: ModuleType,
+    law: ModuleType,
+    game: ModuleType,
+    acting: ModuleType = explicit,
+    faults: ModuleType = faultless,
+) -> Any:
     """The native loop for an agent type, a law and a game.
 
     With ``every`` = 0 it observes the present state, and does not move on.
@@ -127,7 +148,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
     @compiled
     def advance(
         problem, channels, clock, step, every, state, u, monitor, work, scratch,
-        samples_state, samples_u,
+        samples_state, samples_u, samples_seen, samples_acts,
     ):  # fmt: skip
         _ = source
         m, states = channels.rest.shape
@@ -145,16 +166,21 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
                         now = trial
                     time = step * h + (0.0, 0.5 * h, 0.5 * h, h)[stage]
                     if not look(
-                        agent, law, game, problem, channels, clock, time, step, stage, storage,
-                        now, now[m * states :], u, monitor, work,
+                        acting, faults, held_map, (), agent, law, game, problem, channels, clock,
+                        time, step, stage, storage, now, now[m * states :], u, monitor, work,
                     ):  # fmt: skip
                         # a step that began inside has its row, even if a later stage left
                         return sample + (substep > 0 or stage > 0), step
                     if substep == 0 and stage == 0:
                         copy(state, samples_state[sample])
                         copy(u, samples_u[sample])
+                        faults.record(
+                            agent, problem, clock, step, state, u, work, samples_seen[sample],
+                            samples_acts[sample],
+                        )  # fmt: skip
                     if clock.mode == CONTINUOUS and every > 0:
-                        rates(agent, law, problem, channels, now, work, k[stage, :n])
+                        acts = faults.push(problem, clock, step, work.u, work.acts)
+                        rates(agent, law, problem, channels, now, acts, work, k[stage, :n])
                 if every == 0:
                     return sample + 1, step
                 if stages == 4:
@@ -162,8 +188,9 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
                         rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
                         state[r] += h / 6.0 * rise
                 else:
+                    acts = faults.push(problem, clock, step, u, work.acts)
                     held_step(
-                        agent, channels.parameters, states, clock.method, h, state, u, scratch[4]
+                        agent, channels.parameters, states, clock.method, h, state, acts, scratch[4]
                     )
                     if clock.mode == CONTINUOUS:  # Euler's method for the memory
                         for r in range(m * states, n):
@@ -184,6 +211,8 @@ class OdeLoop(ClosedLoop):
         clock: how to step.
         state: (m, states) at the start.
         memory: the law's, at the start.
+        acting, faults: modules of kernels, see :func:`look`.
+        sizes: of the scratch arrays that they need.
     """
 
     def __init__(
@@ -196,15 +225,19 @@ class OdeLoop(ClosedLoop):
         clock: Clock,
         state: NDArray[np.float64],
         memory: NDArray[np.float64],
+        acting: ModuleType = explicit,
+        faults: ModuleType = faultless,
+        sizes: Sizes = Sizes(),
     ) -> None:
-        self._advance = build(agent, law, game)
+        self._advance = build(agent, law, game, acting, faults)
         self._fixed = (problem, channels, clock)
         self._clock = clock
         self._shape = state.shape
         self._state = np.concatenate([state.ravel(), memory])
         actions, constraints = len(state), len(problem.data.member_pointer) - 1
         self._u = np.zeros(actions)
-        self._work = work(actions, constraints, len(problem.data.offsets) - 1)
+        self._faulty = int(faults is not faultless)
+        self._work = work(actions, constraints, len(problem.data.offsets) - 1, sizes)
         self._scratch = np.zeros((5, max(len(self._state), actions, 5 * state.shape[1])))
         self._step = 0
         self.monitor = np.zeros(watch.length(actions, constraints))
@@ -218,27 +251,39 @@ class OdeLoop(ClosedLoop):
         """See the base class."""
         if self.monitor[watch.EXIT] != watch.INSIDE:
             samples = 0
-        states, inputs = np.empty((samples, len(self._state))), np.empty((samples, len(self._u)))
-        done, self._step = self._advance(
-            *self._fixed, self._step, every, self._state, self._u, self.monitor, self._work,
-            self._scratch, states, inputs,
-        )  # fmt: skip
-        return self._samples(states[:done], inputs[:done])
+        return self._samples(*self._record(samples, every))
 
     def finish(self) -> Samples:
         """See the base class."""
-        states, inputs = np.empty((1, len(self._state))), np.empty((1, len(self._u)))
-        done, _ = self._advance(
-            *self._fixed, self._step, 0, self._state, self._u, self.monitor, self._work,
-            self._scratch, states, inputs,
-        )  # fmt: skip
-        u = self._u if done else np.full_like(self._u, np.nan)
-        return self._samples(self._state[None].copy(), u[None].copy())
+        rows = self._record(1, 0)
+        if len(rows[0]):
+            return self._samples(*rows)
+        nothing = (np.full((1, row.shape[1]), np.nan) for row in rows[1:])
+        return self._samples(self._state[None].copy(), *nothing)
 
-    def _samples(self, states: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
+    def _record(self, samples: int, every: int) -> list[NDArray[np.float64]]:
+        """Rows of states, inputs, and where there are faults of what was seen and what acted."""
+        m = len(self._u)
+        widths = (len(self._state), m, m * self._faulty, m * self._faulty)
+        rows = [np.empty((samples, width)) for width in widths]
+        done, self._step = self._advance(
+            *self._fixed, self._step, every, self._state, self._u, self.monitor, self._work,
+            self._scratch, *rows,
+        )  # fmt: skip
+        return [row[:done] for row in rows]
+
+    def _samples(
+        self,
+        states: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        seen: NDArray[np.float64],
+        acts: NDArray[np.float64],
+    ) -> Samples:
         size = self._shape[0] * self._shape[1]
         return Samples(
             state=states[:, :size].reshape(-1, *self._shape),
             input=inputs,
             memory=states[:, size:],
+            seen=seen,
+            acts=acts,
         )

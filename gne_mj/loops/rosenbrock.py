@@ -405,4 +405,6 @@ class RosenbrockLoop(ClosedLoop):
             state=states[:, :size].reshape(-1, *self._shape),
             input=inputs,
             memory=states[:, size:],
+            seen=inputs[:, :0],
+            acts=inputs[:, :0],
         )

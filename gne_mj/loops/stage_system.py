@@ -104,7 +104,7 @@ def linearise(agent, game, problem, channels, states, state, u, work, system):
         copy(z[first:last], profile[first:last])
         for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
             k = data.own_index[entry]
-            room = -game.constraint(q, k, profile)
+            room = -game.constraint(q, k, profile) - data.tightening[k]
             weight = -gain * rho / room
             for a in range(first, last):
                 mine = game.constraint_gradient(q, k, a, profile) / room

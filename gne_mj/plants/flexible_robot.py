@@ -25,6 +25,7 @@ STATES = (
     ("position", "m"),
 )
 OUTPUT = 1
+POSITIONS = (0, 3)  # moved by the new velocities in an Euler step
 INPUT_UNIT = "N"
 
 

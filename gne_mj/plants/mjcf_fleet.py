@@ -9,48 +9,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.native import kernel
-from gne_mj.plants import mjcf_robot
+from gne_mj.plants import mjcf_ahead, mjcf_robot
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import read_model
+from gne_mj.plants.mjcf_ahead import ACTUATOR, OUTPUT_AT, POSITION_AT, actuator_of, gather
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
-from gne_mj.plants.mujoco import INTEGRATORS, NQ, NV, PLACES, SIZES, run_steps
+from gne_mj.plants.mujoco import INTEGRATORS, run_steps
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     USERDATA_HEADER,
     Table,
     callbacks,
-    field,
-    integers,
     step_address,
 )
 
-# A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
-# one, the joint's entry of qpos or -1, the actuator's of ctrl
-OUTPUT_AT, POSITION_AT, ACTUATOR, PLACES_COUNT = range(4)
-SENSORDATA = 7  # one more entry of SIZES
+__all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "stored"]
+
 SPACING = 2.0  # m between robots, so that they do not touch
 
-AGENT = mjcf_robot
-
-
-@kernel
-def gather(at, data, table, state):
-    """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
-    sizes = integers(table, SIZES)
-    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
-    sensordata = field(data, at.sensordata, sizes[SENSORDATA])
-    places = integers(table, PLACES)
-    for r in range(len(places) // PLACES_COUNT):
-        source = places[r * PLACES_COUNT + OUTPUT_AT]
-        position = places[r * PLACES_COUNT + POSITION_AT]
-        state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
-        state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
-
-
-@kernel
-def actuator_of(places, r):
-    """Which entry of ctrl is the input of channel r."""
-    return places[r * PLACES_COUNT + ACTUATOR]
+AGENT, AHEAD = mjcf_robot, mjcf_ahead
 
 
 @kernel
@@ -113,9 +90,11 @@ class MjcfPlant(Plant):
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
         model = self.model
+        self._twin = mujoco.MjData(model)  # where mode implicit looks ahead
         sizes = (
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
-            model.na - memory, model.nsensordata,
+            model.na - memory, model.nsensordata, self._twin._address, step_address(),
+            0 if self.measures_every_stage else step_address("mj_forward"),
         )  # fmt: skip
         self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
         self._table = Table(self.table_arrays)

@@ -48,6 +48,7 @@ class Offsets(NamedTuple):
     act: int
     act_dot: int
     qfrc_passive: int
+    qacc_warmstart: int
     sensordata: int
     userdata: int
     nuserdata: int  # in mjModel
@@ -165,12 +166,12 @@ def call(typingctx: Any, function: Any, model: Any, data: Any) -> Any:
 
 
 @cache
-def step_address() -> int:
-    """Address of mj_step in the library that the mujoco package has loaded."""
+def step_address(function: str = "mj_step") -> int:
+    """Address of mj_step, or of another function (model, data), in the library in use."""
     folder = Path(mujoco.__file__).parent
     for path in sorted([*folder.glob("libmujoco.*"), *folder.glob("mujoco.dll")]):
         library = ctypes.CDLL(str(path))
-        return ctypes.cast(library.mj_step, ctypes.c_void_p).value or 0
+        return ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0
     raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
 
 

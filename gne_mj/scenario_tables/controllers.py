@@ -11,18 +11,24 @@ from gne_mj.scenario_tables.table import Table
 from gne_mj.user_files import load_law
 
 
-class FullController(Table):
+class _ControllerTable(Table):
+    mode: Literal["continuous", "sampled", "implicit"] = "continuous"
+    decentralised: bool = Field(
+        False, description="mode implicit: each agent keeps to its share of every bound's slack"
+    )
+
+
+class FullController(_ControllerTable):
     """[eq:nonlinFIfeedback]"""
 
     information: Literal["full"]
-    mode: Literal["continuous", "sampled"] = "continuous"
 
     def build(self, game: Game) -> Law:
         """The law."""
         return FullInformation()
 
 
-class _NetworkController(Table):
+class _NetworkController(_ControllerTable):
     graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
         Field("ring", description="a name, or edges as pairs of agents numbered from 1")
     )
@@ -38,7 +44,6 @@ class PartialController(_NetworkController):
     """[eq:nonlinearPIFeedback]"""
 
     information: Literal["partial"]
-    mode: Literal["continuous", "sampled"] = "continuous"
     coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
     time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
 
@@ -51,7 +56,6 @@ class DistributedController(_NetworkController):
     """[eq:CenterFeedback]"""
 
     information: Literal["distributed"]
-    mode: Literal["continuous", "sampled"] = "continuous"
     epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
     gain: float = Field(1.0, gt=0, description="k")
 
@@ -64,7 +68,6 @@ class CustomController(_NetworkController):
     """A law of the user's own."""
 
     information: Literal["custom"]
-    mode: Literal["continuous", "sampled"] = "continuous"
     file: str = Field(description="Python file that defines law(game, graph, ...) or action(...)")
     parameters: dict[str, Any] = Field({}, description="handed to it")
 

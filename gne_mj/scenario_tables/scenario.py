@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from gne_mj.barrier import Schedule
 from gne_mj.errors import InvalidInput
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
@@ -26,6 +28,7 @@ from gne_mj.scenario_tables.controllers import (
     FullController,
     PartialController,
 )
+from gne_mj.scenario_tables.faults import FaultTable, MarginTable
 from gne_mj.scenario_tables.games import (
     CournotGame,
     CustomGame,
@@ -36,12 +39,30 @@ from gne_mj.scenario_tables.games import (
 from gne_mj.scenario_tables.table import PerAction, Sizes, Table, per_action
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
+from gne_mj.theory.periods import least_rho
 
 
 class BarrierTable(Table):
     """[eq:logbarrier]"""
 
-    rho: float = Field(0.1, gt=0)
+    rho: float = Field(0.1, gt=0, description="at the start, if it has a schedule")
+    schedule: Literal["exponential", "reciprocal", "halving"] | None = Field(
+        None, description="how rho falls in time; constant if left out"
+    )
+    time_constant: float = Field(1.0, gt=0, description="s, of the schedule")
+    floor: float | None = Field(
+        None,
+        gt=0,
+        description="what rho falls to; if left out 1e-9 in mode implicit, else the least that the"
+        " period allows at the equilibrium",
+    )
+
+    def build(self, floor: float) -> Schedule | None:
+        """The schedule, falling to ``floor`` unless that is given."""
+        if self.schedule is None:
+            return None
+        lowest = min(floor, self.rho) if self.floor is None else self.floor
+        return Schedule(self.schedule, self.rho, lowest, self.time_constant)
 
 
 class PlantTable(Table):
@@ -110,13 +131,25 @@ class SystemTable(Table):
     ] = FullController(information="full")
     plant: PlantTable = PlantTable()
     initial: InitialTable = InitialTable()
+    margin: MarginTable | None = Field(
+        None, description="the barrier is tightened so that these disturbances keep all inside"
+    )
+    faults: list[Annotated[FaultTable, Field(discriminator="type")]] = Field(
+        [], description="what goes wrong, each from a start (s) to an end"
+    )
 
-    def build(self, name: str, integrator_name: str) -> System:
+    def build(self, name: str, simulation: "SimulationTable") -> System:
         """The system, with the simulation's integrator unless it names its own."""
-        count = self.agents.count
+        count, integrator = self.agents.count, self.plant.integrator or simulation.integrator
+        period = simulation.control_period or simulation.timestep
         try:
             game = self.game.build(count)
             agents = self.agents.build(game.sizes)
+            if self.margin is not None:
+                steps = max(1, round(period / simulation.timestep))
+                game = self.margin.tightened(
+                    game, agents, simulation.timestep, integrator, steps
+                )
             law = self.controller.build(game)
             state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
             filtered = self.initial.filtered
@@ -125,20 +158,31 @@ class SystemTable(Table):
                 self.initial.estimate,
                 None if filtered is None else per_action("initial.filtered", filtered, game.sizes),
             )
+            faults = tuple(fault.build() for fault in self.faults)
+            schedule = self.barrier.build(1e-9)
         except InvalidInput as error:
             raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
-        return System(
+        system = System(
             name=name,
             game=game,
             agents=agents,
             law=law,
-            rho=self.barrier.rho,
+            rho=self.barrier.rho if schedule is None else schedule.floor,
+            schedule=schedule,
+            faults=faults,
+            seed=simulation.seed,
+            disturbance=None if self.margin is None else self.margin.disturbance(game),
             state=state,
             memory=memory,
             mode=self.controller.mode,
+            decentralised=self.controller.decentralised,
             engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
-            integrator=self.plant.integrator or integrator_name,
+            integrator=integrator,
         )
+        if schedule is None or self.barrier.floor is not None or system.mode == "implicit":
+            return system
+        floor = least_rho(system, period if system.mode == "sampled" else simulation.timestep)
+        return replace(system, rho=floor, schedule=self.barrier.build(floor))
 
 
 class SimulationTable(Table):
@@ -147,7 +191,7 @@ class SimulationTable(Table):
     duration: float = Field(30.0, gt=0, description="s")
     timestep: float = Field(0.002, gt=0, description="s")
     control_period: float | None = Field(
-        None, gt=0, description="s, for mode sampled; the timestep if left out"
+        None, gt=0, description="s, for the held modes; the timestep if left out"
     )
     integrator: Literal["rk4", "euler"] = "rk4"
     tolerance: float = Field(1e-3, gt=0, description="on max |y - y*|, for status converged")
@@ -198,8 +242,7 @@ class Scenario(Table):
         Raises:
             InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
         """
-        integrator = self.simulation.integrator
-        return [table.build(name, integrator) for name, table in self.systems.items()]
+        return [table.build(name, self.simulation) for name, table in self.systems.items()]
 
     def simulation_object(self) -> Simulation:
         """The scenario, ready to run.

@@ -88,6 +88,20 @@ def _curvatures(system: System, y: np.ndarray) -> np.ndarray:
     return np.array([system.game.weighted_constraint_hessian(y, w) for w in weights])
 
 
+def convex_constraints(system: System) -> Assumption:
+    """Convex constraints, which shares of their slacks rest on."""
+    game, label = system.game, "convex constraints"
+    if game.gap_bounds is not None:
+        return Assumption(label, MET, "bounds on gaps are")
+    points = profiles(game, system.start, game.box, 20, feasible=True)
+    curvature = [_curvatures(system, y) for y in points]
+    if min(float(np.linalg.eigvalsh(c).min()) for c in curvature) < -1e-6:
+        return Assumption(label, FAILS, "a constraint curves the other way at a sampled profile")
+    if game.kernels.__name__.startswith("gne_mj.games."):
+        return Assumption(label, MET, "they are affine")
+    return Assumption(label, ASSUMED, f"at {len(points)} sampled profiles, which is no proof")
+
+
 def pseudo_gradient(system: System, slopes: Slopes, strong: bool) -> Assumption:
     """[asmp:pseudo]: Lipschitz and strictly (a) or strongly (b) monotone."""
     label = f"asmp:pseudo({'b' if strong else 'a'})"

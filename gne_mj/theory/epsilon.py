@@ -11,8 +11,8 @@ import numpy as np
 
 from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InvalidInput
-from gne_mj.loops import monitor as watch
 from gne_mj.system import Clock, System
+from gne_mj.theory.trials import stays_inside
 
 # How the bracket's ends may differ, as a factor
 PRECISION = 1.01
@@ -64,7 +64,7 @@ def search_epsilon(
         if progress is not None:
             progress(f"{system.name}: trying epsilon = {epsilon:.4g} s")
         trial = replace(system, law=replace(law, epsilon=epsilon))
-        stayed = _stays_inside(trial, clock)
+        stayed = stays_inside(trial, clock)
         trials.append((epsilon, stayed))
         return stayed
 
@@ -102,10 +102,3 @@ def search_epsilon(
     )
     return EpsilonSearch(inside, outside, tuple(trials), note)
 
-
-def _stays_inside(system: System, clock: Clock) -> bool:
-    loop = system.closed_loop(clock)
-    total = clock.steps(clock.duration)
-    loop.advance(1, total)
-    loop.finish()
-    return bool(loop.monitor[watch.EXIT] == watch.INSIDE)

@@ -10,8 +10,9 @@ from gne_mj.game import Box
 from gne_mj.system import Clock, System
 from gne_mj.theory import verdict
 from gne_mj.theory.coupling import needed_connectivity
+from gne_mj.theory.held import Held
 from gne_mj.theory.periods import linear_period, push_period
-from gne_mj.theory.theorem import Theorem
+from gne_mj.theory.theorem import HELD, Theorem
 
 CONVENTION = "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2, where the paper's definition has mu/2"
 
@@ -35,6 +36,7 @@ class Guarantees:
     start: dict[str, Any]
     equilibrium: dict[str, Any]
     periods: dict[str, Any]
+    held: dict[str, Any] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
     measured: list[str]
@@ -49,6 +51,7 @@ class Guarantees:
 def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock."""
     theorem = Theorem(system)
+    held = Held(system, clock) if system.mode == "implicit" else None
     law, game = system.law, system.game
     return Guarantees(
         system={
@@ -62,7 +65,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "engine": system.engine,
             "limited_inputs": bool(np.any(np.isfinite(system.agents.input_limit))),
         },
-        status=theorem.status,
+        status=HELD if held is not None and held.promised else theorem.status,
         theorem={
             "name": theorem.name,
             "assumptions": [asdict(a) for a in theorem.assumptions],
@@ -90,14 +93,15 @@ def certify(system: System, clock: Clock) -> Guarantees:
         periods={
             "push": _at_both(system, push_period),
             "linear": _at_both(system, linear_period),
-            "control_period": clock.control_period if system.mode == "sampled" else None,
+            "control_period": None if system.mode == "continuous" else clock.control_period,
             "timestep": clock.timestep,
             "largest_timestep_for_estimates": system.largest_step(),
         },
+        held=None if held is None else {**held.report(), "period_search": None, "push_search": None},
         lyapunov_claimed=theorem.lyapunov,
-        guaranteed=verdict.guaranteed(theorem),
+        guaranteed=verdict.guaranteed(theorem, held),
         measured=verdict.measured(theorem),
-        not_certified=verdict.not_certified(theorem),
+        not_certified=verdict.not_certified(theorem, held),
     )
 
 

@@ -11,6 +11,8 @@ A gain k multiplies both forces; under partial information a coupling gain adds 
 of neighbours to the second.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,3 +51,30 @@ def linear_period(system: System, y: Array) -> float | None:
     values = np.linalg.eigvals(inverse[:, None] * matrix)
     values = values[values.real > 0]
     return float(np.min(2.0 * values.real / np.abs(values) ** 2, initial=np.inf))
+
+
+def least_rho(system: System, period: float, *, reserve: float = 2.0) -> float:
+    """The least penalty whose equilibrium a law that is held for ``period`` s keeps, by the rule.
+
+    Where a bound is active at the variational equilibrium, its distance shrinks with rho and the
+    barrier's slope there grows as 1/rho, so that an explicit law needs rho > (multiplier)^2 times
+    something of the order of the period. Searched down from the system's start of rho, with a
+    reserve of a factor in the period.
+    """
+    highest = system.rho if system.schedule is None else system.schedule.start
+
+    def keeps(rho: float) -> bool:
+        there = replace(system, rho=rho, schedule=None)
+        longest = linear_period(there, there.equilibrium.action)
+        return longest is None or longest >= reserve * period
+
+    low, high = 1e-9, highest
+    if keeps(low) or not keeps(high):
+        return low if keeps(low) else high
+    while high / low > 1.02:
+        middle = float(np.sqrt(low * high))
+        if keeps(middle):
+            high = middle
+        else:
+            low = middle
+    return high

@@ -16,6 +16,7 @@ from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.gain import Gain, required_gain
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
+HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.held
 THEOREMS = {
     FullInformation: "full information, lemma:FI and thm:FI",
     PartialInformation: "partial information, lemma:nonlinearPI and the theorem after it",
@@ -115,6 +116,10 @@ class Theorem:
         gain = self.gain
         if gain is not None and gain.least is not None and not gain.gain > gain.least:
             found.append(f"the gain k = {gain.gain:g} must exceed {gain.least:.6g}")
+        if self.system.schedule is not None:
+            found.append("the penalty changes in time, and the theorems have a constant one")
+        if self.system.faults:
+            found.append("the scenario has faults, and the theorems have none")
         return tuple(found)
 
     @property

@@ -6,6 +6,7 @@ import numpy as np
 
 from gne_mj.system import System
 from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.held import Held
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 
 
@@ -24,7 +25,7 @@ def epsilon_bounds(system: System) -> dict[str, Any]:
     }
 
 
-def guaranteed(theorem: Theorem) -> list[str]:
+def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     """What the theorem gives."""
     system = theorem.system
     bound = epsilon_bounds(system)
@@ -49,6 +50,12 @@ def guaranteed(theorem: Theorem) -> list[str]:
             f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}"
             f"{provided}",
         ]
+    if system.mode == "implicit" and held is not None and held.promised:
+        provided = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
+        return [
+            "at every control instant every shared constraint holds, from every interior start"
+            + (f", provided {' and '.join(provided)}" if provided else "")
+        ]
     if not theorem.obstacles:
         return ["nothing of this run; the same law in continuous time is covered by the theorem"]
     return ["nothing"]
@@ -64,17 +71,23 @@ def measured(theorem: Theorem) -> list[str]:
     return found
 
 
-def not_certified(theorem: Theorem) -> list[str]:
+def not_certified(theorem: Theorem, held: Held | None = None) -> list[str]:
     """What cannot be certified, and why."""
     found = list(theorem.obstacles)
     if not theorem.continuous:
-        sampled = theorem.system.mode != "continuous"
-        what = "mode 'sampled'" if sampled else "Euler's method"
-        found.append(f"{what}: every theorem is in continuous time, none covers this")
+        mode = theorem.system.mode
+        what = f"mode '{mode}'" if mode != "continuous" else "Euler's method"
+        found.append(f"{what}: every theorem of the paper is in continuous time, none covers this")
+    if held is not None:
+        found += [f"[{c.label}] {c.status}: {c.why}" for c in held.conditions if not c.granted]
+        found.append("between two control instants: measured, and reported if the set is left")
     if theorem.status == CONDITIONAL:
         found.append(
             "that the given epsilon is small enough; and a Lyapunov function: V's decrease is"
             " claimed of the limit epsilon -> 0 only"
         )
-    found.append("anything under pushes from outside, or inputs that saturate")
+    if held is None or held.system.disturbance is None:
+        found.append("anything under pushes from outside, or inputs that saturate")
+    else:
+        found.append("anything beyond the disturbances that the margin covers")
     return found

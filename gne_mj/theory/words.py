@@ -50,6 +50,8 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
     yield "sampling", _periods(g)
+    if g["held"] is not None:
+        yield from _held(g["held"])
     for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
     for n, sentence in enumerate(g["measured"]):
@@ -159,6 +161,7 @@ def _estimates(estimates: dict[str, Any]) -> str:
 
 def _periods(g: dict[str, Any]) -> str:
     periods = g["periods"]
+    needs = "an explicit law would need" if g["held"] is not None else "held inputs need"
     parts = []
     for key, name in (("push", "one push"), ("linear", "linearisation")):
         if periods[key]["start"] is not None:
@@ -167,7 +170,7 @@ def _periods(g: dict[str, Any]) -> str:
                 f" {periods[key]['equilibrium']:.3g} s at y*"
             )
     text = "; ".join(parts) or "no rule known for these agents"
-    text = f"held inputs need periods below (heuristics): {text}"
+    text = f"{needs} periods below (heuristics): {text}"
     if periods["control_period"] is not None:
         text += f"; the period here is {periods['control_period']:g} s"
     largest = periods["largest_timestep_for_estimates"]
@@ -175,6 +178,40 @@ def _periods(g: dict[str, Any]) -> str:
         text += f". Estimates under {g['system']['integrator']}: steps up to {largest:.3g} s"
         text += f", here {periods['timestep']:g} s"
     return text
+
+
+def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for condition in held["conditions"]:
+        yield f"[{condition['label']}]", f"{condition['status']}: {condition['why']}"
+    if held["disturbance"] is not None:
+        bound = held["disturbance"]
+        yield (
+            "margin",
+            f"covers a push of {max(bound['push']):g}, noise of {max(bound['noise']):g} and a delay"
+            f" of {bound['delay']} periods: outputs off by at most"
+            f" {max(held['prediction_error']):.4g},"
+            f" constraints tightened by up to {max(held['tightening']):.4g}",
+        )
+    if held["largest_push"] is not None:
+        yield "largest push", f"{held['largest_push']:.4g} on every agent at once is covered"
+    search = held["push_search"]
+    if search is not None:
+        least = search["smallest_breaking_push"]
+        if least is None:
+            text = f"none up to {search['largest_tried']:.4g} leaves the set"
+        else:
+            text = f"{least:.4g} leaves the set ({search['pattern']})"
+            if held["largest_push"]:
+                text += f"; the certified push is {held['largest_push'] / least:.0%} of it"
+        yield "adversarial search", f"{text}, by {search['runs']} runs from this start"
+    search = held["period_search"]
+    if search is not None:
+        inside, outside = search["inside"], search["outside"]
+        text = "none tried stays" if inside is None else f"up to {inside:.4g} s the run stays"
+        text += " inside between the instants too"
+        if outside is not None:
+            text += f", with {outside:.4g} s it does not"
+        yield "period, by trial", f"{text} ({search['note']})"
 
 
 def _number(value: float | None, form: str = ".6g") -> str:

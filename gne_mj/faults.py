@@ -1,0 +1,365 @@
+"""What can go wrong in a run, as users state it, and as native code reads it.
+
+Faults are deterministic: what is random follows from the run's seed, the fault's place in the list
+and the control period (pushes: the integration step).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.graph import Graph
+from gne_mj.loops import faults as native
+from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Faults
+
+SHAPES = {
+    "constant": native.STEADY,
+    "sine": native.SINE,
+    "square": native.SQUARE,
+    "random": native.RANDOM,
+}
+
+
+@dataclass(frozen=True)
+class Fault(ABC):
+    """One fault.
+
+    Args:
+        agents: whom it strikes, numbered from 0; all if left out.
+        start, end: from when (s) and until when, the end not included.
+    """
+
+    kind: ClassVar[int]
+    agents: tuple[int, ...] | None = None
+    start: float = 0.0
+    end: float = np.inf
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.start < self.end:
+            raise InvalidInput(
+                "faults.end", self.end, f"it must be later than the start, {self.start:g} s"
+            )
+
+    @property
+    @abstractmethod
+    def size(self) -> float:
+        """What stands in the column SIZE."""
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """The columns SHAPE and PERIOD."""
+        return 0.0, 0.0
+
+    def targets(self, game: Game, graph: Graph | None) -> list[int]:
+        """What it strikes: here all entries of the agents' actions."""
+        agents = range(game.agents) if self.agents is None else self.agents
+        for agent in agents:
+            if not 0 <= agent < game.agents:
+                raise InvalidInput(
+                    "faults.agents", agent + 1, f"agents are numbered 1 to {game.agents}"
+                )
+        at = game.data.offsets
+        return [r for i in agents for r in range(at[i], at[i + 1])]
+
+
+def _check_range(fault: Fault, key: str, low: float, high: float = np.inf) -> None:
+    value = getattr(fault, key)
+    if not low <= value <= high or not np.isfinite(value):
+        limits = f"between {low:g} and {high:g}" if np.isfinite(high) else f"at least {low:g}"
+        raise InvalidInput(f"faults.{key}", value, f"it must be {limits}, and finite")
+
+
+@dataclass(frozen=True)
+class Push(Fault):
+    """A force on the agents besides their input, in the input's unit, constant within a step.
+
+    Args:
+        force: its size; negative for the other direction.
+        profile: "constant", "sine" or "square" (with ``period`` in s), or "random" (uniform
+            between -force and force, anew at every integration step).
+        period: in s.
+    """
+
+    kind: ClassVar[int] = native.PUSH
+    force: float = 0.0
+    profile: str = "constant"
+    period: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "force", -1e9, 1e9)
+        if self.profile not in SHAPES:
+            raise InvalidInput("faults.profile", self.profile, f"choose from {', '.join(SHAPES)}")
+        if not 0.0 < self.period < np.inf:
+            raise InvalidInput("faults.period", self.period, "it must be positive and finite")
+
+    @property
+    def size(self) -> float:
+        """The force."""
+        return self.force
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """See the base class."""
+        return float(SHAPES[self.profile]), self.period
+
+
+@dataclass(frozen=True)
+class Saturation(Fault):
+    """Actuators that deliver less than they should.
+
+    Args:
+        limit: greatest |u| meanwhile, not negative; zero for none at all.
+    """
+
+    kind: ClassVar[int] = native.LIMIT
+    limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "limit", 0.0)
+
+    @property
+    def size(self) -> float:
+        """The limit."""
+        return self.limit
+
+
+@dataclass(frozen=True)
+class Noise(Fault):
+    """Outputs that are read with noise, uniform and independent from control period to period.
+
+    Args:
+        amplitude: greatest error, in the output's unit.
+    """
+
+    kind: ClassVar[int] = native.NOISE
+    amplitude: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "amplitude", 0.0)
+
+    @property
+    def size(self) -> float:
+        """The amplitude."""
+        return self.amplitude
+
+
+@dataclass(frozen=True)
+class Bias(Fault):
+    """Outputs that are read with a constant error.
+
+    Args:
+        offset: what is read less what is, in the output's unit.
+    """
+
+    kind: ClassVar[int] = native.BIAS
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "offset", -1e9, 1e9)
+
+    @property
+    def size(self) -> float:
+        """The offset."""
+        return self.offset
+
+
+@dataclass(frozen=True)
+class SensorDelay(Fault):
+    """All sensors of the system read what was some control periods ago, for the whole run.
+
+    Args:
+        periods: how many, a whole number.
+    """
+
+    kind: ClassVar[int] = -1  # no rows: it strikes everyone
+    periods: int = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "periods", 0, 1000)
+        if self.agents is not None or self.start > 0.0 or np.isfinite(self.end):
+            raise InvalidInput(
+                "faults.type", "sensor-delay", "it holds for all agents and for the whole run"
+            )
+
+    @property
+    def size(self) -> float:
+        """The delay."""
+        return float(self.periods)
+
+
+@dataclass(frozen=True)
+class _OnLinks(Fault):
+    """A fault of messages: over the links of ``edges``, and of all edges of ``agents``.
+
+    Args:
+        edges: pairs of agents, numbered from 0, both directions.
+    """
+
+    edges: tuple[tuple[int, int], ...] | None = None
+
+    def targets(self, game: Game, graph: Graph | None) -> list[int]:
+        """The links it strikes: entries of the graph's neighbour lists."""
+        if graph is None:
+            raise InvalidInput(
+                "faults.type", type(self).__name__, "the full-information law sends no messages"
+            )
+        super().targets(game, graph)
+        known = set(graph.edges)
+        for i, j in self.edges or ():
+            if (min(i, j), max(i, j)) not in known:
+                raise InvalidInput("faults.edges", [i + 1, j + 1], "the graph has no such edge")
+        everyone = self.agents is None and self.edges is None
+        struck = {frozenset(edge) for edge in self.edges or ()}
+        whom = set(self.agents or ())
+        links = []
+        data = graph.data
+        for i in range(graph.agents):
+            for link in range(data.pointer[i], data.pointer[i + 1]):
+                j = int(data.neighbour[link])
+                if everyone or frozenset((i, j)) in struck or i in whom or j in whom:
+                    links.append(link)
+        return links
+
+
+@dataclass(frozen=True)
+class MessageLoss(_OnLinks):
+    """Messages that do not arrive, each one with a probability; the receiver keeps the last one.
+
+    Args:
+        probability: between 0 and 1.
+    """
+
+    kind: ClassVar[int] = native.LOSS
+    probability: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "probability", 0.0, 1.0)
+
+    @property
+    def size(self) -> float:
+        """The probability."""
+        return self.probability
+
+
+@dataclass(frozen=True)
+class MessageDelay(_OnLinks):
+    """Messages that arrive some control periods late.
+
+    Args:
+        periods: how many, a whole number.
+    """
+
+    kind: ClassVar[int] = native.LATE
+    periods: int = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "periods", 0, 1000)
+
+    @property
+    def size(self) -> float:
+        """The delay."""
+        return float(self.periods)
+
+
+@dataclass(frozen=True)
+class Silence(_OnLinks):
+    """Edges over which nothing comes, or agents who neither send nor hear, for a while."""
+
+    kind: ClassVar[int] = native.SILENCE
+
+    @property
+    def size(self) -> float:
+        """None."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Corruption(Fault):
+    """The agents' estimates shifted once, at ``start``, each by a random number.
+
+    Args:
+        amplitude: greatest shift, in the action's unit.
+    """
+
+    kind: ClassVar[int] = native.CORRUPTION
+    amplitude: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_range(self, "amplitude", 0.0)
+
+    @property
+    def size(self) -> float:
+        """The amplitude."""
+        return self.amplitude
+
+    def targets(self, game: Game, graph: Graph | None) -> list[int]:
+        """The agents themselves."""
+        if graph is None:
+            raise InvalidInput(
+                "faults.type", "estimate-corruption", "the full-information law has no estimates"
+            )
+        super().targets(game, graph)
+        return list(range(game.agents) if self.agents is None else self.agents)
+
+
+MESSAGES = (MessageLoss, MessageDelay, Silence)
+
+
+def sensor_delay(faults: Sequence[Fault]) -> int:
+    """By how many control periods sensors are late."""
+    return max((fault.periods for fault in faults if isinstance(fault, SensorDelay)), default=0)
+
+
+def message_delay(faults: Sequence[Fault]) -> int:
+    """By how many control periods messages are late at most."""
+    return max((fault.periods for fault in faults if isinstance(fault, MessageDelay)), default=0)
+
+
+def strikes_messages(faults: Sequence[Fault]) -> bool:
+    """Whether what agents hear must be kept link by link."""
+    return any(isinstance(fault, MESSAGES) for fault in faults)
+
+
+def for_native(faults: Sequence[Fault], game: Game, graph: Graph | None, seed: int) -> Faults:
+    """The faults as a run reads them; their random numbers follow from ``seed``."""
+    rows: list[list[float]] = []
+    counts = np.zeros(FAULT_KINDS, dtype=np.int64)
+    for kind in range(FAULT_KINDS):
+        for stream, fault in enumerate(faults):
+            if fault.kind != kind:
+                continue
+            for target in fault.targets(game, graph):
+                rows.append([target, fault.start, fault.end, fault.size, *fault.shape, stream])
+                counts[kind] += 1
+    pointer = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    table = np.array(rows, dtype=np.float64).reshape(-1, FAULT_COLUMNS)
+    numbers = np.array([seed, sensor_delay(faults), message_delay(faults)], dtype=np.float64)
+    return Faults(table, pointer, numbers)
+
+
+def links_memory(
+    graph: Graph, actions: int, memory: NDArray[np.float64], delay: int
+) -> NDArray[np.float64]:
+    """What a law's memory needs behind it where messages can be lost or late, flat.
+
+    Over every link the sender's row, as if it had come just before the start; then room for the
+    rows sent during the last ``delay`` + 1 control periods.
+    """
+    rows = memory[: graph.agents * actions].reshape(graph.agents, actions)
+    return np.concatenate(
+        [rows[graph.data.neighbour].ravel(), np.tile(rows, (delay + 1, 1)).ravel()]
+    )

@@ -1,0 +1,241 @@
+"""Faults as a run meets them: pushes, limits, sensors, messages, corrupted estimates.
+
+Everything random is a function of seed, fault, target and step alone, so that a run repeats to the
+last bit however it is cut into pieces. See :mod:`gne_mj.faults` for what users write.
+
+Where sensors are late, ``work.history`` holds the flat states at the last control instants and
+behind them the inputs of those periods, as rings. Where messages can be lost or late, the law's
+memory has what came last over every link, and behind it a ring of the rows that were sent.
+"""
+
+import numpy as np
+
+from gne_mj.controllers.settings import DEALT, LINKS, PENALTY, SHELL, SHELL_VALUE
+from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS
+from gne_mj.native import copy, kernel
+from gne_mj.plants.held_map import roll
+
+# Kinds of rows, in their order in ``Faults.rows``
+PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
+# Columns: channel, link or agent; from and until when in s; how much; a push's shape and its
+# period in s; which random numbers
+TARGET, START, END, SIZE, SHAPE, PERIOD, STREAM = range(FAULT_COLUMNS)
+STEADY, SINE, SQUARE, RANDOM = range(4)
+# Entries of ``Faults.numbers``; delays in control periods
+SEED, SENSOR_DELAY, MESSAGE_DELAY, NUMBERS = range(4)
+
+_GOLDEN, _FIRST, _SECOND = (
+    np.uint64(0x9E3779B97F4A7C15),
+    np.uint64(0xBF58476D1CE4E5B9),
+    np.uint64(0x94D049BB133111EB),
+)
+
+
+@kernel
+def _mix(z):
+    """The finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014)."""
+    z = (z ^ (z >> np.uint64(30))) * _FIRST
+    z = (z ^ (z >> np.uint64(27))) * _SECOND
+    return z ^ (z >> np.uint64(31))
+
+
+@kernel
+def uniform(seed, stream, target, count):
+    """A number in [0, 1) that depends on these four whole numbers alone."""
+    z = _mix(np.uint64(np.int64(seed)) + _GOLDEN)
+    z = _mix(z ^ (np.uint64(np.int64(stream)) * _GOLDEN + _GOLDEN))
+    z = _mix(z ^ (np.uint64(np.int64(target)) * _GOLDEN + _GOLDEN))
+    z = _mix(z ^ (np.uint64(np.int64(count)) * _GOLDEN + _GOLDEN))
+    return np.float64(z >> np.uint64(11)) * 2.0**-53
+
+
+@kernel
+def active(row, time):
+    """Whether a fault is on; half a nanosecond of rounding does not count."""
+    return row[START] <= time + 5e-10 and time + 5e-10 < row[END]
+
+
+@kernel
+def spread(faults, row, count):
+    """A random number between -1 and 1 for this row and step."""
+    return 2.0 * uniform(faults.numbers[SEED], row[STREAM], row[TARGET], count) - 1.0
+
+
+@kernel
+def count_of(clock, step):
+    """Which control period a step belongs to (which step, in mode continuous)."""
+    return step if clock.mode == 0 else step // clock.period
+
+
+@kernel
+def begin(agent, problem, clock, step, stage, state, memory, work):
+    """What happens before the law acts: sensors read, estimates corrupted, messages exchanged."""
+    m, count = len(work.y), count_of(clock, step)
+    fresh = stage == 0 and work.now[DEALT] <= step
+    if stage == 0:
+        work.now[DEALT] = step + 1.0
+    read_sensors(agent, problem, clock, count, step, state, work)
+    if len(memory) > 0:
+        if fresh:
+            corrupt(problem, clock, count, step, m, memory)
+        if problem.settings[LINKS] > 0.0:
+            exchange(problem, clock, count, step, memory, work)
+
+
+@kernel
+def read_sensors(agent, problem, clock, count, step, state, work):
+    """Fill work.seen (m,) with the outputs as they are read, which may be of some periods ago."""
+    faults, m, time = problem.faults, len(work.y), step * clock.h
+    delay = int(faults.numbers[SENSOR_DELAY])
+    if delay > 0:
+        slots = delay + 1
+        size = (len(work.history) // slots) - m
+        states = size // m
+        at = (count % slots) * size
+        copy(state[:size], work.history[at : at + size])
+        at = (max(count - delay, 0) % slots) * size
+        for r in range(m):
+            work.seen[r] = work.history[at + r * states + agent.OUTPUT]
+    else:
+        copy(work.y, work.seen)
+    for f in range(faults.pointer[NOISE], faults.pointer[NOISE + 1]):
+        row = faults.rows[f]
+        if active(row, time):
+            work.seen[int(row[TARGET])] += row[SIZE] * spread(faults, row, count)
+    for f in range(faults.pointer[BIAS], faults.pointer[BIAS + 1]):
+        row = faults.rows[f]
+        if active(row, time):
+            work.seen[int(row[TARGET])] += row[SIZE]
+
+
+@kernel
+def corrupt(problem, clock, count, step, m, memory):
+    """Once, at the first control instant at or after a fault's start, shift an agent's estimates."""
+    faults, time = problem.faults, step * clock.h
+    for f in range(faults.pointer[CORRUPTION], faults.pointer[CORRUPTION + 1]):
+        row = faults.rows[f]
+        long = clock.h if clock.mode == 0 else clock.h * clock.period
+        if row[START] <= time + 5e-10 and time + 5e-10 < row[START] + long:
+            i = int(row[TARGET])
+            for r in range(m):
+                if problem.data.owner[r] != i:
+                    shift = 2.0 * uniform(faults.numbers[SEED], row[STREAM], i * m + r, 0) - 1.0
+                    memory[i * m + r] += row[SIZE] * shift
+
+
+@kernel
+def exchange(problem, clock, count, step, memory, work):
+    """Send all rows; over each link comes what was sent some periods ago, or nothing."""
+    data, graph, faults = problem.data, problem.graph, problem.faults
+    agents, m, time = len(data.offsets) - 1, len(work.y), step * clock.h
+    links = int(problem.settings[LINKS])
+    ring, slots = links + len(graph.neighbour) * m, int(faults.numbers[MESSAGE_DELAY]) + 1
+    at = ring + (count % slots) * agents * m
+    for r in range(m):
+        memory[data.owner[r] * m + r] = work.seen[r]
+    copy(memory[: agents * m], memory[at : at + agents * m])
+    for link in range(len(graph.neighbour)):
+        delay, comes = 0, True
+        for f in range(faults.pointer[LATE], faults.pointer[LATE + 1]):
+            row = faults.rows[f]
+            if row[TARGET] == link and active(row, time):
+                delay = max(delay, int(row[SIZE]))
+        for f in range(faults.pointer[LOSS], faults.pointer[LOSS + 1]):
+            row = faults.rows[f]
+            if row[TARGET] == link and active(row, time):
+                chance = uniform(faults.numbers[SEED], row[STREAM], link, count)
+                comes = comes and chance >= row[SIZE]
+        for f in range(faults.pointer[SILENCE], faults.pointer[SILENCE + 1]):
+            row = faults.rows[f]
+            comes = comes and not (row[TARGET] == link and active(row, time))
+        if comes and count >= delay:
+            sent = ring + ((count - delay) % slots) * agents * m + graph.neighbour[link] * m
+            copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
+
+
+@kernel
+def sense(game, problem, clock, step, stage, work, y, seen):
+    """The outputs (m,) that the law sees: ``seen``. Fills the barrier's weights there."""
+    rho, data = work.now[PENALTY], problem.data
+    work.now[SHELL] = -1.0
+    for k in range(len(work.weights)):
+        room = -game.constraint(data.parameters, k, seen) - data.tightening[k]
+        work.weights[k] = rho / room
+        if not room > 0.0 and work.now[SHELL] < 0.0:
+            work.now[SHELL], work.now[SHELL_VALUE] = float(k), -room
+    return seen
+
+
+@kernel
+def sense_state(agent, problem, channels, clock, step, work, state, known, scratch):
+    """The flat state as the law has it: ``known``, filled.
+
+    A state of some periods ago is moved on by the plant's map under the inputs asked for since.
+    """
+    faults, count = problem.faults, count_of(clock, step)
+    m, states = channels.rest.shape
+    delay = int(faults.numbers[SENSOR_DELAY])
+    late, size, slots = min(delay, count), m * states, delay + 1
+    if delay > 0:
+        at = ((count - late) % slots) * size
+        copy(work.history[at : at + size], known)
+    else:
+        copy(state[: m * states], known)
+    for r in range(m):
+        known[r * states + agent.OUTPUT] = work.seen[r]
+    for ago in range(late):
+        at = slots * size + ((count - late + ago) % slots) * m
+        roll(agent, channels, clock, known, work.history[at : at + m], scratch)
+    return known
+
+
+@kernel
+def deliver(problem, clock, step, stage, work):
+    """Fill work.u with the demand within the limits of now."""
+    faults, m, time = problem.faults, len(work.u), step * clock.h
+    for r in range(m):
+        limit = problem.limit[r]
+        for f in range(faults.pointer[LIMIT], faults.pointer[LIMIT + 1]):
+            row = faults.rows[f]
+            if row[TARGET] == r and active(row, time):
+                limit = min(limit, row[SIZE])
+        work.u[r] = min(max(work.demand[r], -limit), limit)
+    delay = int(faults.numbers[SENSOR_DELAY])
+    if delay > 0:
+        slots = delay + 1
+        size = (len(work.history) // slots) - m
+        at = slots * size + (count_of(clock, step) % slots) * m
+        copy(work.u, work.history[at : at + m])
+
+
+@kernel
+def push(problem, clock, step, u, acts):
+    """What acts on the plant during a step under the input u (m,): ``acts``, u with all pushes."""
+    faults, time = problem.faults, step * clock.h
+    copy(u, acts)
+    for f in range(faults.pointer[PUSH], faults.pointer[PUSH + 1]):
+        row = faults.rows[f]
+        if active(row, time):
+            phase = 0.0
+            if row[PERIOD] > 0.0:
+                phase = (time - row[START]) / row[PERIOD]
+            size = row[SIZE]
+            if row[SHAPE] == SINE:
+                size *= np.sin(2.0 * np.pi * phase)
+            elif row[SHAPE] == SQUARE:
+                size *= 1.0 if np.floor(2.0 * phase) % 2.0 == 0.0 else -1.0
+            elif row[SHAPE] == RANDOM:
+                size *= spread(faults, row, step)
+            acts[int(row[TARGET])] += size
+    return acts
+
+
+@kernel
+def record(agent, problem, clock, step, state, u, work, seen, acts):
+    """Fill rows (m,) with what the law has seen for the input u of this step, and what acts."""
+    copy(work.seen, seen)
+    if clock.mode == 0:  # the look may have been at a later stage, with the step's own errors
+        states = len(state) // len(u)
+        for r in range(len(u)):
+            seen[r] += state[r * states + agent.OUTPUT] - work.y[r]
+    push(problem, clock, step, u, acts)

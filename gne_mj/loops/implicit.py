@@ -1,0 +1,150 @@
+"""Mode implicit: the input that is held is the law at the outputs which that input produces.
+
+At a control instant the plant's own discrete map over the coming period, substeps included, is
+evaluated under a trial input and taken as base + slope u, channel by channel; the barrier's
+equation is solved exactly for that map (``acting.solve``); the map is evaluated again under the
+result, its slope corrected by the secant, and so on until prediction and solution agree. For one
+Euler step the map is affine in u and one evaluation is enough. Since every solution is strictly
+inside, so are the outputs at the next control instant, as long as the plant does what its map says
+and the input that is delivered is the one asked for.
+"""
+
+import numpy as np
+
+from gne_mj.controllers.settings import SHELL, SHELL_VALUE
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.feedback import usable
+from gne_mj.loops.newton import FOUND, OUTSIDE, STEPS, UNSOLVED, solver_in
+from gne_mj.native import copy, kernel
+
+# The map may be linearised so often; predictions agree if no constraint differs by more than this
+# part of the distance to its bound
+MOST_MAPS = 12
+AGREES = 1e-7
+# Where the map is affine in u, a prediction that moves farther than this is checked all the same:
+# the slope has rounding
+FAR = 1e-2
+
+
+@kernel
+def act(
+    acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
+    state, memory, work, monitor,
+):  # fmt: skip
+    """Fill work.demand; False, with the exit latched, if there is no input."""
+    m, states = channels.rest.shape
+    p, b = len(work.g), problem.order.band[0]
+    solver = solver_in(work.solver, m, p, states, b)
+    found = solver.numbers[FOUND]
+    if found > 0.0:
+        watch.compare(monitor, time, work.y, solver.ahead)
+    faults.sense(game, problem, clock, step, stage, work, work.y, work.seen)
+    known = faults.sense_state(
+        agent, problem, channels, clock, step, work, state, solver.state, solver.scratch
+    )
+    if found == 0.0:
+        find_slopes(plant, context, agent, channels, clock, known, solver)
+    # where the inputs so far lead to
+    smooth = found >= 3.0
+    for r in range(m):
+        solver.anchor[r] = known[r * states + agent.OUTPUT]
+        last, before, earlier = solver.held[r], solver.before[r], solver.earlier[r]
+        solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
+        solver.before[r], solver.earlier[r] = last, before
+    if found == 0.0:
+        copy(solver.anchor, solver.ahead)
+    solver.numbers[FOUND] += 1.0
+    solver.numbers[STEPS] = 0.0
+    map_ahead(plant, context, agent, channels, clock, known, solver)
+    copy(solver.reached, solver.y)
+    ended, agreed, least = OUTSIDE, False, np.inf
+    for _ in range(MOST_MAPS):
+        for r in range(m):
+            solver.base[r] = solver.reached[r] - solver.slope[r] * solver.u[r]
+        ended = acting.solve(law, game, problem, b, memory, work, solver)
+        if ended == OUTSIDE:
+            break
+        farthest = 0.0
+        for r in range(m):
+            solver.held[r] = (solver.y[r] - solver.base[r]) * solver.stiff[r]
+            farthest = max(farthest, abs(solver.y[r] - solver.reached[r]))
+        if farthest < FAR and plant.is_affine(agent, clock):
+            agreed = True
+            break
+        for r in range(m):
+            solver.u[r], solver.held[r] = solver.held[r], solver.u[r]
+            solver.ahead[r] = solver.reached[r]
+        map_ahead(plant, context, agent, channels, clock, known, solver)
+        least = correct_slopes(solver)
+        copy(solver.u, solver.held)
+        agreed = agrees(game, problem, solver)
+        if agreed:
+            copy(solver.reached, solver.y)
+            break
+    law.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
+    for r in range(m):
+        solver.ahead[r], work.demand[r] = solver.y[r], solver.held[r]
+    watch.count_solution(monitor, time, solver.numbers[STEPS], agreed and ended < UNSOLVED, least)
+    if ended == OUTSIDE:
+        constraint = int(work.now[SHELL])
+        watch.leave(
+            monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now[SHELL_VALUE], stage
+        )
+        return False
+    return usable(time, stage, work, monitor)
+
+
+@kernel
+def map_ahead(plant, context, agent, channels, clock, known, solver):
+    """Fill solver.reached with the outputs that the plant's map reaches under solver.u."""
+    plant.predict(
+        context, agent, channels, clock, known, solver.u, solver.reached, solver.rolled,
+        solver.scratch,
+    )  # fmt: skip
+
+
+@kernel
+def find_slopes(plant, context, agent, channels, clock, known, solver):
+    """Fill the slopes from the map under two inputs: exact where it is affine."""
+    for r in range(len(solver.u)):
+        solver.u[r] = 0.0
+    map_ahead(plant, context, agent, channels, clock, known, solver)
+    copy(solver.reached, solver.y)
+    for r in range(len(solver.u)):
+        solver.u[r] = 1.0
+    map_ahead(plant, context, agent, channels, clock, known, solver)
+    for r in range(len(solver.u)):
+        solver.slope[r] = solver.reached[r] - solver.y[r]
+        solver.stiff[r] = 1.0 / solver.slope[r]
+
+
+@kernel
+def correct_slopes(solver):
+    """Slopes by the secants from (held, ahead) to (u, reached); returns the least secant.
+
+    A secant that is not positive is not taken: the equation would not be monotone.
+    """
+    least = np.inf
+    for r in range(len(solver.u)):
+        change = solver.u[r] - solver.held[r]
+        moved = solver.reached[r] - solver.ahead[r]
+        # of a short way rounding is all that is seen
+        if abs(moved) > 1e-9 * (1.0 + abs(solver.reached[r])) and change != 0.0:
+            secant = moved / change
+            least = min(least, secant / solver.slope[r])
+            if 0.0 < secant < np.inf:
+                solver.slope[r] = secant
+                solver.stiff[r] = 1.0 / secant
+    return least
+
+
+@kernel
+def agrees(game, problem, solver):
+    """Whether the outputs reached have nearly the distances to all bounds of those solved for."""
+    data = problem.data
+    for k in range(len(solver.inverse)):
+        room = -game.constraint(data.parameters, k, solver.reached) - data.tightening[k]
+        meant = -game.constraint(data.parameters, k, solver.y) - data.tightening[k]
+        if not abs(room - meant) <= AGREES * abs(meant):
+            return False
+    return True

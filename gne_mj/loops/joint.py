@@ -1,0 +1,107 @@
+"""Mode implicit, all agents' inputs together: the law as it stands at the outputs it produces.
+
+u = -pull(y+) - dphi(y+) with y+ = base + slope u is strongly monotone in y+ wherever all slopes are
+positive, so that it has one solution, strictly inside.
+"""
+
+import sys
+
+from gne_mj.controllers.settings import GAIN, PENALTY, SHELL, SHELL_VALUE
+from gne_mj.loops import implicit
+from gne_mj.loops.newton import newton, solver_length
+from gne_mj.native import kernel
+
+__all__ = ["act", "solver_length"]
+
+_EQUATION = sys.modules[__name__]
+
+
+@kernel
+def act(
+    faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage, state,
+    memory, work, monitor,
+):  # fmt: skip
+    """See :func:`gne_mj.loops.implicit.act`."""
+    return implicit.act(
+        _EQUATION, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
+        stage, state, memory, work, monitor,
+    )  # fmt: skip
+
+
+@kernel
+def solve(law, game, problem, b, memory, work, solver):
+    """Fill solver.y from solver.base and solver.slope; returns how that ended."""
+    agents = len(problem.data.offsets) - 1
+    return newton(_EQUATION, law, game, problem, 0, agents, b, True, memory, work, solver)
+
+
+@kernel
+def row_of(problem, first, r):
+    """The matrix's row of action r, ordered for a narrow band."""
+    return problem.order.position[r]
+
+
+@kernel
+def residual(law, game, problem, first, last, memory, work, solver):
+    """Fill solver.residual at solver.trial; False if that is not strictly inside."""
+    data, y, column, within = problem.data, solver.trial, problem.order.column, problem.order.within
+    weight = problem.settings[GAIN] * work.now[PENALTY]
+    for k in range(len(solver.inverse)):
+        room = -game.constraint(data.parameters, k, y) - data.tightening[k]
+        if not room > 0.0:
+            work.now[SHELL] = k
+            work.now[SHELL_VALUE] = -room
+            return False
+        solver.inverse[k] = 1.0 / room
+    law.prepare(problem, first, last, y, memory)
+    for a in range(len(y)):
+        pull = law.pull(game, problem, data.owner[a], a, y, memory)
+        solver.residual[a] = (y[a] - solver.base[a]) * solver.stiff[a] + pull
+    for entry in range(len(column)):  # one loop without others inside is twice as fast
+        k, a = within[entry], column[entry]
+        slope = game.constraint_gradient(data.parameters, k, a, y)
+        solver.jacobian[entry] = slope
+        solver.residual[a] += weight * solver.inverse[k] * slope
+    return True
+
+
+@kernel
+def assemble(law, game, problem, first, last, b, memory, work, solver):
+    """Fill the band with the residual's derivative where it was evaluated last."""
+    data, y, start, column = problem.data, solver.trial, problem.order.start, problem.order.column
+    at, position, band = data.offsets, problem.order.position, solver.band
+    scale = problem.settings[GAIN] * work.now[PENALTY]
+    for a in range(len(y)):
+        i, r = data.owner[a], position[a]
+        for c in range(2 * b + 1):
+            band[r, c] = 0.0
+        band[r, b] = solver.stiff[a]
+        law.add_pull_slope(game, problem, i, a, y, memory, solver.row)
+        for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+            j = data.cost_index[member]
+            for c in range(at[j], at[j + 1]):
+                band[r, position[c] - r + b] += solver.row[c]
+                solver.row[c] = 0.0
+    for k in range(len(solver.inverse)):
+        inverse = solver.inverse[k]
+        weight = scale * inverse
+        for entry in range(start[k], start[k + 1]):
+            a = column[entry]
+            r, slope = position[a], solver.jacobian[entry] * inverse
+            for other in range(start[k], start[k + 1]):
+                c = column[other]
+                second = game.constraint_hessian(data.parameters, k, a, c, y)
+                second += slope * solver.jacobian[other]
+                band[r, position[c] - r + b] += weight * second
+
+
+@kernel
+def local_length(problem, first, last, step, solver):
+    """Greatest change of a constraint by an action's step, relative to the distance to its bound."""
+    order, greatest = problem.order, 0.0
+    for entry in range(len(order.column)):
+        change = solver.jacobian[entry] * step[order.position[order.column[entry]]]
+        change = abs(change) * solver.inverse[order.within[entry]]
+        if not change <= greatest:
+            greatest = change
+    return greatest

@@ -1,0 +1,245 @@
+"""How far to stay from the bounds so that pushes, noise and delay cannot carry agents across.
+
+In mode implicit the outputs expected at the next control instant are strictly inside whatever the
+state is. What really is reached differs from them by what the prediction does not know: pushes
+since the measured state, and the error of the measured output. Both act through the plant's
+discrete map. With |dx(k+1)| <= A |dx(k)| + b |push|, A and b bounding the absolute values of the
+map's derivatives over all states, the outputs differ by at most ``push_gain * push + noise_gain *
+noise``; a barrier of g + t < 0 with t at least what such a difference can add to g then keeps
+g < 0 at every control instant.
+"""
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.plants import mixed
+from gne_mj.plants.agents import Agents, input_columns
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Bounds on what is not modelled.
+
+    Args:
+        push: greatest force on each channel besides its input, (m,), in the input's unit.
+        noise: greatest error of each output that is read, (m,).
+        delay: by how many control periods sensors are late.
+    """
+
+    push: Array
+    noise: Array
+    delay: int = 0
+
+    def __post_init__(self) -> None:
+        for key in ("push", "noise"):
+            value = np.asarray(getattr(self, key), dtype=np.float64)
+            if np.any(value < 0) or not np.all(np.isfinite(value)):
+                raise InvalidInput(f"margin.{key}", value, "it must be finite and not negative")
+        if self.delay < 0:
+            raise InvalidInput("margin.delay", self.delay, "it must not be negative")
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """What disturbances, and inputs, do to the outputs at the next control instant.
+
+    Attributes:
+        push_gain, noise_gain: (m,) bounds of |dy+| for a push of at most 1 and a reading that is
+            wrong by at most 1.
+        least_slope: (m,) lower bound of dy+/du over all states, of one control period.
+        exact: whether the slopes are exact, since the agents are linear.
+    """
+
+    push_gain: Array
+    noise_gain: Array
+    least_slope: Array
+    exact: bool
+
+    def of(self, disturbance: Disturbance) -> Array:
+        """Bounds of |y - predicted y| at a control instant, shape (m,)."""
+        return self.push_gain * disturbance.push + self.noise_gain * disturbance.noise
+
+
+def influence(
+    agents: Agents, timestep: float, integrator: str, period: int, delay: int = 0
+) -> Influence:
+    """Bounds for a control period of so many steps, predicted from a state ``delay`` periods old.
+
+    Args:
+        agents: known as ODEs.
+        timestep: in s.
+        integrator: "euler" or "rk4".
+        period: steps in a control period.
+        delay: in control periods.
+
+    Raises:
+        InvalidInput: agents of which no ODE is known.
+    """
+    if not hasattr(agents.kind, "rate"):
+        raise InvalidInput(
+            "margin",
+            agents.kind.NAME,
+            "margins follow from the agents' ODE, and of these robots none is known",
+        )
+    gains = np.zeros((3, agents.channels))
+    known: dict[bytes, tuple[float, float, float]] = {}
+    exact = True
+    for r, row in enumerate(agents.parameters):
+        key = row.tobytes()
+        if key not in known:
+            channel = _Channel(*_kind_of(agents.kind, row), timestep, integrator)
+            exact = exact and channel.linear
+            known[key] = (*channel.gains(period * (delay + 1)), channel.least_slope(period))
+        gains[:, r] = known[key]
+    return Influence(*gains, exact)
+
+
+def tightening(game: Game, error: Array) -> Array:
+    """How much a difference of outputs of at most ``error`` (m,) can add to g, shape (p,).
+
+    Exact for affine constraints; for bounds on gaps t is such that |gap|^2 <= delta^2 - t leaves
+    room for the greatest change of the gap.
+
+    Raises:
+        InvalidInput: constraints of another form, or an error as great as a bound on a gap.
+    """
+    y = np.zeros(game.actions) if game.box is None else 0.5 * (game.box[0] + game.box[1])
+    if game.gap_bounds is not None:
+        t = np.zeros(game.constraints_count)
+        for k, bound in enumerate(game.gap_bounds):
+            weights = np.zeros(game.constraints_count)
+            weights[k] = 0.5
+            form = np.abs(game.weighted_constraint_hessian(y, weights))
+            change = float(np.sqrt(error @ form @ error))
+            if change >= bound:
+                raise InvalidInput(
+                    "margin",
+                    f"{change:.4g} of '{game.constraint_names[k]}'",
+                    f"disturbances could use up all of the bound, {bound:g}; a shorter control"
+                    " period or smaller disturbances leave room",
+                )
+            t[k] = 2.0 * bound * change - change**2
+        return t
+    if np.any(game.weighted_constraint_hessian(y, np.ones(game.constraints_count))):
+        raise InvalidInput(
+            "margin", game.name, "margins are computed for affine constraints and bounds on gaps"
+        )
+    return np.abs(game.constraint_jacobian(y)) @ error
+
+
+def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Array) -> float:
+    """The greatest push, the same on all channels, that a tightening t (p,) covers; 0 if none.
+
+    Noise and delay are those of ``disturbance``.
+    """
+
+    def covered(push: float) -> bool:
+        error = effect.of(Disturbance(np.full(game.actions, push), disturbance.noise))
+        try:
+            return bool(np.all(tightening(game, error) <= t * (1.0 + 1e-12)))
+        except InvalidInput:
+            return False
+
+    if not np.all(t > 0) or not covered(0.0):
+        return 0.0
+    low, high = 0.0, 1e-6
+    while covered(high):
+        low, high = high, 4.0 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if covered(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _kind_of(kind: ModuleType, row: Array) -> tuple[ModuleType, Array]:
+    """A channel's own type and numbers, also in a mixed fleet."""
+    if kind is not mixed:
+        return kind, row
+    own = mixed.TYPES[int(row[0])]
+    return own, row[1 : 1 + len(own.PARAMETERS)]
+
+
+class _Channel:
+    """Bounds of one channel's discrete map dx(k+1) = A dx(k) + b du over all states."""
+
+    def __init__(self, kind: ModuleType, q: Array, h: float, integrator: str) -> None:
+        self._output, n = kind.OUTPUT, len(kind.STATES)
+        column = input_columns(kind, q[None])[0]
+        slopes = []
+        # A spring's slope lies between those at rest and far out, and the map is affine in it.
+        for x in (np.zeros(n), np.full(n, np.inf)):
+            slope = np.zeros((n, n))
+            kind.jacobian(q, x, slope)
+            slopes.append(slope)
+        self.linear = bool(np.array_equal(*slopes))
+        positions = list(getattr(kind, "POSITIONS", ()))
+        steps = [_step(slope, column, h, integrator, positions) for slope in slopes]
+        self._exact = steps[0]
+        if integrator == "rk4" and not self.linear:
+            # Stages with slopes of their own: absolute values bound every mixture of them.
+            steps = [_step(np.abs(slope), np.abs(column), h, "rk4", []) for slope in slopes]
+        identity = np.eye(n)
+        self._a = np.max([np.abs(a) for a, _ in steps], axis=0)
+        self._change = np.max([np.abs(a - identity) for a, _ in steps], axis=0)
+        self._b = np.max([np.abs(b) for _, b in steps], axis=0)
+        self._free = h * column[self._output]
+
+    def gains(self, steps: int) -> tuple[float, float]:
+        """Bounds of |dy| for a push of at most 1 held any way, and for an output read wrong by 1."""
+        pushed, read = np.zeros_like(self._b), np.zeros_like(self._b)
+        read[self._output] = 1.0
+        if self.linear:
+            a, b = self._exact
+            response, total = b, np.zeros_like(b)
+            for _ in range(steps):
+                total += np.abs(response)
+                response, read = a @ response, a @ read
+            return float(total[self._output]), float(abs(read[self._output]))
+        for _ in range(steps):
+            pushed, read = self._a @ pushed + self._b, self._a @ read
+        return float(pushed[self._output]), float(read[self._output])
+
+    def least_slope(self, steps: int) -> float:
+        """A lower bound of dy/du for an input held so long: exact where the map is linear.
+
+        What the input alone does, h G a step, less the most that all else can take away again.
+        """
+        if self.linear:
+            a, b = self._exact
+            x = np.zeros_like(b)
+            for _ in range(steps):
+                x = a @ x + b
+            return float(x[self._output])
+        size, taken = np.zeros_like(self._b), 0.0
+        for _ in range(steps):
+            taken += float(self._change[self._output] @ size)
+            size = self._a @ size + self._b
+        return float(steps * (2.0 * self._free - self._b[self._output]) - taken)
+
+
+def _step(
+    slope: Array, column: Array, h: float, integrator: str, positions: list[int]
+) -> tuple[Array, Array]:
+    """One integration step's derivatives to state and input, where x' has ``slope``, ``column``."""
+    identity = np.eye(len(slope))
+    if integrator == "rk4":
+        z = h * slope
+        second = z @ z
+        a = identity + z + second / 2.0 + second @ z / 6.0 + second @ second / 24.0
+        b = h * (identity + z / 2.0 + second / 6.0 + second @ z / 24.0) @ column
+        return a, b
+    a, b = identity + h * slope, h * column
+    # Semi-implicit: positions move by the new velocities.
+    a[positions] = identity[positions] + h * slope[positions] @ a
+    b[positions] = h * slope[positions] @ b
+    return a, b

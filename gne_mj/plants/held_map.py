@@ -1,0 +1,38 @@
+"""The plant's own discrete map over a control period, for agents that are known as ODEs.
+
+It serves the ODE engine and the fleets that MuJoCo moves in the same way.
+"""
+
+from gne_mj.native import copy, kernel
+from gne_mj.plants.ode import held_step
+
+
+@kernel
+def roll(agent, channels, clock, state, u, scratch):
+    """Move the flat state by one control period under the held input u (m,)."""
+    states = channels.rest.shape[1]
+    for _ in range(clock.period):
+        held_step(agent, channels.parameters, states, clock.method, clock.h, state, u, scratch)
+
+
+@kernel
+def predict(context, agent, channels, clock, state, u, out, trial, scratch):
+    """Fill out (m,) with the outputs after a control period from a flat state under u (m,).
+
+    Args:
+        context: where the plant is; not needed here.
+        agent, channels, clock, state: as the loop has them.
+        u: held input.
+        out: filled.
+        trial, scratch: as long as the state, and 5 times a channel's; overwritten.
+    """
+    copy(state, trial)
+    roll(agent, channels, clock, trial, u, scratch)
+    for r in range(len(u)):
+        out[r] = trial[r * channels.rest.shape[1] + agent.OUTPUT]
+
+
+@kernel
+def is_affine(agent, clock):
+    """Whether the map is affine in u beyond doubt: one Euler step, since x' is affine in u."""
+    return clock.period == 1 and clock.method == 0

@@ -1,0 +1,71 @@
+"""A fleet of the user's own robots as compiled code sees it, and its map over a control period.
+
+Nothing but MuJoCo knows how such robots move. The outputs at the end of a control period are
+therefore found by stepping a second mjData from the same state; it bears no mark, so that no
+callback of a loop acts on it.
+"""
+
+from gne_mj.native import copy, kernel
+from gne_mj.plants.native_mujoco import call, field, integers
+
+# Of a fleet's table (see gne_mj.plants.mujoco): where the robots' numbers are, and sizes
+PLACES, _, SIZES = range(3)
+NQ, NV, NU, _, NA = range(5)
+SENSORDATA, TWIN, MJ_STEP, MJ_FORWARD = range(7, 11)  # more entries of SIZES
+
+# A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
+# one, the joint's entry of qpos or -1, the actuator's of ctrl
+OUTPUT_AT, POSITION_AT, ACTUATOR, PLACES_COUNT = range(4)
+
+
+@kernel
+def gather(at, data, table, state):
+    """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
+    sizes = integers(table, SIZES)
+    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
+    sensordata = field(data, at.sensordata, sizes[SENSORDATA])
+    places = integers(table, PLACES)
+    for r in range(len(places) // PLACES_COUNT):
+        source = places[r * PLACES_COUNT + OUTPUT_AT]
+        position = places[r * PLACES_COUNT + POSITION_AT]
+        state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
+        state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
+
+
+@kernel
+def actuator_of(places, r):
+    """Which entry of ctrl is the input of channel r."""
+    return places[r * PLACES_COUNT + ACTUATOR]
+
+
+@kernel
+def predict(context, agent, channels, clock, state, u, out, trial, scratch):
+    """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
+
+    The arguments are as :func:`gne_mj.plants.held_map.predict` has them, but that it starts from
+    the simulation itself and not from ``state``.
+    """
+    at, model, data, table = context
+    sizes, places = integers(table, SIZES), integers(table, PLACES)
+    twin = sizes[TWIN]
+    copy(field(data, at.qpos, sizes[NQ]), field(twin, at.qpos, sizes[NQ]))
+    copy(field(data, at.qvel, sizes[NV]), field(twin, at.qvel, sizes[NV]))
+    copy(field(data, at.act, sizes[NA]), field(twin, at.act, sizes[NA]))
+    warm = field(data, at.qacc_warmstart, sizes[NV])
+    copy(warm, field(twin, at.qacc_warmstart, sizes[NV]))
+    ctrl = field(twin, at.ctrl, sizes[NU])
+    for r in range(len(u)):
+        ctrl[actuator_of(places, r)] = u[r]
+    for _ in range(clock.period):
+        call(sizes[MJ_STEP], model, twin)
+    if sizes[MJ_FORWARD] != 0:  # sensors are of the last step's start
+        call(sizes[MJ_FORWARD], model, twin)
+    gather(at, twin, table, trial)
+    for r in range(len(u)):
+        out[r] = trial[2 * r]
+
+
+@kernel
+def is_affine(agent, clock):
+    """Never taken for granted: actuators have dynamics, joints limits, bodies contacts."""
+    return False

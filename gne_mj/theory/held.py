@@ -1,0 +1,188 @@
+"""What mode implicit promises at its control instants, and against which disturbances.
+
+The statements and their proofs are in docs/held-inputs.md; here their conditions are looked at for
+one system.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gne_mj.controllers import FullyDistributed
+from gne_mj.faults import Bias, Fault, Noise, Push, Saturation, sensor_delay
+from gne_mj.margins import Disturbance, Influence, influence, largest_push
+from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.system import Clock, System
+from gne_mj.theory.assumptions import ASSUMED, FAILS, MET, UNKNOWN, Assumption, convex_constraints
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """The conditions of the promise for one system on one clock.
+
+    Args:
+        system: in mode implicit.
+        clock: its period and step.
+    """
+
+    system: System
+    clock: Clock
+
+    @property
+    def influence(self) -> Influence | None:
+        """Bounds of the plant's map over a control period; None where no ODE is known."""
+        system, clock = self.system, self.clock
+        if isinstance(system.agents, MjcfRobots):
+            return None
+        bound = system.disturbance
+        return influence(
+            system.agents,
+            clock.timestep,
+            system.integrator,
+            clock.steps(clock.control_period),
+            0 if bound is None else bound.delay,
+        )
+
+    @property
+    def conditions(self) -> tuple[Assumption, ...]:
+        """What the promise rests on."""
+        found = [self._law(), self._slopes(), self._inputs()]
+        if self.system.decentralised:
+            found.append(convex_constraints(self.system))
+        if self.system.disturbance is not None or self.system.faults:
+            found.append(self._disturbances())
+        return tuple(found)
+
+    @property
+    def promised(self) -> bool:
+        """Whether g < 0 at every control instant is certain, from this and every interior start."""
+        return all(condition.granted for condition in self.conditions)
+
+    def report(self) -> dict[str, Any]:
+        """All of it as plain data."""
+        system, effect = self.system, self.influence
+        bound = system.disturbance
+        return {
+            "promised": self.promised,
+            "conditions": [asdict(condition) for condition in self.conditions],
+            "control_period": self.clock.control_period,
+            "least_slope": None if effect is None else effect.least_slope.tolist(),
+            "slope_exact": None if effect is None else effect.exact,
+            "tightening": system.game.margins.tolist(),
+            "disturbance": None
+            if bound is None
+            else {
+                "push": bound.push.tolist(),
+                "noise": bound.noise.tolist(),
+                "delay": bound.delay,
+            },
+            "prediction_error": None
+            if effect is None or bound is None
+            else effect.of(bound).tolist(),
+            "largest_push": self.largest_push(),
+        }
+
+    def largest_push(self) -> float | None:
+        """The greatest push on all agents at once that the tightening covers; None if unknown."""
+        effect = self.influence
+        if effect is None:
+            return None
+        if self.system.decentralised:
+            return 0.0
+        m = self.system.game.actions
+        bound = self.system.disturbance or Disturbance(np.zeros(m), np.zeros(m))
+        return largest_push(self.system.game, effect, bound, self.system.game.margins)
+
+    def _law(self) -> Assumption:
+        label = "law"
+        if isinstance(self.system.law, FullyDistributed):
+            return Assumption(
+                label,
+                FAILS,
+                "the fully distributed law's barriers are at estimates: each agent keeps what it"
+                " takes for the profile inside, and others move meanwhile",
+            )
+        how = "each agent by itself, to its share of every slack" if self.system.decentralised else (
+            "the equation of all agents together"
+        )
+        return Assumption(label, MET, f"{self.system.law.information} information, {how}")
+
+    def _slopes(self) -> Assumption:
+        label, effect = "dy+/du > 0", self.influence
+        if effect is None:
+            return Assumption(
+                label, UNKNOWN, "of MJCF robots no ODE is known: checked in every period of a run"
+            )
+        least = float(np.min(effect.least_slope))
+        if least > 0:
+            return Assumption(
+                label,
+                MET,
+                f"at least {least:.4g} over a period"
+                + (", exactly" if effect.exact else ", for all states"),
+            )
+        if effect.exact:
+            return Assumption(label, FAILS, f"it is {least:.4g} over a period")
+        return Assumption(
+            label, UNKNOWN, "no bound for all states is positive: checked in every period of a run"
+        )
+
+    def _inputs(self) -> Assumption:
+        limited = np.any(np.isfinite(self.system.agents.input_limit))
+        limited = limited or any(isinstance(f, Saturation) for f in self.system.faults)
+        if limited:
+            return Assumption(
+                "inputs", ASSUMED, "as long as no input limit is met, which a run reports"
+            )
+        return Assumption("inputs", MET, "delivered as asked for")
+
+    def _disturbances(self) -> Assumption:
+        label, system = "disturbances", self.system
+        bound = system.disturbance
+        struck = strength(system.faults, system)
+        if bound is None:
+            if not np.any(struck.push) and not np.any(struck.noise):
+                return Assumption(label, MET, "no fault moves the agents or their sensors")
+            return Assumption(label, FAILS, "there are faults and no [margin] that covers them")
+        if system.decentralised:
+            return Assumption(
+                label, FAILS, "shares of slacks leave no room for disturbances: no margin is known"
+            )
+        for what, given, most in (
+            ("push", struck.push, bound.push),
+            ("noise", struck.noise, bound.noise),
+        ):
+            if np.any(given > most * (1.0 + 1e-12)):
+                worst = int(np.argmax(given - most))
+                return Assumption(
+                    label,
+                    FAILS,
+                    f"faults reach a {what} of {given[worst]:.4g} on agent"
+                    f" {int(system.game.agent_of_action[worst]) + 1}, and the margin covers"
+                    f" {most[worst]:.4g}",
+                )
+        if struck.delay > bound.delay:
+            return Assumption(
+                label,
+                FAILS,
+                f"sensors are {struck.delay} periods late, and the margin covers {bound.delay}",
+            )
+        return Assumption(
+            label, MET, "the barrier is tightened by what they can do within a control period"
+        )
+
+
+def strength(faults: tuple[Fault, ...], system: System) -> Disturbance:
+    """The most that faults do at once, each channel's pushes and sensor errors added up."""
+    push, noise = np.zeros((2, system.game.actions))
+    for fault in faults:
+        at = fault.targets(system.game, system.law.graph) if isinstance(fault, MOVERS) else []
+        if isinstance(fault, Push):
+            push[at] += abs(fault.force)
+        elif isinstance(fault, Noise | Bias):
+            noise[at] += abs(fault.size)
+    return Disturbance(push, noise, sensor_delay(faults))
+
+
+MOVERS = (Push, Noise, Bias)
