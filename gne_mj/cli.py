@@ -218,6 +218,86 @@ def plot(
         print(path)
 
 
+@app.command(name="map")
+def map_(
+    scenario: _SCENARIO,
+    set_: _SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Which; needed if several.")
+    ] = None,
+    periods: Annotated[
+        str, typer.Option("--periods", metavar="FROM:TO:COUNT", help="Control periods in s.")
+    ] = "0.001:1:7",
+    margins: Annotated[
+        str,
+        typer.Option(
+            "--margins", metavar="FROM:TO:COUNT", help="Shares of the way to the boundary left."
+        ),
+    ] = "1e-6:0.5:6",
+    pushes: Annotated[
+        str, typer.Option("--pushes", metavar="A,B,...", help="Forces on every agent.")
+    ] = "0,2,10",
+    runs: Annotated[int, typer.Option("--runs", help="Random starts for each cell.")] = 20,
+    duration: Annotated[float, typer.Option("--duration", help="Of each run, in s.")] = 3.0,
+    seed: Annotated[int, typer.Option("--seed", help="Of starts and directions.")] = 0,
+    out: _OUT = None,
+    as_json: _JSON = False,
+) -> None:
+    """Map where modes `sampled` and `implicit` leave the set: period x start margin x push.
+
+    --out keeps the figure map.png and the table map.csv. Ctrl-C ends it early and keeps what was
+    done.
+    """
+    from dataclasses import asdict
+
+    from gne_mj import exit_map as mapping
+    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.scenario import load_scenario
+    from gne_mj.simulation import interruption
+    from gne_mj.solve import parse_path
+
+    loaded = load_scenario(scenario, _settings(set_))
+    names = list(loaded.systems)
+    if system is None and len(names) > 1:
+        raise InvalidInput("--system", None, f"name one of {', '.join(names)}")
+    name = system or names[0]
+    if name not in names:
+        raise InvalidInput("--system", system, nearest(str(system), names))
+    try:
+        forces = tuple(float(force) for force in pushes.split(","))
+    except ValueError:
+        raise InvalidInput("--pushes", pushes, "it must be numbers, A,B,...") from None
+    grid = mapping.Grid(
+        periods=tuple(parse_path(periods, "--periods")),
+        margins=tuple(parse_path(margins, "--margins")),
+        pushes=forces,
+        runs=runs,
+        duration=duration,
+        seed=seed,
+    )
+    built = loaded.systems[name].build(name, loaded.simulation)
+    with (
+        interruption() as stop,
+        _results(out, replace=False) as folder,
+        _progress(float(grid.total), as_json, "runs") as show,
+    ):
+        cells = mapping.exit_map(
+            built, loaded.simulation.timestep, grid, show, stopped=stop.is_set
+        )
+        if folder is not None:
+            from gne_mj import plots
+
+            mapping.write(cells, folder / "map.csv")
+            plots.save_map(cells, folder / "map.png")
+    if as_json:
+        print(json.dumps([asdict(cell) for cell in cells], indent=2))
+    else:
+        print("\n".join(mapping.summary(cells)))
+        if out is not None:
+            print(f"\nfigure      {out / 'map.png'}\ntable       {out / 'map.csv'}")
+    raise typer.Exit(1 if stop.is_set() else 0)
+
+
 @app.command()
 def passivity(
     scenario: _SCENARIO,
@@ -450,7 +530,7 @@ def _working(quiet: bool, what: str) -> Iterator[Any]:
 
 
 @contextmanager
-def _progress(duration: float, quiet: bool) -> Iterator[Any]:
+def _progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
     """A progress bar on a terminal's stderr, else nothing."""
     if quiet or not sys.stderr.isatty():
         yield None
@@ -459,13 +539,13 @@ def _progress(duration: float, quiet: bool) -> Iterator[Any]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     with Progress(
-        TextColumn("{task.completed:.1f} of {task.total:g} s"),
+        TextColumn(f"{{task.completed:{'.1f' if unit == 's' else '.0f'}}} of {{task.total:g}} {unit}"),
         BarColumn(),
         TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=True,
     ) as bar:
-        task = bar.add_task("run", total=duration)
+        task = bar.add_task("run", total=total)
         yield lambda now: bar.update(task, completed=now)
 
 

@@ -105,8 +105,8 @@ def solve_system(
     )
 
 
-def parse_path(text: str) -> list[float]:
-    """FROM:TO:COUNT as that many penalty parameters, at equal ratios.
+def parse_path(text: str, option: str = "--path") -> list[float]:
+    """FROM:TO:COUNT as that many positive numbers at equal ratios.
 
     Raises:
         InvalidInput: it does not read so.
@@ -119,8 +119,8 @@ def parse_path(text: str) -> list[float]:
         right = False
     if not right:
         raise InvalidInput(
-            "--path", text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive penalty"
-            " parameters and how many, at least 2)",
+            option, text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive numbers and"
+            " how many, at least 2)",
         )  # fmt: skip
     return np.geomspace(first, last, count).tolist()
 

@@ -362,12 +362,7 @@ class System:
         try:
             return penalised_equilibrium(self.game, self.rho, self.start)
         except SolverError:
-            if self.game.box is None:
-                raise
-            middle = 0.5 * (self.game.box[0] + self.game.box[1])
-            if not np.all(self.game.constraints(middle) + self.game.margins < 0):
-                raise
-            return penalised_equilibrium(self.game, self.rho, middle)
+            return penalised_equilibrium(self.game, self.rho, _middle(self.game, self.start))
 
     def closed_loop(self, clock: Clock, plant: "MujocoPlant | None" = None) -> ClosedLoop:
         """The native loop, at its start.
@@ -487,6 +482,24 @@ class System:
                 " integrator 'euler', or name a joint",
             )
         return plant
+
+
+def _middle(game: Game, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A profile well inside, from one strictly inside: the middle along each action in turn."""
+    y = y.copy()
+    for a in np.tile(np.arange(game.actions), 3):
+        ends = []
+        for sign in (-1.0, 1.0):
+            low, high = 0.0, 1e-9
+            ahead = y.copy()
+            while high < 1e6:
+                ahead[a] = y[a] + sign * high
+                if not np.all(game.constraints(ahead) + game.margins < 0):
+                    break
+                low, high = high, 2.0 * high
+            ends.append(sign * low)
+        y[a] += 0.5 * sum(ends)
+    return y
 
 
 def _rounded_down(value: float) -> float:

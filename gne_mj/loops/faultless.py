@@ -38,5 +38,5 @@ def push(problem, clock, step, u, acts):
 
 
 @kernel
-def record(agent, problem, clock, step, state, u, work, seen, acts):
+def record(agent, states, problem, clock, step, state, u, work, seen, acts):
     """Nothing to record: outputs and inputs are what they are."""

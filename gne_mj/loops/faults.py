@@ -218,7 +218,7 @@ def push(problem, clock, step, u, acts):
         if active(row, time):
             phase = 0.0
             if row[PERIOD] > 0.0:
-                phase = (time - row[START]) / row[PERIOD]
+                phase = (time + 5e-10 - row[START]) / row[PERIOD]
             size = row[SIZE]
             if row[SHAPE] == SINE:
                 size *= np.sin(2.0 * np.pi * phase)
@@ -231,11 +231,10 @@ def push(problem, clock, step, u, acts):
 
 
 @kernel
-def record(agent, problem, clock, step, state, u, work, seen, acts):
+def record(agent, states, problem, clock, step, state, u, work, seen, acts):
     """Fill rows (m,) with what the law has seen for the input u of this step, and what acts."""
     copy(work.seen, seen)
     if clock.mode == 0:  # the look may have been at a later stage, with the step's own errors
-        states = len(state) // len(u)
         for r in range(len(u)):
             seen[r] += state[r * states + agent.OUTPUT] - work.y[r]
     push(problem, clock, step, u, acts)

@@ -6,9 +6,9 @@ positive, so that it has one solution, strictly inside.
 
 import sys
 
-from gne_mj.controllers.settings import GAIN, PENALTY, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
 from gne_mj.loops import implicit
-from gne_mj.loops.newton import newton, solver_length
+from gne_mj.loops.newton import RHO, newton, solver_length
 from gne_mj.native import kernel
 
 __all__ = ["act", "solver_length"]
@@ -45,7 +45,7 @@ def row_of(problem, first, r):
 def residual(law, game, problem, first, last, memory, work, solver):
     """Fill solver.residual at solver.trial; False if that is not strictly inside."""
     data, y, column, within = problem.data, solver.trial, problem.order.column, problem.order.within
-    weight = problem.settings[GAIN] * work.now[PENALTY]
+    weight = problem.settings[GAIN] * solver.numbers[RHO]
     for k in range(len(solver.inverse)):
         room = -game.constraint(data.parameters, k, y) - data.tightening[k]
         if not room > 0.0:
@@ -70,7 +70,7 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
     data, y, start, column = problem.data, solver.trial, problem.order.start, problem.order.column
     at, position, band = data.offsets, problem.order.position, solver.band
-    scale = problem.settings[GAIN] * work.now[PENALTY]
+    scale = problem.settings[GAIN] * solver.numbers[RHO]
     for a in range(len(y)):
         i, r = data.owner[a], position[a]
         for c in range(2 * b + 1):

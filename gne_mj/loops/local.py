@@ -14,9 +14,9 @@ is taken to be 1 and nothing is promised.
 
 import sys
 
-from gne_mj.controllers.settings import GAIN, PENALTY, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
 from gne_mj.loops import implicit
-from gne_mj.loops.newton import MOVES, OUTSIDE, SOLVED, newton, solver_length
+from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton, solver_length
 from gne_mj.native import copy, kernel
 
 __all__ = ["act", "solver_length"]
@@ -84,7 +84,7 @@ def look_along(problem, k, first, work, solver):
 @kernel
 def residual(law, game, problem, first, last, memory, work, solver):
     """Fill the agent's entries of solver.residual at solver.trial; False if it has no action."""
-    data, rho, gain = problem.data, work.now[PENALTY], problem.settings[GAIN]
+    data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
     low, high = data.offsets[first], data.offsets[first + 1]
     for a in range(low, high):
         solver.mixed[a] = solver.trial[a]
@@ -113,7 +113,7 @@ def residual(law, game, problem, first, last, memory, work, solver):
 @kernel
 def assemble(law, game, problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
-    data, rho, gain = problem.data, work.now[PENALTY], problem.settings[GAIN]
+    data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
     at, band = data.offsets, solver.band
     low, high = at[first], at[first + 1]
     for a in range(low, high):

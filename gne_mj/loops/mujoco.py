@@ -316,8 +316,8 @@ def build(
                     copy(state, samples_state[sample])
                     step = np.int64(userdata[start + STEP_NOW]) - 1
                     faults.record(
-                        agent, problem, clock, step, state, u, work, samples_seen[sample],
-                        samples_acts[sample],
+                        agent, states, problem, clock, step, state, u, work,
+                        samples_seen[sample], samples_acts[sample],
                     )  # fmt: skip
                     copy(before[nq + nv :] if restores else memory, samples_memory[sample])
                 if left:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gne_mj import banded
+from gne_mj.controllers.settings import PENALTY
 from gne_mj.native import copy, kernel
 
 # How it ended
@@ -27,7 +28,10 @@ SOLVED, ROUNDED, UNSOLVED, OUTSIDE = range(4)
 LAST_STEP = 1e-6
 GOOD_STEP = 1e-3  # if rounding ends the progress before, the end still counts as accurate
 DECREASE = 1e-4  # of the residual's norm, relative to the step's length
-MOST_EVALUATIONS = 400
+MOST_EVALUATIONS = 1000
+# Along curved bounds a low penalty leaves only tiny steps. After so many evaluations it is raised,
+# and lowered again by steps once Newton's step is this short.
+PATIENCE, RAISE, LOWER, CENTRED = 25, 100.0, 0.2, 0.3
 SHORTEST = 1e-14
 
 # A step with factors of an earlier period is as good if its length, times what such factors have
@@ -36,8 +40,9 @@ SHORTEST = 1e-14
 ACCURATE, MOST_USES = 1e-10, 12
 
 # Entries of ``numbers``: how many inputs were found, steps taken, how much an agent's barrier
-# profile moves with its action, how often the factors were used and what they leave of an error
-FOUND, STEPS, MOVES, USES, LEAVES, COUNT = range(6)
+# profile moves with its action, how often the factors were used and what they leave of an error,
+# the penalty that is solved for
+FOUND, STEPS, MOVES, USES, LEAVES, RHO, COUNT = range(7)
 
 
 class Solver(NamedTuple):
@@ -124,6 +129,9 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
     Returns how it ended; solver.numbers[STEPS] grows by the iterations taken.
     """
     at, numbers = problem.data.offsets, solver.numbers
+    target = work.now[PENALTY]
+    numbers[RHO] = target
+    patience = PATIENCE
     low, high = at[first], at[last]
     n = high - low
     y, trial, step = solver.y, solver.trial, solver.step
@@ -135,9 +143,15 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         else:
             for r in range(low, high):
                 trial[r] = y[r] + length * step[equation.row_of(problem, first, r)]
+        patience -= 1
+        if patience < 0 and numbers[RHO] < 1e12 * target:
+            numbers[RHO] *= RAISE
+            length, patience = 0.0, PATIENCE
+            copy(y[low:high], trial[low:high])
         good = equation.residual(law, game, problem, first, last, memory, work, solver)
         if length == 0.0:
             if not good:
+                patience = PATIENCE
                 if starts == 2:
                     return OUTSIDE
                 source = solver.anchor if starts == 0 else solver.ahead
@@ -157,7 +171,7 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
             copy(trial[low:high], y[low:high])
         norm = size
         numbers[STEPS] += 1.0
-        usable = reuse and numbers[USES] > 0.0
+        usable = reuse and numbers[USES] > 0.0 and numbers[RHO] == target
         if usable:
             banded.solve_definite(solver.band, n, b, solver.old_step)
             if numbers[USES] < MOST_USES:
@@ -187,7 +201,10 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         if not remaining < np.inf:
             return UNSOLVED
         length = 1.0
-        if remaining <= LAST_STEP:
+        if numbers[RHO] > target and remaining <= CENTRED:
+            numbers[RHO] = max(target, LOWER * numbers[RHO])
+            length, patience = 0.0, PATIENCE
+        elif remaining <= LAST_STEP:
             for r in range(low, high):
                 y[r] += step[equation.row_of(problem, first, r)]
             return SOLVED

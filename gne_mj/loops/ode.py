@@ -175,8 +175,8 @@ def build(
                         copy(state, samples_state[sample])
                         copy(u, samples_u[sample])
                         faults.record(
-                            agent, problem, clock, step, state, u, work, samples_seen[sample],
-                            samples_acts[sample],
+                            agent, states, problem, clock, step, state, u, work,
+                            samples_seen[sample], samples_acts[sample],
                         )  # fmt: skip
                     if clock.mode == CONTINUOUS and every > 0:
                         acts = faults.push(problem, clock, step, work.u, work.acts)

@@ -26,7 +26,7 @@ def predict(context, agent, channels, clock, state, u, out, trial, scratch):
         out: filled.
         trial, scratch: as long as the state, and 5 times a channel's; overwritten.
     """
-    copy(state, trial)
+    copy(state[: len(trial)], trial)  # a law's memory may follow
     roll(agent, channels, clock, trial, u, scratch)
     for r in range(len(u)):
         out[r] = trial[r * channels.rest.shape[1] + agent.OUTPUT]

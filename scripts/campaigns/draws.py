@@ -138,7 +138,7 @@ class Fleet:
             integrator="euler",
             decentralised=decentralised,
         )
-        periods = int(rng.integers(5, 40))
+        periods = int(rng.integers(4, 25))
         clock = Clock(period * periods, period / steps, period, period * periods)
         return Draw(system, clock, self.kind, margin)
 

@@ -1,0 +1,234 @@
+"""Where a set is left: runs over a grid of control periods, start margins and pushes.
+
+Starts lie on random rays from the penalised equilibrium, at rest but for the outputs; a margin is
+the share of the way from the equilibrium to the boundary that is left. A push is a constant force
+on every agent, in a random direction for each.
+"""
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput, SolverError
+from gne_mj.faults import Push
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.base import ClosedLoop
+from gne_mj.system import Clock, System
+
+MODES = ("sampled", "implicit")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What is tried.
+
+    Args:
+        periods: control periods in s.
+        margins: shares of the way to the boundary that a start leaves, between 0 and 1.
+        pushes: forces on every agent, in the input's unit.
+        runs: starts for each cell.
+        duration: of a run in s, rounded up to whole periods.
+        seed: of starts and directions; the same ones in every cell.
+    """
+
+    periods: tuple[float, ...]
+    margins: tuple[float, ...]
+    pushes: tuple[float, ...] = (0.0,)
+    runs: int = 20
+    duration: float = 3.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for key in ("periods", "margins", "pushes"):
+            values = np.asarray(getattr(self, key), dtype=np.float64)
+            lowest = 0.0 if key == "pushes" else np.nextafter(0.0, 1.0)
+            if not len(values) or not np.all(np.isfinite(values)) or np.any(values < lowest):
+                raise InvalidInput(f"--{key}", list(values), "every entry must be positive")
+        if np.any(np.asarray(self.margins) >= 1.0):
+            raise InvalidInput("--margins", self.margins, "they are shares, below 1")
+        for key in ("runs", "duration"):
+            if not getattr(self, key) > 0:
+                raise InvalidInput(f"--{key}", getattr(self, key), "it must be positive")
+
+    @property
+    def total(self) -> int:
+        """How many runs that is."""
+        return len(MODES) * self.runs * len(self.periods) * len(self.margins) * len(self.pushes)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What the runs of one cell showed.
+
+    Attributes:
+        mode, period, margin, push: which cell.
+        runs: how many.
+        left_at_instant: how many left the set, first seen at a control instant.
+        left_between: how many left it between two control instants.
+        no_action: how many ended since the law had no action or demand that is a number.
+        refused: how many could not be started, as with a period that the mode refuses.
+        least_margin: the least -g over all runs that stayed, None if none did.
+    """
+
+    mode: str
+    period: float
+    margin: float
+    push: float
+    runs: int
+    left_at_instant: int
+    left_between: int
+    no_action: int
+    refused: int
+    least_margin: float | None
+
+    @property
+    def share(self) -> float:
+        """Of the runs that did not stay inside."""
+        return (self.left_at_instant + self.left_between + self.no_action) / max(self.runs, 1)
+
+
+def exit_map(
+    system: System,
+    timestep: float,
+    grid: Grid,
+    progress: Callable[[int], None] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[Cell]:
+    """All cells of the grid, or those done when ``stopped`` said so.
+
+    Args:
+        system: whose game, agents, law and engine are tried; its start and mode do not matter.
+        timestep: the longest integration step in s; periods are made of whole steps.
+        grid: what is tried.
+        progress: called with the number of runs done.
+    """
+    starts = _rays(system, grid)
+    plants: dict[tuple[str, bool], Any] = {}
+    cells: list[Cell] = []
+    done = 0
+    for mode, period, push, margin in product(MODES, grid.periods, grid.pushes, grid.margins):
+        counts = dict.fromkeys(("instant", "between", "nothing", "refused"), 0)
+        least = np.inf
+        for ray, signs in starts:
+            outcome, worst = _run(
+                _at(system, mode, ray, margin, push * signs), timestep, period, grid, plants
+            )
+            if outcome == "inside":
+                least = min(least, worst)
+            else:
+                counts[outcome] += 1
+            done += 1
+            if progress is not None:
+                progress(done)
+        cells.append(
+            Cell(
+                mode, period, margin, push, len(starts), counts["instant"], counts["between"],
+                counts["nothing"], counts["refused"], least if np.isfinite(least) else None,
+            )
+        )  # fmt: skip
+        if stopped():
+            break
+    return cells
+
+
+def write(cells: Sequence[Cell], file: Path) -> None:
+    """The cells as a CSV table."""
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        names = [each.name for each in fields(Cell)]
+        table = csv.DictWriter(stream, names)
+        table.writeheader()
+        table.writerows(asdict(cell) for cell in cells)
+
+
+def summary(cells: Sequence[Cell]) -> Iterator[str]:
+    """Lines that tell, for each mode and push, up to which period every run stayed inside."""
+    for mode, push in dict.fromkeys((cell.mode, cell.push) for cell in cells):
+        own = [cell for cell in cells if (cell.mode, cell.push) == (mode, push)]
+        runs, left = sum(c.runs for c in own), sum(c.left_at_instant for c in own)
+        between = sum(c.left_between + c.no_action for c in own)
+        safe = 0.0
+        for period in sorted({cell.period for cell in own}):
+            if any(cell.share > 0 or cell.refused for cell in own if cell.period == period):
+                break
+            safe = period
+        text = f"every start stayed inside up to {safe:g} s" if safe else "no period was safe"
+        yield (
+            f"{mode}, push {push:g}: {text}; of {runs} runs {left} left at a control instant,"
+            f" {between} between"
+        )
+
+
+def _rays(
+    system: System, grid: Grid
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """For each run a way from y* to the boundary, (m,), and signs of the agents' pushes (m,)."""
+    rng = np.random.default_rng(grid.seed)
+    game, middle = system.game, system.equilibrium.action
+    found = []
+    for _ in range(grid.runs):
+        ray = rng.normal(size=game.actions)
+        low, high = 0.0, 1.0
+
+        def inside(length: float, ray: NDArray[np.float64] = ray) -> bool:
+            return bool(np.all(game.constraints(middle + length * ray) + game.margins < 0))
+
+        while inside(high) and high < 1e12:
+            high *= 2.0
+        for _ in range(100):
+            length = 0.5 * (low + high)
+            low, high = (length, high) if inside(length) else (low, length)
+        found.append((low * ray, rng.choice([-1.0, 1.0], game.actions)))
+    return found
+
+
+def _at(
+    system: System, mode: str, ray: NDArray[np.float64], margin: float, push: NDArray[np.float64]
+) -> System | None:
+    """The system at rest at that part of the way, pushed; None if rounding puts it outside."""
+    y = system.equilibrium.action + (1.0 - margin) * ray
+    state = system.agents.equilibrium(y)
+    owner = system.game.agent_of_action
+    pushes = tuple(
+        Push(agents=(int(owner[r]),), force=float(push[r])) for r in range(len(y)) if push[r]
+    )
+    memory = system.law.initial_memory(y)
+    try:
+        return replace(system, mode=mode, state=state, memory=memory, faults=pushes)
+    except InvalidInput:
+        return None
+
+
+def _run(
+    system: System | None,
+    timestep: float,
+    period: float,
+    grid: Grid,
+    plants: dict[tuple[str, bool], Any],
+) -> tuple[str, float]:
+    """How one run ended, and its least margin -g."""
+    if system is None:
+        return "refused", np.nan
+    steps = int(np.ceil(period / timestep - 1e-9))
+    duration = float(np.ceil(grid.duration / period - 1e-9)) * period
+    clock = Clock(duration, period / steps, period, duration)
+    key = (system.mode, bool(system.faults))
+    try:
+        loop: ClosedLoop = system.closed_loop(clock, plants.get(key))
+    except (InvalidInput, SolverError):
+        return "refused", np.nan
+    plants[key] = getattr(loop, "plant", None)
+    loop.advance(1, clock.steps(duration))
+    loop.finish()
+    monitor, p = loop.monitor, system.game.constraints_count
+    if monitor[watch.EXIT] == watch.LEFT_SET:
+        return ("between" if monitor[watch.EXIT_BETWEEN] > 0 else "instant"), np.nan
+    if monitor[watch.EXIT] != watch.INSIDE:
+        return "nothing", np.nan
+    at = int(watch.worst_at(p))
+    return "inside", float(-np.max(monitor[at : at + p]))
