@@ -74,22 +74,19 @@ def test_an_explicit_law_stops_where_its_period_stops_it():
     changes = {
         "controller": {"information": "full", "mode": "sampled"},
         "plant.integrator": "euler",
-        "barrier": {"rho": 0.1, "schedule": "exponential", "time_constant": 1.0},
-        "simulation.timestep": 0.01,
-        "simulation.duration": 40.0,
+        "barrier": {"rho": 1.0, "schedule": "exponential", "time_constant": 1.0},
+        "simulation.timestep": 0.002,
+        "simulation.duration": 20.0,
     }
     scenario = load_scenario("osnr", changes)
     (system,) = scenario.system_objects()
-    assert 1e-4 < system.rho < 0.05
-    assert system.rho == pytest.approx(least_rho(system, 0.01), rel=0.05)
-    assert linear_period(system, system.equilibrium.action) >= 0.02 * (1 - 1e-9)
+    assert 0.05 < system.rho < 0.5
+    assert system.rho == pytest.approx(least_rho(system, 0.002), rel=0.05)
+    assert linear_period(system, system.equilibrium.action) >= 0.0025 * (1 - 1e-9)
     allowed = run("osnr", changes)
     assert allowed.status == "converged"
-    below = run("osnr", {**changes, "barrier.floor": system.rho / 50})
-    assert below.status in ("left_feasible_set", "completed")
-    assert below.status == "left_feasible_set" or (
-        below.reports["channels"]["equilibrium"]["final_distance"] > 1e-3
-    )
+    below = run("osnr", {**changes, "barrier.floor": system.rho / 20})
+    assert below.status == "left_feasible_set"
 
 
 def test_what_is_said_of_a_falling_penalty():

@@ -53,7 +53,7 @@ def linear_period(system: System, y: Array) -> float | None:
     return float(np.min(2.0 * values.real / np.abs(values) ** 2, initial=np.inf))
 
 
-def least_rho(system: System, period: float, *, reserve: float = 2.0) -> float:
+def least_rho(system: System, period: float, *, reserve: float = 1.25) -> float:
     """The least penalty whose equilibrium a law that is held for ``period`` s keeps, by the rule.
 
     Where a bound is active at the variational equilibrium, its distance shrinks with rho and the

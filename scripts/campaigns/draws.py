@@ -1,9 +1,13 @@
 """Random systems for the campaigns: games, fleets, starts, periods."""
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
 from gne_mj.game import Game
@@ -143,9 +147,10 @@ class Fleet:
         return Draw(system, clock, self.kind, margin)
 
 
-def fleets(seed: int) -> Iterator[Fleet]:
-    """Fleets without end, each from a seed of its own."""
-    number = 0
-    while True:
-        yield Fleet(np.random.default_rng([seed, number]))
-        number += 1
+def progress(done: Iterable[Any], total: int, what: str) -> Iterator[Any]:
+    """The same, with a progress bar on a terminal."""
+    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task(what, total=total)
+        for each in done:
+            yield each
+            bar.advance(task)

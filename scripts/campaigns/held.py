@@ -1,22 +1,13 @@
-"""Random runs of modes implicit and sampled: who leaves the set, when, and whether it is seen.
+"""Random runs of modes implicit and sampled: who leaves the set, when, and whether it is seen."""
 
-scripts/check-held [--runs N] [--seed S] [--out FILE.json]
-"""
-
-import argparse
-import copy
-import json
-import sys
 import time
-from collections import defaultdict
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from draws import Draw, Fleet
-from rich.progress import Progress
+from draws import Draw, Fleet, progress
 
 from gne_mj.errors import InvalidInput, SolverError
 from gne_mj.loops import monitor as watch
@@ -27,43 +18,28 @@ DECADES = (1e-4, 1e-3, 5e-3, 2e-2, 0.1, 0.3, 1.01)  # s, edges of the table's ro
 VARIANTS = ("implicit", "decentralised", "sampled")
 
 
-def main() -> int:
-    """Run, print the table, write the numbers; 1 if a promise was broken."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=100_000, help="runs of each mode")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="JSON file for the numbers")
-    options = parser.parse_args()
-    started, total = time.perf_counter(), defaultdict(int)
-    jobs = range(-(-options.runs // RUNS_A_FLEET))
-    with ProcessPoolExecutor(options.processes) as pool, Progress(
-        disable=not sys.stderr.isatty()
-    ) as bar:
-        task = bar.add_task("fleets", total=len(jobs))
-        for counts in pool.map(_fleet, [(options.seed, job) for job in jobs]):
-            for key, count in counts.items():
-                total[key] += count
-            bar.advance(task)
-    print("\n".join(table(total)))
+def campaign(runs: int, seed: int, processes: int) -> tuple[list[str], int, dict[str, int]]:
+    """Tables of what came out, how many promises were broken, and all counts."""
+    started, total = time.perf_counter(), Counter[tuple[str, str, str]]()
+    jobs = [(seed, job) for job in range(-(-runs // RUNS_A_FLEET))]
+    with ProcessPoolExecutor(processes) as pool:
+        for counts in progress(pool.map(_fleet, jobs), len(jobs), "fleets"):
+            total.update(counts)
     broken = sum(
         n for key, n in total.items()
         if key[2] in UNSEEN or (key[0] != "sampled" and key[2] == BROKEN)
     )  # fmt: skip
-    print(f"{time.perf_counter() - started:.0f} s; promises broken: {broken}")
-    if options.out:
-        flat = {" | ".join(map(str, key)): n for key, n in sorted(total.items())}
-        options.out.write_text(json.dumps(flat, indent=2) + "\n", encoding="utf-8")
-    return 1 if broken else 0
+    lines = [*table(total), f"{time.perf_counter() - started:.0f} s; promises broken: {broken}"]
+    return lines, broken, {" | ".join(key): n for key, n in sorted(total.items())}
 
 
 BROKEN, UNSEEN = "left at an instant, promised", ("silent", "misdated")
 
 
-def _fleet(job: tuple[int, int]) -> dict[tuple[str, str, str], int]:
+def _fleet(job: tuple[int, int]) -> Counter[tuple[str, str, str]]:
     """All variants of the runs of one fleet, counted by (variant, period, outcome)."""
     fleet = Fleet(np.random.default_rng(list(job)))
-    counts: dict[tuple[str, str, str], int] = defaultdict(int)
+    counts = Counter[tuple[str, str, str]]()
     plants: dict[str, Any] = {}
     for _ in range(RUNS_A_FLEET):
         draw = fleet.draw("implicit")
@@ -79,16 +55,9 @@ def _fleet(job: tuple[int, int]) -> dict[tuple[str, str, str], int]:
         for variant in VARIANTS:
             mode = "sampled" if variant == "sampled" else "implicit"
             system = replace(draw.system, mode=mode, decentralised=variant == "decentralised")
-            for outcome in _outcomes(replace_draw(draw, system), plants, variant, promised):
+            for outcome in _outcomes(replace(draw, system=system), plants, variant, promised):
                 counts[variant, row, outcome] += 1
-    return dict(counts)
-
-
-def replace_draw(draw: Draw, system: Any) -> Draw:
-    """The same draw of another mode."""
-    other = copy.copy(draw)
-    other.system = system
-    return other
+    return counts
 
 
 def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) -> list[str]:
@@ -114,8 +83,8 @@ def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) 
         found.append("silent" if np.any(outside) else "inside")
     else:
         step = round(monitor[watch.EXIT_TIME] / clock.timestep)
-        # finish() repeats the state at which the exit was seen
-        if np.any(outside[:-1]) or (code == watch.LEFT_SET and loop.time > 0 and step < len(recorded.state)):
+        # every step before the exit was inside, and the exit is told of the very next one
+        if np.any(outside[:-1]) or step > len(recorded.state):
             found.append("misdated")
         if code == watch.DIVERGED:
             found.append("diverged")
@@ -139,10 +108,10 @@ def _row(period: float) -> str:
     return "other"
 
 
-def table(total: dict[tuple[str, str, str], int]) -> list[str]:
+def table(total: Counter[tuple[str, str, str]]) -> list[str]:
     """Markdown, a table for each variant."""
     lines = []
-    rows = [f"{low:g} to {min(high, 1.0):g} s" for low, high in zip(DECADES, DECADES[1:], strict=False)]
+    rows = [_row(low) for low in DECADES[:-1]]
     for variant in VARIANTS:
         outcomes = sorted({key[2] for key in total if key[0] == variant} - {"runs"})
         lines += ["", f"{variant}", "", "| period | runs | " + " | ".join(outcomes) + " |"]
@@ -157,6 +126,3 @@ def table(total: dict[tuple[str, str, str], int]) -> list[str]:
         lines.append("| all | " + " | ".join(map(str, cells)) + " |")
     return lines
 
-
-if __name__ == "__main__":
-    sys.exit(main())
