@@ -10,6 +10,17 @@ The kernels of a law's module, each given the game's module or the loop's ``prob
 ``propagate(problem, y, memory, scratch)``              the memory over a control period, y held
 ``storage(problem, memory)``                            the memory's part of the Lyapunov function
 =====================================================  =======================================
+
+and, for mode implicit, in which u = -pull - gain * (gradient of the barrier),
+
+===================================================  =========================================
+``pull(game, problem, i, a, y, memory)``              entry a of agent i's action, but the barrier
+``add_pull_slope(game, problem, i, a, y, memory,      adds dpull/dy to out (m,), in entries of
+out)``                                                agents in J_i only; its symmetric part >= 0
+``prepare(problem, first, last, y, memory)``          puts these agents' actions where pull reads
+``own_profile(problem, i, y, memory, profile)``       what agent i's barrier reads, and how much
+                                                      its own block moves with its own action
+===================================================  =========================================
 """
 
 from abc import ABC, abstractmethod

@@ -9,7 +9,7 @@ RATE = 5  # estimates follow d/dt = -RATE times their disagreement, in 1/s
 LINKS = 6  # where in the memory what was last heard over each link begins; 0: rows are read
 COUNT = 7
 
-# Entries of a loop's ``work.now``: the penalty at this time, and the first constraint whose g + t is
-# not negative at what the law sees (-1 for none) with that value; the step up to which faults were
-# dealt with
+# Entries of a loop's ``work.now``: the penalty at this time; the first constraint whose g + t is
+# not negative at what the law sees (-1 for none), with that value; the step up to which faults
+# were dealt with
 PENALTY, SHELL, SHELL_VALUE, DEALT, NOW = range(5)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
+from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
 from gne_mj.theory import Theorem
@@ -331,6 +332,18 @@ def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     }
 
 
+def _limit_then(system: System, channel: int, time: float) -> float:
+    """The least limit of a channel's actuator at a time: its own, or a fault's."""
+    limit = float(system.agents.input_limit[channel])
+    for fault in system.faults:
+        if not isinstance(fault, Saturation):
+            continue
+        struck = channel in fault.targets(system.game, system.law.graph)
+        if struck and fault.start <= time + 1e-9 < fault.end + 1e-9:
+            limit = min(limit, fault.limit)
+    return limit
+
+
 def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     m, p = system.game.actions, system.game.constraints_count
     at = int(watch.inputs_at(p))
@@ -355,6 +368,6 @@ def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
             "agent": int(agent[index]) + 1,
             "time": float(monitor[watch.SATURATED_TIME]),
             "demand": float(monitor[watch.SATURATED_DEMAND]),
-            "limit": float(limits[index]),
+            "limit": _limit_then(system, index, float(monitor[watch.SATURATED_TIME])),
         }
     return result

@@ -281,9 +281,7 @@ def map_(
         _results(out, replace=False) as folder,
         _progress(float(grid.total), as_json, "runs") as show,
     ):
-        cells = mapping.exit_map(
-            built, loaded.simulation.timestep, grid, show, stopped=stop.is_set
-        )
+        cells = mapping.exit_map(built, loaded.simulation.timestep, grid, show, stopped=stop.is_set)
         if folder is not None:
             from gne_mj import plots
 
@@ -539,7 +537,9 @@ def _progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     with Progress(
-        TextColumn(f"{{task.completed:{'.1f' if unit == 's' else '.0f'}}} of {{task.total:g}} {unit}"),
+        TextColumn(
+            f"{{task.completed:{'.1f' if unit == 's' else '.0f'}}} of {{task.total:g}} {unit}"
+        ),
         BarColumn(),
         TimeRemainingColumn(),
         console=Console(stderr=True),
@@ -586,6 +586,19 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
             f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
             f" {gap['time']:.4g} s"
         )
+    implicit = report["implicit"]
+    if implicit is not None:
+        rows["held inputs"] = (
+            f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
+            f" steps each; predicted outputs off by up to"
+            f" {implicit['largest_prediction_error']:.2g}"
+        )
+        for key, what in (
+            ("not_accurate", "not accurate (though inside)"),
+            ("periods_not_monotone", "periods without dy+/du > 0"),
+        ):
+            if implicit[key]:
+                rows["held inputs"] += f"; {implicit[key]} {what}"
     if epsilon["measured"] is not None:
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="

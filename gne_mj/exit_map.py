@@ -164,9 +164,7 @@ def summary(cells: Sequence[Cell]) -> Iterator[str]:
         )
 
 
-def _rays(
-    system: System, grid: Grid
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _rays(system: System, grid: Grid) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """For each run a way from y* to the boundary, (m,), and signs of the agents' pushes (m,)."""
     rng = np.random.default_rng(grid.seed)
     game, middle = system.game, system.equilibrium.action

@@ -98,7 +98,7 @@ def influence(
             exact = exact and channel.linear
             known[key] = (*channel.gains(period * (delay + 1)), channel.least_slope(period))
         gains[:, r] = known[key]
-    return Influence(*gains, exact)
+    return Influence(gains[0], gains[1], gains[2], exact)
 
 
 def tightening(game: Game, error: Array) -> Array:
@@ -181,7 +181,7 @@ class _Channel:
             slope = np.zeros((n, n))
             kind.jacobian(q, x, slope)
             slopes.append(slope)
-        self.linear = bool(np.array_equal(*slopes))
+        self.linear = bool(np.array_equal(slopes[0], slopes[1]))
         positions = list(getattr(kind, "POSITIONS", ()))
         steps = [_step(slope, column, h, integrator, positions) for slope in slopes]
         self._exact = steps[0]
@@ -195,7 +195,7 @@ class _Channel:
         self._free = h * column[self._output]
 
     def gains(self, steps: int) -> tuple[float, float]:
-        """Bounds of |dy| for a push of at most 1 held any way, and for an output read wrong by 1."""
+        """Bounds of |dy| for pushes of at most 1, and for an output that is read wrong by 1."""
         pushed, read = np.zeros_like(self._b), np.zeros_like(self._b)
         read[self._output] = 1.0
         if self.linear:

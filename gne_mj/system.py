@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import Law, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.equilibrium import Equilibrium, order, penalised_equilibrium
 from gne_mj.controllers.settings import LINKS
+from gne_mj.equilibrium import Equilibrium, order, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.faults import (
     Bias,
@@ -220,7 +220,9 @@ class System:
         tight = self.game.constraints(self.start) + self.game.margins
         worst = int(np.argmax(tight))
         if not tight[worst] < 0.0:
-            name = f"{self.game.constraint_names[worst]}, tightened by {self.game.margins[worst]:g},"
+            name = (
+                f"{self.game.constraint_names[worst]}, tightened by {self.game.margins[worst]:g},"
+            )
             raise InfeasibleStart(key, what, name, float(tight[worst]))
 
     def _check_memory(self) -> None:
@@ -402,9 +404,8 @@ class System:
         )
         laws, game, m = self.law.kernels, self.game.kernels, self.game.actions
         period, mode = clock.steps(clock.control_period), MODES[self.mode]
-        acting, faults, memory = self.acting, faultless, self.memory
-        if self.faults:
-            faults = native_faults
+        acting, memory = self.acting, self.memory
+        faults: ModuleType = native_faults if self.faults else faultless
         if strikes_messages(self.faults):
             assert self.law.graph is not None
             problem.settings[LINKS] = len(memory)

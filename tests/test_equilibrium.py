@@ -15,10 +15,10 @@ from scipy.optimize import minimize, minimize_scalar
 import reference
 from gne_mj import banded
 from gne_mj.equilibrium import (
-    order,
     _solver,
     best_response,
     measured_epsilon,
+    order,
     path,
     penalised_equilibrium,
     variational_equilibrium,
@@ -191,9 +191,9 @@ def test_a_path_hands_on_what_it_found():
     game, _, _ = chain(8, seed=1)
     start = np.full(8, V0)
     rhos = np.geomspace(1.0, 1e-6, 13)
-    for order in (rhos, rhos[::-1]):
-        points = list(path(game, order, start))
-        alone = [penalised_equilibrium(game, rho, start) for rho in order]
+    for way in (rhos, rhos[::-1]):
+        points = list(path(game, way, start))
+        alone = [penalised_equilibrium(game, rho, start) for rho in way]
         for point, expected in zip(points, alone, strict=True):
             assert np.allclose(point.action, expected.action, rtol=0, atol=1e-10)
             assert point.rho == expected.rho

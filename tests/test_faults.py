@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import EQUAL, FIVE, V0, clock, robot_state, robot_system, run_loop
+from builders import EQUAL, FIVE, V0, clock, robot_state, robot_system
 
 import reference
 from gne_mj import graph as graphs
@@ -48,7 +48,7 @@ def test_random_numbers_depend_on_all_four_and_are_uniform():
             [native.uniform(*key, k) for k in range(50)]
             for key in ((8, 1, 2), (7, 2, 2), (7, 1, 3))
         ]
-    assert 0.0 <= min(draw)
+    assert min(draw) >= 0.0
     assert max(draw) < 1.0
     counts = np.histogram(draw, bins=20, range=(0, 1))[0]
     assert np.sum((counts - 200) ** 2 / 200) < 45  # chi squared of 19 degrees, p about 0.001
@@ -125,9 +125,7 @@ def test_late_sensors(delay):
 @pytest.mark.slow
 def test_mode_implicit_is_not_deceived_by_a_known_delay():
     for steps in (1, 4):
-        recorded, loop = record(
-            struck(SensorDelay(periods=2), mode="implicit"), 80, control=steps * H
-        )
+        recorded, _ = record(struck(SensorDelay(periods=2), mode="implicit"), 80, control=steps * H)
         ahead = recorded.state[steps::steps, :, 1]
         expected = [reference.full_information(GAME, RHO, y) for y in ahead]
         assert np.allclose(recorded.input[: len(ahead) * steps : steps], expected, atol=1e-6)
@@ -169,6 +167,7 @@ def exchange_oracle(system, periods, seed, loss, delay, silent):
     return np.array(found), np.array(inputs)
 
 
+@pytest.mark.slow
 def test_messages_lost_late_and_silenced_against_plain_python():
     law = PartialInformation(graphs.ring(5), 2.0, 0.5)
     system = struck(
@@ -185,6 +184,7 @@ def test_messages_lost_late_and_silenced_against_plain_python():
     assert np.allclose(recorded.input, inputs, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_estimates_corrupted_once():
     law = PartialInformation(graphs.ring(5), 2.0, 0.5)
     clean, _ = record(struck(Noise(amplitude=0.0), law=law), 20)
@@ -243,7 +243,9 @@ def test_the_trajectory_tells_what_the_law_saw():
 def test_a_measured_profile_outside_is_no_exit_of_the_true_one():
     y = np.array([V0 - 2.99, *FIVE[1:]])
     system = robot_system(
-        robot_state(y), mode="sampled", integrator="euler",
+        robot_state(y),
+        mode="sampled",
+        integrator="euler",
         faults=(Bias(agents=(0,), offset=-2.0, start=0.05),),
     )
     trajectory = Simulation([system], Clock(1.0, H, H, H)).run()
@@ -296,8 +298,8 @@ def test_links_of_agents_and_edges():
 
     def targets(**options):
         rows = for_native((Silence(**options),), game, graph, 0).rows
-        pairs = [(i, int(j)) for i in range(5)
-                 for j in graph.data.neighbour[graph.data.pointer[i]:graph.data.pointer[i + 1]]]  # fmt: skip
+        pointer, neighbour = graph.data
+        pairs = [(i, int(j)) for i in range(5) for j in neighbour[pointer[i] : pointer[i + 1]]]
         return {pairs[int(row[0])] for row in rows}
 
     assert targets(edges=((1, 0),)) == {(0, 1), (1, 0)}

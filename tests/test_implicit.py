@@ -45,7 +45,9 @@ def instants(system, h, periods, steps):
 )
 def test_the_input_is_the_law_at_the_next_outputs(integrator, h, steps):
     """Against the law in plain Python at what the plant itself then reaches."""
-    start = robot_state(FIVE, extension=[0.5, -1, 0, 2, 0.3], appendage=FIVE + [1, -2, 3, 0, -1])
+    start = robot_state(
+        FIVE, extension=[0.5, -1, 0, 2, 0.3], appendage=np.add(FIVE, [1, -2, 3, 0, -1])
+    )
     system = robot_system(start, UNEQUAL, mode="implicit", integrator=integrator)
     state, u, _, loop = instants(system, h, 60, steps)
     assert loop.monitor[watch.EXIT] == watch.INSIDE
@@ -59,7 +61,7 @@ def test_the_input_is_the_law_at_the_next_outputs(integrator, h, steps):
 
 @pytest.mark.slow
 def test_mujoco_and_the_ode_agree():
-    start = robot_state(FIVE, appendage=FIVE + [1, -2, 3, 0, -1])
+    start = robot_state(FIVE, appendage=np.add(FIVE, [1, -2, 3, 0, -1]))
     got, expected = (
         instants(robot_system(start, UNEQUAL, mode="implicit", integrator="euler", engine=e),
                  0.005, 60, 4)[:2]
@@ -72,7 +74,7 @@ def test_mujoco_and_the_ode_agree():
 @pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 4])
 def test_curved_bounds_in_the_plane(steps):
-    """Two axes for each agent, |gap| bounded, in MuJoCo: the law's own oracle at the next outputs."""
+    """Two axes for each agent, |gap| bounded, in MuJoCo: the law in plain Python at what comes."""
     from gne_mj.games import velocity_consensus_game
     from gne_mj.plants import flexible_robot
     from gne_mj.plants.agents import Agents
@@ -81,7 +83,7 @@ def test_curved_bounds_in_the_plane(steps):
     game = velocity_consensus_game(edges, [1.0, 0.0, 0.0], v0, delta[:2], delta[2:])
     oracle = reference.VelocityConsensusGame(v0, edges, np.array([1.0, 0.0, 0.0]), delta)
     agents = Agents(flexible_robot, np.ones((6, 5)), np.full(6, np.inf), 2)
-    y = np.tile(v0, 3) + [0.9, 0.9, 0.3, 0.7, 0.2, 0.2]
+    y = np.add(np.tile(v0, 3), [0.9, 0.9, 0.3, 0.7, 0.2, 0.2])
     state = agents.equilibrium(y)
     state[:, 2] += [5.0, -5.0, 3.0, 0.0, -4.0, 2.0]
     system = System(
@@ -116,7 +118,8 @@ def test_partial_information_is_implicit_in_the_true_outputs():
             assert u[k, i] == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("partial", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("partial", [False, True])
 def test_each_agent_alone_keeps_to_its_share(partial):
     """The decentralised law's formula, in plain Python."""
     law = PartialInformation(graphs.ring(5), 2.0, 0.5) if partial else FullInformation()
@@ -146,6 +149,7 @@ def test_each_agent_alone_keeps_to_its_share(partial):
             assert u[k, i] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_an_agent_alone_needs_nothing_of_agents_it_shares_no_bound_or_cost_with():
     def inputs(last):
         y = np.array([1.0, 0.0, -1.0, 0.5, last])
@@ -180,9 +184,16 @@ def test_fully_distributed_looks_where_z_will_be():
             assert u[k, i] == pytest.approx(-0.7 * expected, abs=1e-6)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 3, 20, 100]), st.booleans())
+ALONE = [
+    False,
+    pytest.param(True, marks=pytest.mark.slow),
+]  # of which a loop of its own is compiled
+
+
+@pytest.mark.parametrize("decentralised", ALONE)
+@given(seed=st.integers(0, 2**32 - 1), steps=st.sampled_from([1, 3, 20, 100]))
 @settings(max_examples=60)
-def test_no_start_leaves_at_a_control_instant(seed, steps, decentralised):
+def test_no_start_leaves_at_a_control_instant(decentralised, seed, steps):
     """Kicked robots, close to their bounds, periods up to 0.5 s: inside at every instant."""
     rng = np.random.default_rng(seed)
     gaps = 3.0 * rng.uniform(-0.95, 0.95, 5)
@@ -238,14 +249,14 @@ def test_powers_of_the_channels(agents, steps):
     assert np.max(np.abs(u - expected)) < 1e-6
 
 
-def test_the_equilibrium_is_the_same():
-    for decentralised in (False, True):
-        system = robot_system(
-            robot_state(FIVE), mode="implicit", integrator="euler", decentralised=decentralised
-        )
-        trajectory = Simulation([system], Clock(40.0, 0.005, 0.05, 0.1)).run()
-        assert trajectory.status == "converged"
-        assert trajectory.reports["robots"]["equilibrium"]["final_distance"] < 1e-4
+@pytest.mark.parametrize("decentralised", ALONE)
+def test_the_equilibrium_is_the_same(decentralised):
+    system = robot_system(
+        robot_state(FIVE), mode="implicit", integrator="euler", decentralised=decentralised
+    )
+    trajectory = Simulation([system], Clock(40.0, 0.005, 0.05, 0.1)).run()
+    assert trajectory.status == "converged"
+    assert trajectory.reports["robots"]["equilibrium"]["final_distance"] < 1e-4
 
 
 def test_a_period_over_which_outputs_fall_with_their_inputs_is_refused():
@@ -307,4 +318,6 @@ def test_factors_without_pivoting(seed, n, b):
 
 
 def test_velocity_game_is_what_the_oracles_take_it_to_be():
-    assert np.allclose(velocity_game(5, V0, 3.0).constraints(FIVE), reference.constraints(GAME, FIVE))
+    assert np.allclose(
+        velocity_game(5, V0, 3.0).constraints(FIVE), reference.constraints(GAME, FIVE)
+    )

@@ -1,15 +1,21 @@
-"""Margins: what disturbances can do within a control period, and barriers that leave room for it."""
+"""Margins: what disturbances can do within a control period, and barriers that leave room."""
 
 import numpy as np
 import pytest
-from builders import EQUAL, FIVE, V0, integrators, pi_cascades, robot_state, robots
+from builders import EQUAL, V0, integrators, pi_cascades, robot_state, robots
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Noise, Push, SensorDelay
-from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_consensus_game, velocity_game
+from gne_mj.games import (
+    cournot_game,
+    osnr_game,
+    ten_channels,
+    velocity_consensus_game,
+    velocity_game,
+)
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import Disturbance, influence, largest_push, tightening
 from gne_mj.plants.ode import OdePlant
@@ -30,7 +36,9 @@ def random_robots(rng, count=5):
 def test_no_push_and_no_error_of_an_output_does_more(seed, integrator, steps, kind):
     """Any course of pushes within the bound, from any state, through the plant itself."""
     rng, h = np.random.default_rng(seed), 0.005
-    agents = {"robots": random_robots(rng), "integrators": integrators(5), "pi": pi_cascades(5)}[kind]
+    agents = {"robots": random_robots(rng), "integrators": integrators(5), "pi": pi_cascades(5)}[
+        kind
+    ]
     effect = influence(agents, h, integrator, steps)
     state = rng.normal(size=(5, agents.states)) * rng.choice([0.1, 3.0, 30.0])
     u = rng.normal(size=5) * 5.0
@@ -234,6 +242,7 @@ def test_a_start_within_the_tightening_is_refused():
         ).system_objects()
 
 
+@pytest.mark.slow
 def test_an_adversary_finds_a_push_that_breaks_it_and_not_far_above_the_certified_one():
     scenario = load_scenario("velocity-sync", {**MARGIN, "simulation.duration": 3.0})
     (system,) = scenario.system_objects()
@@ -245,6 +254,7 @@ def test_an_adversary_finds_a_push_that_breaks_it_and_not_far_above_the_certifie
     assert weaker.force < found.smallest_breaking_push
 
 
+@pytest.mark.slow
 def test_the_longest_safe_period_is_found_by_trial():
     scenario = load_scenario(
         "velocity-sync",

@@ -45,6 +45,7 @@ def test_the_law_takes_the_penalty_of_its_time(engine):
         assert np.allclose(u[k], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_channels_reach_the_exact_variational_equilibrium_from_inside():
     """The power limit binds there; below it at every step, within 1e-6 at the end."""
     changes = {

@@ -110,7 +110,7 @@ def read_sensors(agent, problem, clock, count, step, state, work):
 
 @kernel
 def corrupt(problem, clock, count, step, m, memory):
-    """Once, at the first control instant at or after a fault's start, shift an agent's estimates."""
+    """Shift an agent's estimates, once, at the first control instant from a fault's start on."""
     faults, time = problem.faults, step * clock.h
     for f in range(faults.pointer[CORRUPTION], faults.pointer[CORRUPTION + 1]):
         row = faults.rows[f]

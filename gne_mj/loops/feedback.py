@@ -81,6 +81,9 @@ class Sizes(NamedTuple):
     solver: int = 0
 
 
+NO_SIZES = Sizes()
+
+
 @kernel
 def work_sizes(actions, constraints, agents, history, solver):
     """Lengths of the arrays of :class:`Work`, in its order."""
@@ -88,7 +91,7 @@ def work_sizes(actions, constraints, agents, history, solver):
     return p, p, m, m, m, m, m, 1, scratch_length(agents), NOW, m, m, history, solver
 
 
-def work(actions: int, constraints: int, agents: int, sizes: Sizes = Sizes()) -> Work:
+def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> Work:
     """Fresh scratch arrays."""
     return Work(*(np.zeros(n) for n in work_sizes(actions, constraints, agents, *sizes)))
 
@@ -120,7 +123,7 @@ def inside(game, problem, time, stage, y, work, monitor):
 
 @kernel
 def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
-    """Fill u (m,) with the input that the actuators deliver at outputs y (m,), all seen as they are.
+    """Fill u (m,) with the input that actuators deliver at outputs y (m,), all seen as they are.
 
     work.g, work.weights and work.demand are filled on the way. Returns True if there is an input.
     If not (y or an estimate is not strictly inside, or the demand is not finite), the exit is
@@ -137,12 +140,10 @@ def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
 
 @kernel
 def explicit_law(law, game, problem, time, stage, y, memory, work, monitor):
-    """Fill work.demand by the law at y (m,), where the weights belong; False if it has no action."""
+    """Fill work.demand by the law at y (m,), whose weights are given; False if it has no action."""
     shell = int(work.now[SHELL])
     if shell >= 0:
-        watch.leave(
-            monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now[SHELL_VALUE], stage
-        )
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now[SHELL_VALUE], stage)
         return False
     left = law.action(game, problem, y, work.weights, memory, work, work.demand)
     if left >= 0:

@@ -97,7 +97,7 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
 
 @kernel
 def local_length(problem, first, last, step, solver):
-    """Greatest change of a constraint by an action's step, relative to the distance to its bound."""
+    """Greatest change of a constraint by an action's step, relative to the distance to a bound."""
     order, greatest = problem.order, 0.0
     for entry in range(len(order.column)):
         change = solver.jacobian[entry] * step[order.position[order.column[entry]]]

@@ -48,9 +48,7 @@ def solve(law, game, problem, b, memory, work, solver):
         moves = law.own_profile(problem, i, solver.anchor, memory, work.profile)
         solver.numbers[MOVES] = moves
         copy(work.profile[at[i] : at[i + 1]], solver.own[at[i] : at[i + 1]])
-        ended = newton(
-            _EQUATION, law, game, problem, i, i + 1, b, False, memory, work, solver
-        )
+        ended = newton(_EQUATION, law, game, problem, i, i + 1, b, False, memory, work, solver)
         copy(solver.anchor[at[i] : at[i + 1]], solver.mixed[at[i] : at[i + 1]])
         worst = max(worst, ended)
         if ended == OUTSIDE:

@@ -26,6 +26,7 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
 from gne_mj.loops.feedback import (
     FAULT_COLUMNS,
+    NO_SIZES,
     Faults,
     Order,
     Problem,
@@ -356,7 +357,7 @@ def build(
 
 
 def room(
-    game: Game, agents: Agents, memory: int, mode: int, sizes: Sizes = Sizes()
+    game: Game, agents: Agents, memory: int, mode: int, sizes: Sizes = NO_SIZES
 ) -> tuple[int, int]:
     """Entries of userdata, and of act, that a plant must leave for this game's loop.
 
@@ -366,9 +367,7 @@ def room(
         mode: CONTINUOUS or HELD of :mod:`gne_mj.loops.ode`.
         sizes: of the scratch arrays that depend on the kind of loop.
     """
-    needed = room_needed(
-        game.actions, game.constraints_count, game.agents, agents.states, *sizes
-    )
+    needed = room_needed(game.actions, game.constraints_count, game.agents, agents.states, *sizes)
     return (int(needed), memory) if mode == CONTINUOUS else (int(needed) + memory, 0)
 
 
@@ -399,7 +398,7 @@ class MujocoLoop(ClosedLoop):
         memory: NDArray[np.float64],
         acting: ModuleType = explicit,
         faults: ModuleType = faultless,
-        sizes: Sizes = Sizes(),
+        sizes: Sizes = NO_SIZES,
     ) -> None:
         self.plant = plant
         m = plant.agents.channels

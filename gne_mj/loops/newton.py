@@ -136,7 +136,7 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
     n = high - low
     y, trial, step = solver.y, solver.trial, solver.step
     starts, length, norm, remaining = 0, 0.0, np.inf, np.inf
-    for evaluation in range(MOST_EVALUATIONS):
+    for _ in range(MOST_EVALUATIONS):
         if length == 0.0:
             for r in range(low, high):
                 trial[r] = y[r]
@@ -149,15 +149,14 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
             length, patience = 0.0, PATIENCE
             copy(y[low:high], trial[low:high])
         good = equation.residual(law, game, problem, first, last, memory, work, solver)
-        if length == 0.0:
-            if not good:
-                patience = PATIENCE
-                if starts == 2:
-                    return OUTSIDE
-                source = solver.anchor if starts == 0 else solver.ahead
-                copy(source[low:high], y[low:high])
-                starts += 1
-                continue
+        if length == 0.0 and not good:
+            patience = PATIENCE
+            if starts == 2:
+                return OUTSIDE
+            source = solver.anchor if starts == 0 else solver.ahead
+            copy(source[low:high], y[low:high])
+            starts += 1
+            continue
         size = 0.0
         for r in range(low, high):
             solver.old_step[equation.row_of(problem, first, r)] = -solver.residual[r]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import Problem, Sizes, inside, work
+from gne_mj.loops.feedback import NO_SIZES, Problem, Sizes, inside, work
 from gne_mj.native import compiled, copy, kernel, source_key
 from gne_mj.plants import held_map
 from gne_mj.plants.ode import RK4, Channels, held_step
@@ -227,7 +227,7 @@ class OdeLoop(ClosedLoop):
         memory: NDArray[np.float64],
         acting: ModuleType = explicit,
         faults: ModuleType = faultless,
-        sizes: Sizes = Sizes(),
+        sizes: Sizes = NO_SIZES,
     ) -> None:
         self._advance = build(agent, law, game, acting, faults)
         self._fixed = (problem, channels, clock)

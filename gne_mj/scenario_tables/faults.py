@@ -1,6 +1,6 @@
 """The tables ``[[systems.NAME.faults]]``, one a kind of fault, and ``[systems.NAME.margin]``."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +19,7 @@ class _FaultTable(Table):
     end: float | None = Field(None, gt=0, description="s; the run's end if left out")
 
     @property
-    def common(self) -> dict[str, object]:
+    def common(self) -> dict[str, Any]:
         """What all faults are given."""
         agents = None if self.agents is None else tuple(i - 1 for i in self.agents)
         return {
@@ -41,7 +41,7 @@ class PushTable(_FaultTable):
         """The fault."""
         return faults.Push(
             **self.common, force=self.force, profile=self.profile, period=self.period
-        )  # type: ignore[arg-type]
+        )
 
 
 class SaturationTable(_FaultTable):
@@ -52,7 +52,7 @@ class SaturationTable(_FaultTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.Saturation(**self.common, limit=self.limit)  # type: ignore[arg-type]
+        return faults.Saturation(**self.common, limit=self.limit)
 
 
 class NoiseTable(_FaultTable):
@@ -63,7 +63,7 @@ class NoiseTable(_FaultTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.Noise(**self.common, amplitude=self.amplitude)  # type: ignore[arg-type]
+        return faults.Noise(**self.common, amplitude=self.amplitude)
 
 
 class BiasTable(_FaultTable):
@@ -74,7 +74,7 @@ class BiasTable(_FaultTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.Bias(**self.common, offset=self.offset)  # type: ignore[arg-type]
+        return faults.Bias(**self.common, offset=self.offset)
 
 
 class SensorDelayTable(Table):
@@ -94,7 +94,7 @@ class _LinksTable(_FaultTable):
     )
 
     @property
-    def common(self) -> dict[str, object]:
+    def common(self) -> dict[str, Any]:
         """What all faults of messages are given."""
         edges = None if self.edges is None else tuple((i - 1, j - 1) for i, j in self.edges)
         return {**super().common, "edges": edges}
@@ -108,7 +108,7 @@ class MessageLossTable(_LinksTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.MessageLoss(**self.common, probability=self.probability)  # type: ignore[arg-type]
+        return faults.MessageLoss(**self.common, probability=self.probability)
 
 
 class MessageDelayTable(_LinksTable):
@@ -119,7 +119,7 @@ class MessageDelayTable(_LinksTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.MessageDelay(**self.common, periods=self.periods)  # type: ignore[arg-type]
+        return faults.MessageDelay(**self.common, periods=self.periods)
 
 
 class SilenceTable(_LinksTable):
@@ -129,7 +129,7 @@ class SilenceTable(_LinksTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.Silence(**self.common)  # type: ignore[arg-type]
+        return faults.Silence(**self.common)
 
 
 class CorruptionTable(_FaultTable):
@@ -140,7 +140,7 @@ class CorruptionTable(_FaultTable):
 
     def build(self) -> faults.Fault:
         """The fault."""
-        return faults.Corruption(**self.common, amplitude=self.amplitude)  # type: ignore[arg-type]
+        return faults.Corruption(**self.common, amplitude=self.amplitude)
 
 
 FaultTable = (
@@ -169,7 +169,7 @@ class MarginTable(Table):
             np.repeat(per_agent(f"margin.{key}", getattr(self, key), game.agents), game.sizes)
             for key in ("push", "noise")
         ]
-        return Disturbance(*each, self.delay)
+        return Disturbance(each[0], each[1], self.delay)
 
     def tightened(
         self, game: Game, agents: Agents, timestep: float, integrator: str, period: int

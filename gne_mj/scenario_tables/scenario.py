@@ -147,9 +147,7 @@ class SystemTable(Table):
             agents = self.agents.build(game.sizes)
             if self.margin is not None:
                 steps = max(1, round(period / simulation.timestep))
-                game = self.margin.tightened(
-                    game, agents, simulation.timestep, integrator, steps
-                )
+                game = self.margin.tightened(game, agents, simulation.timestep, integrator, steps)
             law = self.controller.build(game)
             state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
             filtered = self.initial.filtered

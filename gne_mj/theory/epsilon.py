@@ -101,4 +101,3 @@ def search_epsilon(
         default=None,
     )
     return EpsilonSearch(inside, outside, tuple(trials), note)
-

@@ -97,7 +97,9 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "timestep": clock.timestep,
             "largest_timestep_for_estimates": system.largest_step(),
         },
-        held=None if held is None else {**held.report(), "period_search": None, "push_search": None},
+        held=None
+        if held is None
+        else {**held.report(), "period_search": None, "push_search": None},
         lyapunov_claimed=theorem.lyapunov,
         guaranteed=verdict.guaranteed(theorem, held),
         measured=verdict.measured(theorem),

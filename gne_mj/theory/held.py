@@ -103,8 +103,10 @@ class Held:
                 "the fully distributed law's barriers are at estimates: each agent keeps what it"
                 " takes for the profile inside, and others move meanwhile",
             )
-        how = "each agent by itself, to its share of every slack" if self.system.decentralised else (
-            "the equation of all agents together"
+        how = (
+            "each agent by itself, to its share of every slack"
+            if self.system.decentralised
+            else ("the equation of all agents together")
         )
         return Assumption(label, MET, f"{self.system.law.information} information, {how}")
 
@@ -129,9 +131,8 @@ class Held:
         )
 
     def _inputs(self) -> Assumption:
-        limited = np.any(np.isfinite(self.system.agents.input_limit))
-        limited = limited or any(isinstance(f, Saturation) for f in self.system.faults)
-        if limited:
+        limited = bool(np.any(np.isfinite(self.system.agents.input_limit)))
+        if limited or any(isinstance(f, Saturation) for f in self.system.faults):
             return Assumption(
                 "inputs", ASSUMED, "as long as no input limit is met, which a run reports"
             )

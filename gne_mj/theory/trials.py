@@ -5,6 +5,7 @@ What trials show holds for the start, the duration and the values that were trie
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -155,7 +156,8 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
     period = clock.control_period
     slopes = game.constraint_jacobian(system.start)
     around = game.constraint_jacobian(0.5 * (system.start + system.equilibrium.action))
-    courses = [("steadily", {}), ("from half the time on", {"start": 0.5 * clock.duration})]
+    courses: list[tuple[str, dict[str, Any]]] = [("steadily", {})]
+    courses += [("from half the time on", {"start": 0.5 * clock.duration})]
     courses += [
         (f"in squares of {length:g} s", {"profile": "square", "period": length})
         for length in (2.0 * period, 20.0 * period, 0.2 * clock.duration)
@@ -170,7 +172,7 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
         for sign in (1.0, -1.0) if game.gap_bounds is not None else (1.0,):
             for course, options in courses:
                 pushes = tuple(
-                    Push(agents=(int(owner[a]),), force=sign * direction[a], **options)  # type: ignore[arg-type]
+                    Push(agents=(int(owner[a]),), force=sign * direction[a], **options)
                     for a in agents
                 )
                 yield f"'{name}', {'+' if sign > 0 else '-'}, {course}", pushes

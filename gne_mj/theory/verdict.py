@@ -51,10 +51,10 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
             f"{provided}",
         ]
     if system.mode == "implicit" and held is not None and held.promised:
-        provided = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
+        terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
         return [
             "at every control instant every shared constraint holds, from every interior start"
-            + (f", provided {' and '.join(provided)}" if provided else "")
+            + (f", provided {' and '.join(terms)}" if terms else "")
         ]
     if not theorem.obstacles:
         return ["nothing of this run; the same law in continuous time is covered by the theorem"]

@@ -31,6 +31,8 @@ def rows(runs: int = 25) -> list[dict[str, str]]:
         *_closed_loop(5, "euler", 20_000, runs, "<= 1.20", partial, "sampled"),
         *_closed_loop(5, "rk4", 5_000, runs, "<= 1.20", distributed),
         *_closed_loop(5, "euler", 20_000, runs, "<= 1.20", distributed, "sampled"),
+        *_closed_loop(5, "euler", 20_000, runs, "<= 1.20", None, "implicit"),
+        *_closed_loop(200, "euler", 1_000, runs, "<= 1.30", None, "implicit"),
         *_closed_loop(200, "euler", 200, runs, "", PartialInformation(ring(200)), "sampled"),
         *_closed_loop(200, "rk4", 200, runs, "", PartialInformation(ring(200))),
     ]

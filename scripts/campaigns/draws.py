@@ -11,7 +11,13 @@ from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
 from gne_mj.game import Game
-from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_consensus_game, velocity_game
+from gne_mj.games import (
+    cournot_game,
+    osnr_game,
+    ten_channels,
+    velocity_consensus_game,
+    velocity_game,
+)
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.system import Clock, System
@@ -73,20 +79,20 @@ class Fleet:
         agents = Agents(flexible_robot, self._numbers(count, 2), np.full(2 * count, np.inf), 2)
         return game, agents
 
-    def _OSNR(self) -> tuple[Game, Agents]:  # noqa: N802
+    def _OSNR(self) -> tuple[Game, Agents]:
         rng = self.rng
         game = osnr_game(**{**ten_channels(), "total_power_limit": float(rng.uniform(1, 4))})
         v = rng.uniform(0.5, 2, 10)
         table = np.column_stack([v, v * rng.uniform(0.1, 0.9, 10)])
         return game, Agents(pi_cascade, table, np.full(10, np.inf))
 
-    def _Cournot(self) -> tuple[Game, Agents]:  # noqa: N802
+    def _Cournot(self) -> tuple[Game, Agents]:
         count = int(self.rng.choice([3, 10]))
         game = cournot_game(count, upper_bound=float(self.rng.uniform(20, 100)))
         return game, Agents(integrator, np.zeros((count, 0)), np.full(count, np.inf))
 
     def _integrators(self) -> tuple[Game, Agents]:
-        game, agents = self._robots()
+        game, _ = self._robots()
         count = game.agents
         return game, Agents(integrator, np.zeros((count, 0)), np.full(count, np.inf))
 

@@ -4,6 +4,7 @@ import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,7 @@ def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) 
 
 
 def _row(period: float) -> str:
-    for low, high in zip(DECADES, DECADES[1:], strict=False):
+    for low, high in pairwise(DECADES):
         if low <= period < high:
             return f"{low:g} to {min(high, 1.0):g} s"
     return "other"
@@ -125,4 +126,3 @@ def table(total: Counter[tuple[str, str, str]]) -> list[str]:
         ]
         lines.append("| all | " + " | ".join(map(str, cells)) + " |")
     return lines
-

@@ -30,8 +30,8 @@ def main() -> int:
         print("\n".join(["", "within margins", "", *lines]), flush=True)
         broken += left
     if options.ratios:
-        print("\n".join(["", "| period | certified push | breaking push | ratio |", "|---|---|---|---|",
-                         *margins.ratios()]))  # fmt: skip
+        head = ["", "| period | certified push | breaking push | ratio |", "|---|---|---|---|"]
+        print("\n".join([*head, *margins.ratios()]))
     return 1 if broken else 0
 
 

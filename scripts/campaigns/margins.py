@@ -78,9 +78,7 @@ def _channels() -> Agents:
     return Agents(pi_cascade, np.tile([1.0, 0.5], (10, 1)), np.full(10, np.inf))
 
 
-def _draw(
-    rng: np.random.Generator, kind: str, agents: Agents, m: int
-) -> tuple[System, Clock]:
+def _draw(rng: np.random.Generator, kind: str, agents: Agents, m: int) -> tuple[System, Clock]:
     channels = kind == "channels"
     push = 10.0 ** rng.uniform(-2, 0) if channels else 10.0 ** rng.uniform(-0.5, 1.3)
     noise = 10.0 ** rng.uniform(-5, -3 if channels else -1.7)
