@@ -2,7 +2,7 @@
 
 A law's memory holds the estimates as N rows of length m: row i is agent i's full-length vector
 **y**^i, which it sends to its neighbours. Its own block is no estimate but its own action, which
-the law writes there before anything else at every evaluation (:func:`write_own_actions`).
+the law writes there before anything else at every evaluation (:func:`prepare`).
 
 Where messages can be lost or late, the memory has one more row for each link of the graph (each
 agent's neighbours in turn): what came over it last. Then that is what an agent has of a neighbour.
@@ -53,11 +53,11 @@ def _relax(problem, m, memory):
 
 
 @kernel
-def write_own_actions(data, y, memory):
-    """Put each agent's own action into its own block of its row."""
-    m = len(y)
-    for r in range(m):
-        memory[data.owner[r] * m + r] = y[r]
+def prepare(problem, first, last, y, memory):
+    """Put the actions of agents ``first`` to ``last`` - 1 into their own rows, for a law's pull."""
+    at, m = problem.data.offsets, len(y)
+    for r in range(at[first], at[last]):
+        memory[problem.data.owner[r] * m + r] = y[r]
 
 
 @kernel

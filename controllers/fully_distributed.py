@@ -20,7 +20,7 @@ from gne_mj.controllers.estimates import (
     clear_others,
     estimate_rates,
     move_estimates,
-    write_own_actions,
+    prepare,
 )
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
@@ -101,7 +101,7 @@ def action(game, problem, y, weights, memory, work, u):
     agents = len(at) - 1
     m = at[agents]
     z = memory[agents * m : agents * m + m]
-    write_own_actions(data, y, memory)
+    prepare(problem, 0, len(at) - 1, y, memory)
     for i in range(agents):
         first, last = at[i], at[i + 1]
         outside = agent_action(
@@ -136,14 +136,6 @@ def agent_action(game, data, settings, i, own_filter, own_row, work, u):
     for r in range(len(u)):
         u[r] *= -settings[GAIN]
     return -1
-
-
-@kernel
-def prepare(problem, first, last, y, memory):
-    """Put the actions of agents ``first`` to ``last`` - 1 where ``pull`` reads them."""
-    at, m = problem.data.offsets, len(y)
-    for r in range(at[first], at[last]):
-        memory[problem.data.owner[r] * m + r] = y[r]
 
 
 @kernel

@@ -24,7 +24,7 @@ from gne_mj.controllers.estimates import (
     estimate_rates,
     heard_at,
     move_estimates,
-    write_own_actions,
+    prepare,
 )
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
@@ -82,20 +82,12 @@ def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) from the true barrier's weights (p,) and each agent's own profile."""
     data = problem.data
     at = data.offsets
-    write_own_actions(data, y, memory)
+    prepare(problem, 0, len(at) - 1, y, memory)
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
             barrier = weighted_gradient(game, data, i, a, y, weights)
             u[a] = -pull(game, problem, i, a, y, memory) - barrier
     return -1
-
-
-@kernel
-def prepare(problem, first, last, y, memory):
-    """Put the actions of agents ``first`` to ``last`` - 1 where ``pull`` reads them."""
-    at, m = problem.data.offsets, len(y)
-    for r in range(at[first], at[last]):
-        memory[problem.data.owner[r] * m + r] = y[r]
 
 
 @kernel

@@ -4,7 +4,7 @@ Faults are deterministic: what is random follows from the run's seed, the fault'
 and the control period (pushes: the integration step).
 """
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,6 +17,8 @@ from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.loops import faults as native
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Faults
+
+LARGEST = 1e9  # what a fault may have in any unit
 
 SHAPES = {
     "constant": native.STEADY,
@@ -36,6 +38,8 @@ class Fault(ABC):
     """
 
     kind: ClassVar[int]
+    # The field that says how much, and between which values it may be; None if there is none
+    measure: ClassVar[tuple[str, float, float] | None] = None
     agents: tuple[int, ...] | None = None
     start: float = 0.0
     end: float = np.inf
@@ -45,11 +49,17 @@ class Fault(ABC):
             raise InvalidInput(
                 "faults.end", self.end, f"it must be later than the start, {self.start:g} s"
             )
+        if self.measure is not None:
+            key, low, high = self.measure
+            if not low <= self.size <= high:
+                raise InvalidInput(
+                    f"faults.{key}", self.size, f"it must be between {low:g} and {high:g}"
+                )
 
     @property
-    @abstractmethod
     def size(self) -> float:
-        """What stands in the column SIZE."""
+        """How much: the column SIZE."""
+        return 0.0 if self.measure is None else float(getattr(self, self.measure[0]))
 
     @property
     def shape(self) -> tuple[float, float]:
@@ -68,13 +78,6 @@ class Fault(ABC):
         return [r for i in agents for r in range(at[i], at[i + 1])]
 
 
-def _check_range(fault: Fault, key: str, low: float, high: float = np.inf) -> None:
-    value = getattr(fault, key)
-    if not low <= value <= high or not np.isfinite(value):
-        limits = f"between {low:g} and {high:g}" if np.isfinite(high) else f"at least {low:g}"
-        raise InvalidInput(f"faults.{key}", value, f"it must be {limits}, and finite")
-
-
 @dataclass(frozen=True)
 class Push(Fault):
     """A force on the agents besides their input, in the input's unit, constant within a step.
@@ -87,22 +90,17 @@ class Push(Fault):
     """
 
     kind: ClassVar[int] = native.PUSH
+    measure = ("force", -LARGEST, LARGEST)
     force: float = 0.0
     profile: str = "constant"
     period: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_range(self, "force", -1e9, 1e9)
         if self.profile not in SHAPES:
             raise InvalidInput("faults.profile", self.profile, f"choose from {', '.join(SHAPES)}")
         if not 0.0 < self.period < np.inf:
             raise InvalidInput("faults.period", self.period, "it must be positive and finite")
-
-    @property
-    def size(self) -> float:
-        """The force."""
-        return self.force
 
     @property
     def shape(self) -> tuple[float, float]:
@@ -119,16 +117,8 @@ class Saturation(Fault):
     """
 
     kind: ClassVar[int] = native.LIMIT
+    measure = ("limit", 0.0, LARGEST)
     limit: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "limit", 0.0)
-
-    @property
-    def size(self) -> float:
-        """The limit."""
-        return self.limit
 
 
 @dataclass(frozen=True)
@@ -140,16 +130,8 @@ class Noise(Fault):
     """
 
     kind: ClassVar[int] = native.NOISE
+    measure = ("amplitude", 0.0, LARGEST)
     amplitude: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "amplitude", 0.0)
-
-    @property
-    def size(self) -> float:
-        """The amplitude."""
-        return self.amplitude
 
 
 @dataclass(frozen=True)
@@ -161,16 +143,8 @@ class Bias(Fault):
     """
 
     kind: ClassVar[int] = native.BIAS
+    measure = ("offset", -LARGEST, LARGEST)
     offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "offset", -1e9, 1e9)
-
-    @property
-    def size(self) -> float:
-        """The offset."""
-        return self.offset
 
 
 @dataclass(frozen=True)
@@ -182,20 +156,15 @@ class SensorDelay(Fault):
     """
 
     kind: ClassVar[int] = -1  # no rows: it strikes everyone
+    measure = ("periods", 0, 1000)
     periods: int = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_range(self, "periods", 0, 1000)
         if self.agents is not None or self.start > 0.0 or np.isfinite(self.end):
             raise InvalidInput(
                 "faults.type", "sensor-delay", "it holds for all agents and for the whole run"
             )
-
-    @property
-    def size(self) -> float:
-        """The delay."""
-        return float(self.periods)
 
 
 @dataclass(frozen=True)
@@ -241,16 +210,8 @@ class MessageLoss(_OnLinks):
     """
 
     kind: ClassVar[int] = native.LOSS
+    measure = ("probability", 0.0, 1.0)
     probability: float = 0.5
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "probability", 0.0, 1.0)
-
-    @property
-    def size(self) -> float:
-        """The probability."""
-        return self.probability
 
 
 @dataclass(frozen=True)
@@ -262,16 +223,8 @@ class MessageDelay(_OnLinks):
     """
 
     kind: ClassVar[int] = native.LATE
+    measure = ("periods", 0, 1000)
     periods: int = 1
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "periods", 0, 1000)
-
-    @property
-    def size(self) -> float:
-        """The delay."""
-        return float(self.periods)
 
 
 @dataclass(frozen=True)
@@ -279,11 +232,6 @@ class Silence(_OnLinks):
     """Edges over which nothing comes, or agents who neither send nor hear, for a while."""
 
     kind: ClassVar[int] = native.SILENCE
-
-    @property
-    def size(self) -> float:
-        """None."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -295,16 +243,8 @@ class Corruption(Fault):
     """
 
     kind: ClassVar[int] = native.CORRUPTION
+    measure = ("amplitude", 0.0, LARGEST)
     amplitude: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_range(self, "amplitude", 0.0)
-
-    @property
-    def size(self) -> float:
-        """The amplitude."""
-        return self.amplitude
 
     def targets(self, game: Game, graph: Graph | None) -> list[int]:
         """The agents themselves."""

@@ -15,8 +15,8 @@ def solver_length(actions: int, constraints: int, entries: int, states: int, b: 
 
 @kernel
 def act(
-    faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage, state,
-    memory, work, monitor,
+    acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
+    state, memory, work, monitor,
 ):  # fmt: skip
     """Fill work.demand; False, with the exit latched, if the law has no action there."""
     seen = faults.sense(game, problem, clock, step, stage, work, work.y, work.seen)

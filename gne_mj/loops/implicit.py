@@ -52,7 +52,7 @@ def act(
         solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
         solver.before[r], solver.earlier[r] = last, before
     if found == 0.0:
-        copy(solver.anchor, solver.ahead)
+        copy(problem.equilibrium, solver.ahead)  # inside for certain, as y(0) that is seen is not
     solver.numbers[FOUND] += 1.0
     solver.numbers[STEPS] = 0.0
     map_ahead(plant, context, agent, channels, clock, known, solver)

@@ -7,25 +7,13 @@ positive, so that it has one solution, strictly inside.
 import sys
 
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
-from gne_mj.loops import implicit
+from gne_mj.loops.implicit import act
 from gne_mj.loops.newton import RHO, newton, solver_length
 from gne_mj.native import kernel
 
 __all__ = ["act", "solver_length"]
 
 _EQUATION = sys.modules[__name__]
-
-
-@kernel
-def act(
-    faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage, state,
-    memory, work, monitor,
-):  # fmt: skip
-    """See :func:`gne_mj.loops.implicit.act`."""
-    return implicit.act(
-        _EQUATION, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
-        stage, state, memory, work, monitor,
-    )  # fmt: skip
 
 
 @kernel

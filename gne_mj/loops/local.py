@@ -15,25 +15,13 @@ is taken to be 1 and nothing is promised.
 import sys
 
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
-from gne_mj.loops import implicit
+from gne_mj.loops.implicit import act
 from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton, solver_length
 from gne_mj.native import copy, kernel
 
 __all__ = ["act", "solver_length"]
 
 _EQUATION = sys.modules[__name__]
-
-
-@kernel
-def act(
-    faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage, state,
-    memory, work, monitor,
-):  # fmt: skip
-    """See :func:`gne_mj.loops.implicit.act`."""
-    return implicit.act(
-        _EQUATION, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
-        stage, state, memory, work, monitor,
-    )  # fmt: skip
 
 
 @kernel

@@ -98,8 +98,8 @@ def look(
             copy(y, work.held)
         faults.begin(agent, problem, clock, step, stage, state, memory, work)
         if not acting.act(
-            faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
-            state, memory, work, monitor,
+            acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
+            stage, state, memory, work, monitor,
         ):  # fmt: skip
             return False
         faults.deliver(problem, clock, step, stage, work)

@@ -1,6 +1,6 @@
 """The tables ``[[systems.NAME.faults]]``, one a kind of fault, and ``[systems.NAME.margin]``."""
 
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,133 +14,101 @@ from gne_mj.scenario_tables.table import PerAgent, Table, per_agent
 
 
 class _FaultTable(Table):
+    fault: ClassVar[type[faults.Fault]]
+
+    def build(self) -> faults.Fault:
+        """The fault, its agents and edges numbered from 0."""
+        given = self.model_dump(exclude={"type"}, exclude_none=True)
+        if "agents" in given:
+            given["agents"] = tuple(i - 1 for i in given["agents"])
+        if "edges" in given:
+            given["edges"] = tuple((i - 1, j - 1) for i, j in given["edges"])
+        return self.fault(**given)
+
+
+class _SomeTable(_FaultTable):
     agents: list[int] | None = Field(None, description="numbered from 1; all if left out")
     start: float = Field(0.0, ge=0, description="s")
     end: float | None = Field(None, gt=0, description="s; the run's end if left out")
 
-    @property
-    def common(self) -> dict[str, Any]:
-        """What all faults are given."""
-        agents = None if self.agents is None else tuple(i - 1 for i in self.agents)
-        return {
-            "agents": agents,
-            "start": self.start,
-            "end": np.inf if self.end is None else self.end,
-        }
 
-
-class PushTable(_FaultTable):
+class PushTable(_SomeTable):
     """A force besides the input."""
 
+    fault = faults.Push
     type: Literal["push"]
     force: float = Field(description="in the input's unit")
     profile: Literal["constant", "sine", "square", "random"] = "constant"
     period: float = Field(1.0, gt=0, description="s, of 'sine' and 'square'")
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Push(
-            **self.common, force=self.force, profile=self.profile, period=self.period
-        )
 
-
-class SaturationTable(_FaultTable):
+class SaturationTable(_SomeTable):
     """Actuators that deliver less."""
 
+    fault = faults.Saturation
     type: Literal["saturation"]
     limit: float = Field(ge=0, description="greatest |u| meanwhile")
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Saturation(**self.common, limit=self.limit)
 
-
-class NoiseTable(_FaultTable):
+class NoiseTable(_SomeTable):
     """Outputs read with noise."""
 
+    fault = faults.Noise
     type: Literal["noise"]
     amplitude: float = Field(ge=0, description="greatest error, uniform")
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Noise(**self.common, amplitude=self.amplitude)
 
-
-class BiasTable(_FaultTable):
+class BiasTable(_SomeTable):
     """Outputs read with a constant error."""
 
+    fault = faults.Bias
     type: Literal["bias"]
     offset: float = Field(description="what is read less what is")
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Bias(**self.common, offset=self.offset)
 
-
-class SensorDelayTable(Table):
+class SensorDelayTable(_FaultTable):
     """All sensors read what was some periods ago."""
 
+    fault = faults.SensorDelay
     type: Literal["sensor-delay"]
     periods: int = Field(ge=0, description="control periods")
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.SensorDelay(periods=self.periods)
 
-
-class _LinksTable(_FaultTable):
+class _LinksTable(_SomeTable):
     edges: list[tuple[int, int]] | None = Field(
         None, description="of the graph, pairs numbered from 1; all if agents are left out too"
     )
-
-    @property
-    def common(self) -> dict[str, Any]:
-        """What all faults of messages are given."""
-        edges = None if self.edges is None else tuple((i - 1, j - 1) for i, j in self.edges)
-        return {**super().common, "edges": edges}
 
 
 class MessageLossTable(_LinksTable):
     """Messages that do not arrive."""
 
+    fault = faults.MessageLoss
     type: Literal["message-loss"]
     probability: float = Field(ge=0, le=1)
-
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.MessageLoss(**self.common, probability=self.probability)
 
 
 class MessageDelayTable(_LinksTable):
     """Messages that arrive late."""
 
+    fault = faults.MessageDelay
     type: Literal["message-delay"]
     periods: int = Field(ge=0, description="control periods")
-
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.MessageDelay(**self.common, periods=self.periods)
 
 
 class SilenceTable(_LinksTable):
     """Edges or agents that go silent."""
 
+    fault = faults.Silence
     type: Literal["silence"]
 
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Silence(**self.common)
 
-
-class CorruptionTable(_FaultTable):
+class CorruptionTable(_SomeTable):
     """Estimates shifted once, at the start."""
 
+    fault = faults.Corruption
     type: Literal["estimate-corruption"]
     amplitude: float = Field(ge=0, description="greatest shift, uniform")
-
-    def build(self) -> faults.Fault:
-        """The fault."""
-        return faults.Corruption(**self.common, amplitude=self.amplitude)
 
 
 FaultTable = (

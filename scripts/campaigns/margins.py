@@ -25,6 +25,8 @@ from gne_mj.theory import search_push
 from gne_mj.theory.held import Held
 
 RUNS_A_JOB = 50
+BROKEN = "left at an instant"
+BROKEN_BY = (BROKEN, "ended without an action")
 H = 0.002
 
 
@@ -37,7 +39,7 @@ def campaign(runs: int, seed: int, processes: int) -> tuple[list[str], int]:
             total.update(counts)
     lines = [f"{key}: {total[key]}" for key in sorted(total)]
     lines.append(f"{time.perf_counter() - started:.0f} s")
-    return lines, sum(n for key, n in total.items() if "left" in key)
+    return lines, sum(n for key, n in total.items() if key.endswith(BROKEN_BY))
 
 
 def _job(key: tuple[int, int]) -> Counter[str]:
@@ -62,9 +64,12 @@ def _job(key: tuple[int, int]) -> Counter[str]:
             plant = loop.plant  # type: ignore[attr-defined]
         loop.advance(1, clock.steps(clock.duration))
         loop.finish()
-        inside = loop.monitor[watch.EXIT] == watch.INSIDE
-        between = loop.monitor[watch.EXIT_BETWEEN] > 0
-        how = "inside" if inside else "between instants" if between else "left at an instant"
+        code, between = loop.monitor[watch.EXIT], loop.monitor[watch.EXIT_BETWEEN] > 0
+        how = "inside"
+        if code == watch.LEFT_SET:
+            how = "left between instants only" if between else BROKEN
+        elif code != watch.INSIDE:
+            how = "ended without an action"
         counts[f"{kind}, {how}"] += 1
     return counts
 
