@@ -65,6 +65,11 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
+def settle(ahead, held):
+    """In mode implicit too the memory moves with the outputs of the period's start."""
+
+
+@kernel
 def rate(problem, y, memory, out):
     """No memory, no rate."""
 

@@ -172,6 +172,12 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
+def settle(ahead, held):
+    """In mode implicit the memory moves with the outputs of the period's end, as solved for."""
+    copy(ahead, held)
+
+
+@kernel
 def rate(problem, y, memory, out):
     """Fill out with the rates of estimates and z (own blocks of the estimates: zero)."""
     at = problem.data.offsets

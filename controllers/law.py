@@ -20,6 +20,8 @@ out)``                                                agents in J_i only; its sy
 ``prepare(problem, first, last, y, memory)``          puts these agents' actions where pull reads
 ``own_profile(problem, i, y, memory, profile)``       what agent i's barrier reads, and how much
                                                       its own block moves with its own action
+``settle(ahead, held)``                               may set the outputs (m,) that the memory
+                                                      moves with to those of the period's end
 ===================================================  =========================================
 """
 

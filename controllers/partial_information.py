@@ -125,6 +125,11 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
+def settle(ahead, held):
+    """In mode implicit too the memory moves with the outputs of the period's start."""
+
+
+@kernel
 def rate(problem, y, memory, out):
     """Fill out with the estimates' rates."""
     estimate_rates(problem, y, memory, out)

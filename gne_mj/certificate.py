@@ -291,7 +291,8 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
-    game = system.game
+    # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
+    game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
     affine = game.affine_constraints
     try:
         measured = float(np.max(measured_epsilon(game, equilibrium.action)))
@@ -300,6 +301,8 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,
+        # By convexity a tightening t_l costs at most lambda_l t_l more.
+        "of_margin": float(equilibrium.multipliers @ system.game.margins),
         # The same set by affine constraints meets Assumption [asmp:cost] to the letter.
         "p_rho_affine": None if affine is None else affine * system.rho,
         "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,

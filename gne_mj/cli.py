@@ -603,6 +603,7 @@ def _summary(name: str, report: dict[str, Any]) -> list[str]:
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
             f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
+            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
         )
     return [f"\n{name}", *(f"  {key:20} {value}" for key, value in rows.items())]
 

@@ -2,7 +2,8 @@
 
 Starts lie on random rays from the penalised equilibrium, at rest but for the outputs; a margin is
 the share of the way from the equilibrium to the boundary that is left. A push is a constant force
-on every agent, in a random direction for each.
+on every entry of every agent's action, each in a random direction; it takes the place of the
+scenario's own faults. A margin that the scenario declares is made anew for each control period.
 """
 
 import csv
@@ -15,11 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.errors import InvalidInput, SolverError
-from gne_mj.faults import Push
+from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
+from gne_mj.faults import steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop
+from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
+from gne_mj.theory.trials import held_for
 
 MODES = ("sampled", "implicit")
 
@@ -191,14 +194,12 @@ def _at(
     """The system at rest at that part of the way, pushed; None if rounding puts it outside."""
     y = system.equilibrium.action + (1.0 - margin) * ray
     state = system.agents.equilibrium(y)
-    owner = system.game.agent_of_action
-    pushes = tuple(
-        Push(agents=(int(owner[r]),), force=float(push[r])) for r in range(len(y)) if push[r]
-    )
     memory = system.law.initial_memory(y)
     try:
-        return replace(system, mode=mode, state=state, memory=memory, faults=pushes)
-    except InvalidInput:
+        return replace(
+            system, mode=mode, state=state, memory=memory, faults=steady_push(system.game, push)
+        )
+    except (InvalidInput, InfeasibleStart):
         return None
 
 
@@ -217,12 +218,14 @@ def _run(
     clock = Clock(duration, period / steps, period, duration)
     key = (system.mode, bool(system.faults))
     try:
-        loop: ClosedLoop = system.closed_loop(clock, plants.get(key))
-    except (InvalidInput, SolverError):
+        held = held_for(system, clock.timestep, steps)
+        loop: ClosedLoop = held.closed_loop(clock, plants.get(key))
+    except (InvalidInput, InfeasibleStart, SolverError):
         return "refused", np.nan
     plants[key] = getattr(loop, "plant", None)
     loop.advance(1, clock.steps(duration))
     loop.finish()
+    raise_pending()
     monitor, p = loop.monitor, system.game.constraints_count
     if monitor[watch.EXIT] == watch.LEFT_SET:
         return ("between" if monitor[watch.EXIT_BETWEEN] > 0 else "instant"), np.nan

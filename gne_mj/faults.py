@@ -7,7 +7,7 @@ and the control period (pushes: the integration step).
 from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,11 +87,13 @@ class Push(Fault):
         profile: "constant", "sine" or "square" (with ``period`` in s), or "random" (uniform
             between -force and force, anew at every integration step).
         period: in s.
+        axis: which entry of the agents' actions is pushed, from 0; all if left out.
     """
 
     kind: ClassVar[int] = native.PUSH
     measure = ("force", -LARGEST, LARGEST)
     force: float = 0.0
+    axis: int | None = None
     profile: str = "constant"
     period: float = 1.0
 
@@ -101,6 +103,18 @@ class Push(Fault):
             raise InvalidInput("faults.profile", self.profile, f"choose from {', '.join(SHAPES)}")
         if not 0.0 < self.period < np.inf:
             raise InvalidInput("faults.period", self.period, "it must be positive and finite")
+
+    def targets(self, game: Game, graph: Graph | None) -> list[int]:
+        """Those entries of the agents' actions."""
+        entries = super().targets(game, graph)
+        if self.axis is None:
+            return entries
+        if not 0 <= self.axis < min(game.sizes):
+            raise InvalidInput(
+                "faults.axis", self.axis + 1, f"actions have {min(game.sizes)} entries"
+            )
+        at, owner = game.data.offsets, game.agent_of_action
+        return [r for r in entries if r - at[owner[r]] == self.axis]
 
     @property
     def shape(self) -> tuple[float, float]:
@@ -267,6 +281,16 @@ def sensor_delay(faults: Sequence[Fault]) -> int:
 def message_delay(faults: Sequence[Fault]) -> int:
     """By how many control periods messages are late at most."""
     return max((fault.periods for fault in faults if isinstance(fault, MessageDelay)), default=0)
+
+
+def steady_push(game: Game, forces: NDArray[np.float64], **course: Any) -> tuple[Push, ...]:
+    """Pushes of so much on every entry of the profile, forces of (m,), zeros left out."""
+    at, owner = game.data.offsets, game.agent_of_action
+    return tuple(
+        Push(agents=(int(owner[r]),), axis=int(r - at[owner[r]]), force=float(force), **course)
+        for r, force in enumerate(forces)
+        if force
+    )
 
 
 def strikes_messages(faults: Sequence[Fault]) -> bool:

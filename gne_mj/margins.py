@@ -96,7 +96,9 @@ def influence(
         if key not in known:
             channel = _Channel(*_kind_of(agents.kind, row), timestep, integrator)
             exact = exact and channel.linear
-            known[key] = (*channel.gains(period * (delay + 1)), channel.least_slope(period))
+            # Sensors may be less late than they may be, and errors fade on their way.
+            each = [channel.gains(period * (late + 1)) for late in range(delay + 1)]
+            known[key] = (*np.max(each, axis=0), channel.least_slope(period))
         gains[:, r] = known[key]
     return Influence(gains[0], gains[1], gains[2], exact)
 
@@ -127,11 +129,41 @@ def tightening(game: Game, error: Array) -> Array:
                 )
             t[k] = 2.0 * bound * change - change**2
         return t
-    if np.any(game.weighted_constraint_hessian(y, np.ones(game.constraints_count))):
+    if not is_affine(game, y):
         raise InvalidInput(
             "margin", game.name, "margins are computed for affine constraints and bounds on gaps"
         )
     return np.abs(game.constraint_jacobian(y)) @ error
+
+
+def is_affine(game: Game, y: Array) -> bool:
+    """Whether each constraint's second derivative vanishes at y (m,) and around it."""
+    rng = np.random.default_rng(0)
+    size = 1.0 + np.abs(y)
+    points = [y, *(y + size * rng.normal(size=len(y)) for _ in range(5))]
+    weights = rng.uniform(0.5, 1.5, (3, game.constraints_count))  # no two of them cancel alike
+    return not any(
+        np.any(game.weighted_constraint_hessian(point, each))
+        for point in points
+        for each in weights
+    )
+
+
+def with_margin(
+    game: Game,
+    agents: Agents,
+    bound: Disturbance,
+    timestep: float,
+    integrator: str,
+    period: int,
+) -> Game:
+    """The game with a barrier that leaves room for such disturbances, and for no others.
+
+    Raises:
+        InvalidInput: as :func:`influence` and :func:`tightening`.
+    """
+    effect = influence(agents, timestep, integrator, period, bound.delay)
+    return game.tightened(tightening(game, effect.of(bound)))
 
 
 def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Array) -> float:

@@ -50,7 +50,7 @@ class Simulation:
         systems: with different names.
         clock: durations and steps.
         tolerance: on max |y - y*| for the status ``converged``.
-        seed: kept with the results; nothing random happens in a run yet.
+        seed: kept with the results; systems have their own, of what is random in their faults.
         source: the scenario as JSON, kept with the results.
 
     >>> simulation = Simulation([system], clock)

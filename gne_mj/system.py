@@ -35,8 +35,9 @@ from gne_mj.loops.ode import Clock as LoopClock
 from gne_mj.margins import Disturbance, influence
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.base import Plant
 from gne_mj.plants.mjcf_robot import MjcfRobots
-from gne_mj.plants.ode import METHODS, Channels
+from gne_mj.plants.ode import METHODS, Channels, OdePlant
 
 if TYPE_CHECKING:
     from gne_mj.plants.mjcf_fleet import MjcfPlant
@@ -163,6 +164,14 @@ class System:
                 "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
                 " with; use mode 'sampled'",
             )
+        if self.decentralised and (
+            self.mode != "implicit" or self.law.information not in ("full", "partial")
+        ):
+            raise InvalidInput(
+                f"systems.{self.name}.controller.decentralised",
+                True,
+                "it is for mode 'implicit' under full or partial information",
+            )
         if not np.all(np.isfinite(self.state)):
             raise InvalidInput(
                 f"systems.{self.name}.initial", "nan or inf", "every entry must be finite"
@@ -188,6 +197,12 @@ class System:
         key = f"systems.{self.name}.faults"
         if self.faults and self.integrator == "rosenbrock":
             raise InvalidInput(key, "given", "integrator 'rosenbrock' knows none; use 'rk4'")
+        for number, fault in enumerate(self.faults):
+            try:
+                for_native((fault,), self.game, self.law.graph, self.seed)
+            except InvalidInput as error:
+                where = error.key.replace("faults", f"{key}.{number}", 1)
+                raise InvalidInput(where, error.value, error.expected) from None
         held = strikes_messages(self.faults) or sensor_delay(self.faults) > 0
         if held and self.mode == "continuous":
             raise InvalidInput(
@@ -204,12 +219,6 @@ class System:
                         "mode 'implicit' predicts MJCF robots from their whole true state, which"
                         " such sensors would not tell; use mode 'sampled'",
                     )
-        try:
-            for_native(self.faults, self.game, self.law.graph, self.seed)
-        except InvalidInput as error:
-            raise InvalidInput(
-                f"systems.{self.name}.{error.key}", error.value, error.expected
-            ) from None
 
     def _check_start(self) -> None:
         key = f"systems.{self.name}.initial.action"
@@ -315,20 +324,36 @@ class System:
             )
 
     def _check_slopes(self, clock: Clock) -> None:
-        """Refuse periods over which dy+/du is not positive, where that is known exactly."""
+        """Refuse periods over which dy+/du is not positive: exactly, or else from this start."""
         if self.mode != "implicit" or isinstance(self.agents, MjcfRobots):
             return
-        steps = clock.steps(clock.control_period)
-        effect = influence(self.agents, clock.timestep, self.integrator, steps)
-        worst = int(np.argmin(effect.least_slope))
-        if effect.exact and not effect.least_slope[worst] > 0:
+        effect = influence(
+            self.agents, clock.timestep, self.integrator, clock.steps(clock.control_period)
+        )
+        if effect.exact:
+            self._refuse_slopes(effect.least_slope, clock)
+        elif not np.all(effect.least_slope > 0):
+            self._try_slopes(OdePlant(self.agents, clock.timestep, self.integrator), clock)
+
+    def _try_slopes(self, plant: Plant, clock: Clock) -> None:
+        """The same by moving a plant under two inputs from the start; it is reset afterwards."""
+        reached = []
+        for u in (0.0, 1.0):
+            plant.reset(self.state)
+            plant.step(np.full(self.game.actions, u), clock.steps(clock.control_period))
+            reached.append(plant.output)
+        plant.reset(self.state)
+        self._refuse_slopes(reached[1] - reached[0], clock)
+
+    def _refuse_slopes(self, slope: NDArray[np.float64], clock: Clock) -> None:
+        worst = int(np.argmin(slope))
+        if not slope[worst] > 0:
             agent = int(self.game.agent_of_action[worst]) + 1
             raise InvalidInput(
                 "simulation.control_period",
                 clock.control_period,
                 f"over it the output of agent {agent} of '{self.name}' does not rise with its input"
-                f" (dy+/du = {effect.least_slope[worst]:.4g}), which mode 'implicit' needs; make it"
-                " shorter",
+                f" (dy+/du = {slope[worst]:.4g}), which mode 'implicit' needs",
             )
 
     @property
@@ -427,6 +452,8 @@ class System:
             if plant is None:
                 needed = room(self.game, self.agents, len(memory), mode, sizes)
                 fleet = self._mujoco_plant(clock.timestep, *needed)
+                if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
+                    self._try_slopes(fleet, clock)
             else:
                 fleet = plant
                 plant.model.opt.timestep = plant.timestep = clock.timestep

@@ -44,6 +44,26 @@ CASES = {
     ),
     "zero mass": ("velocity-sync", ["agents.appendage_mass=0"], ["appendage_mass", "positive"]),
     "negative damping": ("velocity-sync", ["agents.damping=-1"], ["agents.damping", "-1"]),
+    "floor without schedule": (
+        "velocity-sync",
+        ["barrier.floor=0.01"],
+        ["systems.robots.barrier.floor", "0.01", "barrier.schedule"],
+    ),
+    "alone where nothing is solved": (
+        "velocity-sync",
+        ["controller.decentralised=true"],
+        ["controller.decentralised", "mode 'implicit'"],
+    ),
+    "fault of nobody": (
+        "velocity-sync",
+        ["faults=[{type='push', force=1.0, agents=[]}]"],
+        ["systems.robots.faults.0.agents", "at least 1"],
+    ),
+    "fault of an unknown kind": (
+        "velocity-sync",
+        ["faults=[{type='shove', force=1.0}]"],
+        ["systems.robots.faults.0.type", "'shove'", "push, saturation"],
+    ),
     "rho zero": ("velocity-sync", ["barrier.rho=0"], ["barrier.rho", "0", "greater than 0"]),
     "delta zero": ("velocity-sync", ["game.gap_bound=0"], ["game.gap_bound", "0", "positive"]),
     "delta negative": (

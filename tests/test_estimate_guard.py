@@ -19,6 +19,7 @@ from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.scenario_tables import Scenario
+from gne_mj.scenario_tables.scenario import SimulationTable
 from gne_mj.simulation import Simulation
 from gne_mj.system import STABLE, System
 
@@ -151,7 +152,7 @@ def scenario(controller, initial):
 
 def built(controller, initial):
     table = scenario(controller, initial).systems["robots"]
-    return table.build("robots", "rk4")
+    return table.build("robots", SimulationTable(integrator="rk4"))
 
 
 PARTIAL = {"information": "partial", "graph": "ring", "coupling": 2.0, "time_constant": 0.5}

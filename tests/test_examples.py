@@ -162,6 +162,7 @@ def test_a_law_of_ones_own(copied, tmp_path):
     assert np.allclose(z[-1], 3.0, rtol=0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_law_of_ones_own_propagates_exactly(copied):
     """Mode sampled: over each held period the filter moves by its exact solution."""
     trajectory = gne_mj.run(

@@ -24,6 +24,7 @@ def run_main(monkeypatch, *words):
     return end.value.code
 
 
+@pytest.mark.slow
 def test_cells_tell_who_left_and_when():
     system = robot_system(robot_state(FIVE), integrator="euler")
     grid = Grid(periods=(0.005, 0.1), margins=(1e-6, 0.3), runs=4, duration=0.3, seed=1)
@@ -47,6 +48,7 @@ def test_cells_tell_who_left_and_when():
     assert len(exit_map(system, 0.005, grid, stopped=lambda: True)) == 1
 
 
+@pytest.mark.slow
 def test_the_command_writes_figure_and_table(tmp_path, monkeypatch, capsys):
     out = tmp_path / "map"
     assert run_main(monkeypatch, *SMALL, "--out", str(out)) == 0

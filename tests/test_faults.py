@@ -258,12 +258,12 @@ def test_a_measured_profile_outside_is_no_exit_of_the_true_one():
 @pytest.mark.parametrize(
     ("fault", "options", "words"),
     [
-        (Push(agents=(5,), force=1.0), {}, ["faults.agents", "6", "1 to 5"]),
+        (Push(agents=(5,), force=1.0), {}, ["faults.0.agents", "6", "1 to 5"]),
         (MessageLoss(probability=0.5), {}, ["full-information law sends no messages"]),
         (
             Silence(edges=((0, 2),)),
             {"law": PartialInformation(graphs.ring(5))},
-            ["faults.edges", "[1, 3]", "no such edge"],
+            ["faults.0.edges", "[1, 3]", "no such edge"],
         ),
         (Corruption(amplitude=1.0), {}, ["no estimates"]),
         (SensorDelay(periods=1), {"mode": "continuous"}, ["'sampled' or 'implicit'"]),
@@ -290,6 +290,56 @@ def test_faults_that_cannot_be(fault, options, words):
 def test_faults_are_checked_where_they_are_made(make):
     with pytest.raises(InvalidInput, match="faults"):
         make()
+
+
+@pytest.mark.slow
+def test_what_the_sensors_say_is_what_the_memory_moves_with():
+    """A biased output is what an agent sends, held or continuous, with messages or without."""
+    law = PartialInformation(graphs.complete(5), 5.0, 0.05)
+    for mode in ("sampled", "continuous"):
+        system = robot_system(
+            robot_state(FIVE), law=law, mode=mode, integrator="euler",
+            faults=(Bias(agents=(2,), offset=0.3),),
+        )  # fmt: skip
+        recorded, _ = record(system, 100)
+        rows = recorded.memory[-1, :25].reshape(5, 5)
+        others = np.delete(rows[:, 2], 2)
+        seen, y = recorded.seen[-1, 2], recorded.state[-1, 2, 1]
+        assert seen == pytest.approx(y + 0.3)
+        assert np.max(np.abs(others - seen)) < 0.1 < np.min(np.abs(others - y)), mode
+
+
+@pytest.mark.slow
+def test_robots_of_ones_own_can_be_pushed():
+    from gne_mj.scenario import run
+
+    trajectory = run(
+        "examples/robot/scenario.toml",
+        {
+            "controller": {"information": "full", "mode": "implicit"},
+            "simulation.duration": 0.3,
+            "faults": [{"type": "push", "force": 0.5, "agents": [1]}],
+        },
+    )
+    (report,) = trajectory.reports.values()
+    assert trajectory.holds
+    assert report["implicit"]["periods_not_monotone"] == 0
+    (name,) = trajectory.reports
+    data = trajectory[name]
+    pushed = (data["acting_input"] - data["input"]).isel(time=slice(0, -1))
+    assert np.allclose(pushed.sel(agent=1), 0.5)
+
+
+def test_a_push_along_one_axis():
+    from gne_mj.faults import steady_push
+    from gne_mj.games import velocity_consensus_game
+
+    game = velocity_consensus_game([(0, 1)], [1.0, 0.0], [0.0, 0.0], 1.0, 1.0)
+    pushes = steady_push(game, np.array([1.0, 0.0, -2.0, 3.0]))
+    rows = for_native(pushes, game, None, 0).rows
+    assert {(int(r[0]), r[3]) for r in rows} == {(0, 1.0), (2, -2.0), (3, 3.0)}
+    with pytest.raises(InvalidInput, match=r"faults\.axis"):
+        for_native((Push(force=1.0, axis=2),), game, None, 0)
 
 
 def test_links_of_agents_and_edges():

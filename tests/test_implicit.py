@@ -259,6 +259,24 @@ def test_the_equilibrium_is_the_same(decentralised):
     assert trajectory.reports["robots"]["equilibrium"]["final_distance"] < 1e-4
 
 
+def test_looking_at_a_run_does_not_change_it():
+    def loop_of():
+        system = robot_system(robot_state(FIVE), mode="implicit", integrator="euler")
+        return system.closed_loop(clock(0.01, 1.0))
+
+    whole, cut = loop_of(), loop_of()
+    expected = whole.advance(40, 1)
+    parts = []
+    for _ in range(4):
+        parts.append(cut.advance(10, 1))
+        cut.finish()
+    whole.finish()
+    assert np.array_equal(np.concatenate([p.state for p in parts]), expected.state)
+    assert np.array_equal(np.concatenate([p.input for p in parts]), expected.input)
+    for entry in (watch.SOLUTIONS, watch.PREDICTION, watch.NOT_MONOTONE):
+        assert cut.monitor[entry] == whole.monitor[entry]
+
+
 def test_a_period_over_which_outputs_fall_with_their_inputs_is_refused():
     """M = 1, m = 8, gamma = 0.1 and a linear spring: -0.17 at 4.2 s."""
     numbers = {
@@ -269,6 +287,12 @@ def test_a_period_over_which_outputs_fall_with_their_inputs_is_refused():
         system.closed_loop(clock(0.002, 42.0, 4.2))
     assert "agent 1" in str(error.value)
     system.closed_loop(clock(0.002, 4.0, 1.0))
+    nearly = robot_system(
+        robot_state(FIVE), {**numbers, "atan_coefficient": [0.01] * 5}, mode="implicit",
+        integrator="euler",
+    )  # fmt: skip
+    with pytest.raises(InvalidInput, match="does not rise with its input"):
+        nearly.closed_loop(clock(0.002, 42.0, 4.2))
 
 
 def test_laws_without_what_the_mode_needs_are_refused():

@@ -1,5 +1,7 @@
 """Margins: what disturbances can do within a control period, and barriers that leave room."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import EQUAL, V0, integrators, pi_cascades, robot_state, robots
@@ -77,6 +79,26 @@ def test_a_delay_lengthens_the_horizon():
     direct = influence(robots(EQUAL), 0.002, "euler", 15)
     assert np.array_equal(three.push_gain, direct.push_gain)
     assert np.array_equal(three.least_slope, one.least_slope), "an input is held for one period"
+
+
+def test_sensors_less_late_than_they_may_be_are_covered():
+    """Errors of a reading fade on their way, so that the worst delay need not be the longest."""
+    effect = influence(pi_cascades(2, v=8.0, k=0.5), 0.1, "euler", 1, 3)
+    without = influence(pi_cascades(2, v=8.0, k=0.5), 0.1, "euler", 1, 0)
+    assert np.all(effect.noise_gain >= without.noise_gain)
+    assert np.all(effect.noise_gain >= 0.2 * (1 - 1e-9))
+
+
+def test_constraints_that_only_look_affine_in_one_point_are_refused():
+    from types import SimpleNamespace
+
+    game = SimpleNamespace(
+        name="cubic", actions=1, box=None, gap_bounds=None, constraints_count=1,
+        weighted_constraint_hessian=lambda y, w: np.array([[6.0 * y[0] * w[0]]]),
+        constraint_jacobian=lambda y: np.array([[3.0 * y[0] ** 2]]),
+    )  # fmt: skip
+    with pytest.raises(InvalidInput, match="affine constraints and bounds on gaps"):
+        tightening(game, np.array([0.3]))
 
 
 GAMES = {
@@ -157,6 +179,7 @@ def disturbed(seed, **options):
     return system, Clock(0.4 * steps, 0.002, 0.002 * steps, 0.4 * steps)
 
 
+@pytest.mark.slow
 def test_within_the_bounds_nothing_leaves():
     """And beyond them something does, with the same margins: they are not idle."""
     tried = left = 0
@@ -172,7 +195,7 @@ def test_within_the_bounds_nothing_leaves():
         assert certify(system, clock).held["promised"]
         if tried <= 15:
             stronger = tuple(
-                Push(f.agents, f.start, f.end, 8.0 * f.force, f.profile, f.period)
+                replace(f, force=8.0 * f.force)
                 if isinstance(f, Push) else f for f in system.faults
             )  # fmt: skip
             beyond = System(
@@ -233,6 +256,21 @@ def test_what_is_not_covered_is_named(changes, label, words):
     assert words in condition["why"]
     assert condition["status"] != "met"
     assert report.held["promised"] == (condition["status"] == "assumed")
+
+
+def test_a_margin_promises_nothing_in_other_modes():
+    with pytest.raises(InvalidInput, match=r"systems.robots.margin: .*mode 'implicit'"):
+        load_scenario("velocity-sync", {**MARGIN, "controller.mode": "sampled"}).system_objects()
+
+
+@pytest.mark.slow
+def test_what_agents_could_gain_is_asked_of_the_set_itself():
+    from gne_mj.scenario import run
+
+    report = run("velocity-sync", {**MARGIN, "simulation.duration": 0.1}).reports["robots"]
+    epsilon = report["epsilon"]
+    assert epsilon["measured"] <= epsilon["p_rho"] + epsilon["of_margin"]
+    assert epsilon["of_margin"] > 0
 
 
 def test_a_start_within_the_tightening_is_refused():

@@ -90,6 +90,7 @@ def test_estimates_of_a_partial_law_ride_along(tmp_path):
         assert relative_error(got[2], expected[2]) < 1e-12
 
 
+@pytest.mark.slow
 def test_actuators_with_dynamics_of_their_own_beside_a_memory(tmp_path):
     """A filtered motor: its activation a' = (u - a) / T lies before the law's memory in act."""
     h, steps, lag, period = 0.01, 300, 0.05, 1

@@ -62,7 +62,13 @@ def full_information_cases():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", full_information_cases())
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name == "integrators as channels" else name
+        for name in full_information_cases()
+    ],
+)
 def test_full_information_equals_a_plain_rk4(name):
     system, agent, game = full_information_cases()[name]
     h, steps = (0.001, 200) if game.N == 10 else (0.005, 400)
@@ -78,7 +84,9 @@ def test_full_information_equals_a_plain_rk4(name):
 
 
 @pytest.mark.parametrize("graph", ["printed", "ring"])
-@pytest.mark.parametrize("name", ["integrators", "PI cascades"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("integrators", marks=pytest.mark.slow), "PI cascades"]
+)
 def test_fully_distributed_equals_a_plain_rk4(name, graph):
     agents, agent = {
         "integrators": (integrators(10), reference.Integrator()),

@@ -84,7 +84,7 @@ def expected_rate():
     return reference.closed_loop_rate(robot, "full_information", oracle(), RHO)
 
 
-both = pytest.mark.parametrize("engine", ["mujoco", "ode"])
+both = pytest.mark.parametrize("engine", [pytest.param("mujoco", marks=pytest.mark.slow), "ode"])
 
 
 @both
@@ -130,6 +130,7 @@ def test_any_fleet_over_any_graph_stays_inside(seed):
     assert loop.monitor[watch.STORAGE_RISE] <= 1e-9 * max(1.0, loop.monitor[watch.STORAGE_START])
 
 
+@pytest.mark.slow
 def test_rk4_is_of_fourth_order_in_mujoco():
     state, end = interior(np.random.default_rng(6), used=0.6), 1.0
     exact = reference.dop853(expected_rate(), state[:, :3].ravel(), np.array([0.0, end]))[-1]

@@ -372,6 +372,7 @@ def test_bounded_coupling_of_osnr_is_that_of_the_worst_end():
     assert found.quadratic.least < found.rigorous.least
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("above", [True, False])
 def test_measured_v_agrees_with_the_certificate(above):
     """Integrators near y*, the boundary far: V falls along the run if and only if it must."""
@@ -806,6 +807,7 @@ def test_the_command_prints_json():
     assert document["channels"]["epsilon"] == {"given": 0.01, "star": None, "search": None}
 
 
+@pytest.mark.slow
 def test_the_command_searches_epsilon():
     done = gne(
         "paper", "--search-epsilon", "--json", "--set", "simulation.duration=0.1",

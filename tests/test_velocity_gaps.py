@@ -92,7 +92,9 @@ def velocity_scenarios():
         scenario = load_scenario(name)
         for key, system in scenario.systems.items():
             if system.game.type in ("velocity-synchronization", "velocity-consensus"):
-                yield name, key
+                # of the disturbed one a loop of its own is compiled
+                marks = [pytest.mark.slow] if name == "disturbed" else []
+                yield pytest.param(name, key, marks=marks)
 
 
 @pytest.mark.parametrize(("name", "key"), list(velocity_scenarios()))

@@ -4,12 +4,20 @@ A loop is compiled with this module or with :mod:`gne_mj.loops.faults`, so that 
 not use costs nothing.
 """
 
-from gne_mj.native import kernel
+from gne_mj.native import copy, kernel
 
 
 @kernel
 def begin(agent, problem, clock, step, stage, state, memory, work):
-    """Nothing happens."""
+    """Nothing happens but that the outputs are what the law's memory is held at."""
+    if clock.mode != 0:
+        copy(work.y, work.held)
+
+
+@kernel
+def choose(y, seen):
+    """Of the outputs as they are and as they are seen, those that the law has."""
+    return y
 
 
 @kernel
@@ -19,7 +27,7 @@ def sense(game, problem, clock, step, stage, work, y, seen):
 
 
 @kernel
-def sense_state(agent, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, agent, problem, channels, clock, step, work, state, known, scratch):
     """The flat state as the law has it: the state, or ``known``, filled."""
     return state
 

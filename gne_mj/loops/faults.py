@@ -13,7 +13,6 @@ import numpy as np
 from gne_mj.controllers.settings import DEALT, LINKS, PENALTY, SHELL, SHELL_VALUE
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS
 from gne_mj.native import copy, kernel
-from gne_mj.plants.held_map import roll
 
 # Kinds of rows, in their order in ``Faults.rows``
 PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
@@ -75,11 +74,19 @@ def begin(agent, problem, clock, step, stage, state, memory, work):
     if stage == 0:
         work.now[DEALT] = step + 1.0
     read_sensors(agent, problem, clock, count, step, state, work)
+    if clock.mode != 0:
+        copy(work.seen, work.held)
     if len(memory) > 0:
         if fresh:
             corrupt(problem, clock, count, step, m, memory)
         if problem.settings[LINKS] > 0.0:
             exchange(problem, clock, count, step, memory, work)
+
+
+@kernel
+def choose(y, seen):
+    """Of the outputs as they are and as they are seen, those that the law has."""
+    return seen
 
 
 @kernel
@@ -167,7 +174,7 @@ def sense(game, problem, clock, step, stage, work, y, seen):
 
 
 @kernel
-def sense_state(agent, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, agent, problem, channels, clock, step, work, state, known, scratch):
     """The flat state as the law has it: ``known``, filled.
 
     A state of some periods ago is moved on by the plant's map under the inputs asked for since.
@@ -185,7 +192,7 @@ def sense_state(agent, problem, channels, clock, step, work, state, known, scrat
         known[r * states + agent.OUTPUT] = work.seen[r]
     for ago in range(late):
         at = slots * size + ((count - late + ago) % slots) * m
-        roll(agent, channels, clock, known, work.history[at : at + m], scratch)
+        plant.roll(agent, channels, clock, known, work.history[at : at + m], scratch)
     return known
 
 

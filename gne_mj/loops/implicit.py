@@ -14,7 +14,7 @@ import numpy as np
 from gne_mj.controllers.settings import SHELL, SHELL_VALUE
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import usable
-from gne_mj.loops.newton import FOUND, OUTSIDE, STEPS, UNSOLVED, solver_in
+from gne_mj.loops.newton import FOUND, OUTSIDE, STANDS, STEPS, UNSOLVED, solver_in
 from gne_mj.native import copy, kernel
 
 # The map may be linearised so often; predictions agree if no constraint differs by more than this
@@ -36,11 +36,15 @@ def act(
     p, b = len(work.g), problem.order.band[0]
     solver = solver_in(work.solver, m, p, states, b)
     found = solver.numbers[FOUND]
+    if solver.numbers[STANDS] == step + 1.0:  # a run that goes on after its end was looked at
+        copy(solver.held, work.demand)
+        return True
+    solver.numbers[STANDS] = step + 1.0
     if found > 0.0:
         watch.compare(monitor, time, work.y, solver.ahead)
     faults.sense(game, problem, clock, step, stage, work, work.y, work.seen)
     known = faults.sense_state(
-        agent, problem, channels, clock, step, work, state, solver.state, solver.scratch
+        plant, agent, problem, channels, clock, step, work, state, solver.state, solver.scratch
     )
     if found == 0.0:
         find_slopes(plant, context, agent, channels, clock, known, solver)
@@ -84,6 +88,7 @@ def act(
     law.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
     for r in range(m):
         solver.ahead[r], work.demand[r] = solver.y[r], solver.held[r]
+    law.settle(solver.ahead, work.held)
     watch.count_solution(monitor, time, solver.numbers[STEPS], agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
         constraint = int(work.now[SHELL])
@@ -120,7 +125,7 @@ def find_slopes(plant, context, agent, channels, clock, known, solver):
 
 @kernel
 def correct_slopes(solver):
-    """Slopes by the secants from (held, ahead) to (u, reached); returns the least secant.
+    """Slopes by the secants from (held, ahead) to (u, reached); returns the least one seen.
 
     A secant that is not positive is not taken: the equation would not be monotone.
     """
@@ -131,7 +136,7 @@ def correct_slopes(solver):
         # of a short way rounding is all that is seen
         if abs(moved) > 1e-9 * (1.0 + abs(solver.reached[r])) and change != 0.0:
             secant = moved / change
-            least = min(least, secant / solver.slope[r])
+            least = min(least, secant)
             if 0.0 < secant < np.inf:
                 solver.slope[r] = secant
                 solver.stiff[r] = 1.0 / secant

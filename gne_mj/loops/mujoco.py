@@ -281,7 +281,8 @@ def build(
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
         parts = parts_of(userdata, sizes[ROOM], steps, states)
         memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
-        law.rate(problem_in(table), parts[2].y, memory, rates)
+        seen = faults.choose(parts[2].y, parts[2].seen)
+        law.rate(problem_in(table), seen, memory, rates)
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
     def advance(

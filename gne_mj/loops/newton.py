@@ -41,8 +41,8 @@ ACCURATE, MOST_USES = 1e-10, 12
 
 # Entries of ``numbers``: how many inputs were found, steps taken, how much an agent's barrier
 # profile moves with its action, how often the factors were used and what they leave of an error,
-# the penalty that is solved for
-FOUND, STEPS, MOVES, USES, LEAVES, RHO, COUNT = range(7)
+# the penalty that is solved for, and the step (plus 1) that was solved for last
+FOUND, STEPS, MOVES, USES, LEAVES, RHO, STANDS, COUNT = range(8)
 
 
 class Solver(NamedTuple):

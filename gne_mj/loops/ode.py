@@ -91,11 +91,9 @@ def look(
             monitor[watch.EXIT_BETWEEN] = 1.0
         return False
     if instant:
-        if clock.mode != CONTINUOUS:
-            if work.stands[0] < step:  # a control period has passed
-                law.propagate(problem, work.held, memory, work.scratch)
-                work.stands[0] = step
-            copy(y, work.held)
+        if clock.mode != CONTINUOUS and work.stands[0] < step:  # a control period has passed
+            law.propagate(problem, work.held, memory, work.scratch)
+            work.stands[0] = step
         faults.begin(agent, problem, clock, step, stage, state, memory, work)
         if not acting.act(
             acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
@@ -114,13 +112,13 @@ def look(
 
 
 @kernel
-def rates(agent, law, problem, channels, state, u, work, out):
-    """Fill out with the rate of the flat state under u (m,), the law having acted (work.y)."""
+def rates(agent, law, problem, channels, state, u, y, out):
+    """Fill out with the rate of the flat state under u (m,), the law having acted at y (m,)."""
     m, states = channels.rest.shape
     for r in range(m):
         x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
         agent.rate(channels.parameters[r], x, u[r], rate)
-    law.rate(problem, work.y, state[m * states :], out[m * states :])
+    law.rate(problem, y, state[m * states :], out[m * states :])
 
 
 @kernel
@@ -180,7 +178,8 @@ def build(
                         )  # fmt: skip
                     if clock.mode == CONTINUOUS and every > 0:
                         acts = faults.push(problem, clock, step, work.u, work.acts)
-                        rates(agent, law, problem, channels, now, acts, work, k[stage, :n])
+                        seen = faults.choose(work.y, work.seen)
+                        rates(agent, law, problem, channels, now, acts, seen, k[stage, :n])
                 if every == 0:
                     return sample + 1, step
                 if stages == 4:

@@ -39,6 +39,11 @@ def actuator_of(places, r):
 
 
 @kernel
+def roll(agent, channels, clock, state, u, scratch):
+    """Not known without MuJoCo: late sensors of such robots are refused in mode implicit."""
+
+
+@kernel
 def predict(context, agent, channels, clock, state, u, out, trial, scratch):
     """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
 

@@ -6,10 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from gne_mj import faults
-from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
-from gne_mj.margins import Disturbance, influence, tightening
-from gne_mj.plants.agents import Agents
+from gne_mj.margins import Disturbance
 from gne_mj.scenario_tables.table import PerAgent, Table, per_agent
 
 
@@ -21,13 +19,17 @@ class _FaultTable(Table):
         given = self.model_dump(exclude={"type"}, exclude_none=True)
         if "agents" in given:
             given["agents"] = tuple(i - 1 for i in given["agents"])
+        if "axis" in given:
+            given["axis"] -= 1
         if "edges" in given:
             given["edges"] = tuple((i - 1, j - 1) for i, j in given["edges"])
         return self.fault(**given)
 
 
 class _SomeTable(_FaultTable):
-    agents: list[int] | None = Field(None, description="numbered from 1; all if left out")
+    agents: list[int] | None = Field(
+        None, min_length=1, description="numbered from 1; all if left out"
+    )
     start: float = Field(0.0, ge=0, description="s")
     end: float | None = Field(None, gt=0, description="s; the run's end if left out")
 
@@ -38,6 +40,9 @@ class PushTable(_SomeTable):
     fault = faults.Push
     type: Literal["push"]
     force: float = Field(description="in the input's unit")
+    axis: int | None = Field(
+        None, ge=1, description="which entry of the agents' actions; all if left out"
+    )
     profile: Literal["constant", "sine", "square", "random"] = "constant"
     period: float = Field(1.0, gt=0, description="s, of 'sine' and 'square'")
 
@@ -103,11 +108,15 @@ class SilenceTable(_LinksTable):
     type: Literal["silence"]
 
 
-class CorruptionTable(_SomeTable):
+class CorruptionTable(_FaultTable):
     """Estimates shifted once, at the start."""
 
     fault = faults.Corruption
     type: Literal["estimate-corruption"]
+    agents: list[int] | None = Field(
+        None, min_length=1, description="numbered from 1; all if left out"
+    )
+    start: float = Field(0.0, ge=0, description="s")
     amplitude: float = Field(ge=0, description="greatest shift, uniform")
 
 
@@ -138,13 +147,3 @@ class MarginTable(Table):
             for key in ("push", "noise")
         ]
         return Disturbance(each[0], each[1], self.delay)
-
-    def tightened(
-        self, game: Game, agents: Agents, timestep: float, integrator: str, period: int
-    ) -> Game:
-        """The game with a barrier that leaves room for such disturbances."""
-        if integrator == "rosenbrock":
-            raise InvalidInput("margin", "given", "margins are for the held modes")
-        bound = self.disturbance(game)
-        effect = influence(agents, timestep, integrator, period, bound.delay)
-        return game.tightened(tightening(game, effect.of(bound)))

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
 from gne_mj.errors import InvalidInput
+from gne_mj.margins import with_margin
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.scenario_tables.agents import (
@@ -49,7 +50,7 @@ class BarrierTable(Table):
     schedule: Literal["exponential", "reciprocal", "halving"] | None = Field(
         None, description="how rho falls in time; constant if left out"
     )
-    time_constant: float = Field(1.0, gt=0, description="s, of the schedule")
+    time_constant: float | None = Field(None, gt=0, description="s, of the schedule; 1 if left out")
     floor: float | None = Field(
         None,
         gt=0,
@@ -60,9 +61,14 @@ class BarrierTable(Table):
     def build(self, floor: float) -> Schedule | None:
         """The schedule, falling to ``floor`` unless that is given."""
         if self.schedule is None:
+            for key in ("floor", "time_constant"):
+                if getattr(self, key) is not None:
+                    raise InvalidInput(
+                        f"barrier.{key}", getattr(self, key), "it goes with barrier.schedule"
+                    )
             return None
         lowest = min(floor, self.rho) if self.floor is None else self.floor
-        return Schedule(self.schedule, self.rho, lowest, self.time_constant)
+        return Schedule(self.schedule, self.rho, lowest, self.time_constant or 1.0)
 
 
 class PlantTable(Table):
@@ -146,8 +152,15 @@ class SystemTable(Table):
             game = self.game.build(count)
             agents = self.agents.build(game.sizes)
             if self.margin is not None:
+                if self.controller.mode != "implicit":
+                    raise InvalidInput(
+                        "margin", "given", "it is for mode 'implicit', where a margin is a promise"
+                    )
                 steps = max(1, round(period / simulation.timestep))
-                game = self.margin.tightened(game, agents, simulation.timestep, integrator, steps)
+                game = with_margin(
+                    game, agents, self.margin.disturbance(game), simulation.timestep, integrator,
+                    steps,
+                )  # fmt: skip
             law = self.controller.build(game)
             state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
             filtered = self.initial.filtered
@@ -193,7 +206,7 @@ class SimulationTable(Table):
     )
     integrator: Literal["rk4", "euler"] = "rk4"
     tolerance: float = Field(1e-3, gt=0, description="on max |y - y*|, for status converged")
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, le=2**53, description="of what is random in faults")
 
 
 class RecordingTable(Table):

@@ -15,6 +15,7 @@ from gne_mj.margins import Disturbance, Influence, influence, largest_push
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
 from gne_mj.theory.assumptions import ASSUMED, FAILS, MET, UNKNOWN, Assumption, convex_constraints
+from gne_mj.theory.theorem import Theorem
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ class Held:
     @property
     def conditions(self) -> tuple[Assumption, ...]:
         """What the promise rests on."""
-        found = [self._law(), self._slopes(), self._inputs()]
+        found = [self._law(), self._monotone(), self._slopes(), self._inputs()]
         if self.system.decentralised:
             found.append(convex_constraints(self.system))
         if self.system.disturbance is not None or self.system.faults:
@@ -110,6 +111,19 @@ class Held:
         )
         return Assumption(label, MET, f"{self.system.law.information} information, {how}")
 
+    def _monotone(self) -> Assumption:
+        label, system = "monotone", self.system
+        alone = system.decentralised or system.law.graph is not None
+        if alone:  # only own derivatives of the costs enter
+            return Assumption(label, ASSUMED if not _ours(system) else MET, "costs convex in own"
+                              " actions")  # fmt: skip
+        slopes = Theorem(system).slopes
+        if slopes.monotone:
+            return Assumption(label, MET, "F is strongly monotone")
+        if slopes.refuted:
+            return Assumption(label, FAILS, "F is not monotone at a sampled profile")
+        return Assumption(label, ASSUMED, "F monotone, which nothing that was looked at refutes")
+
     def _slopes(self) -> Assumption:
         label, effect = "dy+/du > 0", self.influence
         if effect is None:
@@ -169,9 +183,14 @@ class Held:
                 FAILS,
                 f"sensors are {struck.delay} periods late, and the margin covers {bound.delay}",
             )
-        return Assumption(
-            label, MET, "the barrier is tightened by what they can do within a control period"
-        )
+        why = "the barrier is tightened by what they can do within a control period"
+        if system.game.gap_bounds is None and not _ours(system):
+            return Assumption(label, ASSUMED, f"{why}, the constraints being affine")
+        return Assumption(label, MET, why)
+
+
+def _ours(system: System) -> bool:
+    return system.game.kernels.__name__.startswith("gne_mj.games.")
 
 
 def strength(faults: tuple[Fault, ...], system: System) -> Disturbance:

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.errors import InvalidInput
-from gne_mj.faults import Fault, Push
+from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.faults import Fault, Push, steady_push
 from gne_mj.loops import monitor as watch
+from gne_mj.margins import with_margin
+from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 
 # How the ends of a bracket may differ, as a factor
@@ -59,7 +61,18 @@ def stays_inside(system: System, clock: Clock) -> bool:
     loop = system.closed_loop(clock)
     loop.advance(1, clock.steps(clock.duration))
     loop.finish()
+    raise_pending()
     return bool(loop.monitor[watch.EXIT] == watch.INSIDE)
+
+
+def held_for(system: System, timestep: float, steps: int) -> System:
+    """The system with the margin that its declared disturbances need for such a control period."""
+    if system.disturbance is None:
+        return system
+    game = with_margin(
+        system.game, system.agents, system.disturbance, timestep, system.integrator, steps
+    )
+    return replace(system, game=game)
 
 
 def search_period(
@@ -84,7 +97,11 @@ def search_period(
         if progress is not None:
             progress(f"{system.name}: trying a period of {period:.4g} s")
         duration = np.ceil(clock.duration / period - 1e-9) * period
-        stayed = stays_inside(system, Clock(duration, clock.timestep, period, duration))
+        try:
+            trial = held_for(system, clock.timestep, steps)
+            stayed = stays_inside(trial, Clock(duration, clock.timestep, period, duration))
+        except (InvalidInput, InfeasibleStart):  # disturbances of so long use up a bound
+            stayed = False
         trials.append((period, stayed))
         return stayed
 
@@ -116,6 +133,8 @@ def search_push(
     several periods, or once from some time on; the scenario's own faults stay.
     """
     best, pattern, runs, tried = np.inf, None, 0, 0.0
+    if not stays_inside(system, clock):
+        return PushSearch(0.0, "without any push", 0.0, 1)
     for name, pushes in _patterns(system, clock):
 
         def stays(size: float, pushes: tuple[Push, ...] = pushes) -> bool:
@@ -162,17 +181,12 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
         (f"in squares of {length:g} s", {"profile": "square", "period": length})
         for length in (2.0 * period, 20.0 * period, 0.2 * clock.duration)
     ]
-    owner = game.agent_of_action
     for k, name in enumerate(game.constraint_names):
         # Of a bound on a gap that vanishes every direction is as good as the other.
         direction = np.sign(np.where(slopes[k] != 0, slopes[k], around[k]))
-        agents = np.flatnonzero(direction)
-        if not len(agents):
+        if not np.any(direction):
             continue
         for sign in (1.0, -1.0) if game.gap_bounds is not None else (1.0,):
             for course, options in courses:
-                pushes = tuple(
-                    Push(agents=(int(owner[a]),), force=sign * direction[a], **options)
-                    for a in agents
-                )
+                pushes = steady_push(game, sign * direction, **options)
                 yield f"'{name}', {'+' if sign > 0 else '-'}, {course}", pushes

@@ -197,11 +197,13 @@ def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
     search = held["push_search"]
     if search is not None:
         least = search["smallest_breaking_push"]
-        if least is None:
+        if least == 0.0:
+            text = "the run leaves the set without any push"
+        elif least is None:
             text = f"none up to {search['largest_tried']:.4g} leaves the set"
         else:
             text = f"{least:.4g} leaves the set ({search['pattern']})"
-            if held["largest_push"]:
+            if held["largest_push"] and least:
                 text += f"; the certified push is {held['largest_push'] / least:.0%} of it"
         yield "adversarial search", f"{text}, by {search['runs']} runs from this start"
     search = held["period_search"]

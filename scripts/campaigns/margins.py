@@ -12,7 +12,7 @@ from draws import progress
 
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.errors import InvalidInput
-from gne_mj.faults import Fault, Noise, Push, SensorDelay
+from gne_mj.faults import Fault, Noise, Push, SensorDelay, sensor_delay
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.graph import ring
 from gne_mj.loops import monitor as watch
@@ -57,7 +57,7 @@ def _job(key: tuple[int, int]) -> Counter[str]:
         if not Held(system, clock).promised:
             counts[f"{kind}, refused (slope not certified)"] += 1
             continue
-        late = any(isinstance(fault, SensorDelay) for fault in system.faults)
+        late = sensor_delay(system.faults) > 0
         reuse = plant if not late else None  # another size of memory
         loop = system.closed_loop(clock, reuse)
         if system.engine == "mujoco" and not late:
@@ -70,6 +70,9 @@ def _job(key: tuple[int, int]) -> Counter[str]:
             how = "left between instants only" if between else BROKEN
         elif code != watch.INSIDE:
             how = "ended without an action"
+        if how.endswith(BROKEN_BY):
+            where = int(loop.monitor[watch.EXIT_CONSTRAINT]), loop.monitor[watch.EXIT_VALUE]
+            print(key, sum(counts.values()), kind, how, code, loop.monitor[watch.EXIT_TIME], where)
         counts[f"{kind}, {how}"] += 1
     return counts
 
@@ -125,7 +128,7 @@ def _faults(
         )  # fmt: skip
     yield Noise(amplitude=noise)
     if delay:
-        yield SensorDelay(periods=delay)
+        yield SensorDelay(periods=int(rng.integers(0, delay + 1)))
 
 
 def ratios() -> list[str]:
