@@ -154,7 +154,8 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
                         markeredgewidth=1.0,
                     )  # fmt: skip
             axes.set_title(f"{mode}, push {push:g}", fontsize=8.5)
-            axes.set_xticks(range(len(periods)), [f"{1e3 * p:.4g}" for p in periods])
+            short = [f"{float(f'{1e3 * period:.2g}'):g}" for period in periods]
+            axes.set_xticks(range(len(periods)), short)
             axes.set_yticks(range(len(margins)), [f"{m:.1g}" for m in margins])
             axes.tick_params(labelsize=7)
         for axes in grid[-1]:
