@@ -295,7 +295,7 @@ def test_faults_are_checked_where_they_are_made(make):
 @pytest.mark.slow
 def test_what_the_sensors_say_is_what_the_memory_moves_with():
     """A biased output is what an agent sends, held or continuous, with messages or without."""
-    law = PartialInformation(graphs.complete(5), 5.0, 0.05)
+    law = PartialInformation(graphs.complete(5), 2.0, 0.2)
     for mode in ("sampled", "continuous"):
         system = robot_system(
             robot_state(FIVE), law=law, mode=mode, integrator="euler",
