@@ -306,3 +306,19 @@ def test_the_longest_safe_period_is_found_by_trial():
     assert 0.01 <= found.inside < found.outside <= 1.05 * found.inside + 0.011
     assert dict(found.trials)[found.inside]
     assert not dict(found.trials)[found.outside]
+
+
+def test_a_controller_that_does_not_say_what_it_knows_knows_all():
+    scenario = load_scenario(
+        {
+            "systems": {
+                "robots": {
+                    "game": {"type": "velocity-synchronization"},
+                    "agents": {"type": "flexible-robot", "count": 2},
+                    "controller": {"mode": "implicit"},
+                }
+            }
+        }
+    )
+    (system,) = scenario.system_objects()
+    assert (system.law.information, system.mode) == ("full", "implicit")

@@ -1,13 +1,13 @@
 """The whole of a scenario file: the shared clock and the systems on it."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
@@ -143,6 +143,13 @@ class SystemTable(Table):
     faults: list[Annotated[FaultTable, Field(discriminator="type")]] = Field(
         [], description="what goes wrong, each from a start (s) to an end"
     )
+
+    @field_validator("controller", mode="before")
+    @classmethod
+    def _full_by_default(cls, table: Any) -> Any:
+        """A controller that does not say what it knows knows everything, as if left out."""
+        given = isinstance(table, Mapping) and "information" not in table
+        return {"information": "full", **table} if given else table
 
     def build(self, name: str, simulation: "SimulationTable") -> System:
         """The system, with the simulation's integrator unless it names its own."""

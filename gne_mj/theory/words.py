@@ -193,7 +193,8 @@ def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f" constraints tightened by up to {max(held['tightening']):.4g}",
         )
     if held["largest_push"] is not None:
-        yield "largest push", f"{held['largest_push']:.4g} on every agent at once is covered"
+        push = f"{held['largest_push']:.4g} on every agent at once is covered"
+        yield "largest push", push if held["largest_push"] else "none is covered without a margin"
     search = held["push_search"]
     if search is not None:
         least = search["smallest_breaking_push"]
