@@ -277,6 +277,18 @@ def test_looking_at_a_run_does_not_change_it():
         assert cut.monitor[entry] == whole.monitor[entry]
 
 
+def test_a_push_from_rest_where_all_gaps_vanish_is_solved_for():
+    """There the bounds' first derivatives vanish too, and a long step looks short by them."""
+    rest = np.full(5, V0)
+    start = robot_state(rest, appendage=np.add(rest, [60.0, -60.0, 60.0, -60.0, 60.0]))
+    system = robot_system(start, mode="implicit", integrator="euler")
+    states, u, _, loop = instants(system, 0.005, 30, 20)
+    assert loop.monitor[watch.EXIT_BETWEEN] or loop.monitor[watch.EXIT] == watch.INSIDE
+    y = states[1 : len(u) + 1, :, 1]
+    expected = [reference.full_information(GAME, RHO, row) for row in y]
+    assert np.max(np.abs(u[: len(y)] - expected)) < 2e-6 * np.max(np.abs(expected))
+
+
 def test_a_period_over_which_outputs_fall_with_their_inputs_is_refused():
     """M = 1, m = 8, gamma = 0.1 and a linear spring: -0.17 at 4.2 s."""
     numbers = {

@@ -134,11 +134,13 @@ RUN = """
 import json, sys
 from gne_mj.controllers import full_information
 from gne_mj.games import velocity_synchronization
-from gne_mj.loops import ode
+from gne_mj.loops import explicit, faultless, ode
 from gne_mj.plants import flexible_robot
 from gne_mj.scenario import run
 trajectory = run("velocity-sync", {"plant.engine": "ode", "simulation.duration": 0.1})
-advance = ode.build(flexible_robot, full_information, velocity_synchronization)
+advance = ode.build(
+    flexible_robot, full_information, velocity_synchronization, explicit, faultless
+)
 statistics = [sum(advance.stats.cache_hits.values()), sum(advance.stats.cache_misses.values())]
 print(json.dumps([statistics, trajectory["robots"]["action"].values.tolist()]))
 """

@@ -6,6 +6,8 @@ positive, so that it has one solution, strictly inside.
 
 import sys
 
+import numpy as np
+
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
 from gne_mj.loops.implicit import act
 from gne_mj.loops.newton import RHO, newton, solver_length
@@ -84,12 +86,18 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
 
 
 @kernel
-def local_length(problem, first, last, step, solver):
-    """Greatest change of a constraint by an action's step, relative to the distance to a bound."""
-    order, greatest = problem.order, 0.0
+def local_length(game, problem, first, last, step, solver):
+    """The step's length in the barrier's own norm, that of the worst action and constraint.
+
+    With s = -g - t its square is (dg step / s)^2 + d2g step^2 / s: where a gap vanishes, dg does.
+    """
+    order, data, greatest = problem.order, problem.data, 0.0
     for entry in range(len(order.column)):
-        change = solver.jacobian[entry] * step[order.position[order.column[entry]]]
-        change = abs(change) * solver.inverse[order.within[entry]]
+        k, a = order.within[entry], order.column[entry]
+        moved = step[order.position[a]]
+        change = solver.jacobian[entry] * moved * solver.inverse[k]
+        second = abs(game.constraint_hessian(data.parameters, k, a, a, solver.trial))
+        change = change * change + second * moved * moved * solver.inverse[k]
         if not change <= greatest:
             greatest = change
-    return greatest
+    return np.sqrt(greatest)

@@ -14,6 +14,8 @@ is taken to be 1 and nothing is promised.
 
 import sys
 
+import numpy as np
+
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
 from gne_mj.loops.implicit import act
 from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton, solver_length
@@ -127,17 +129,18 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
 
 
 @kernel
-def local_length(problem, first, last, step, solver):
-    """Greatest change of a constraint along the step, relative to the distance to its bound."""
+def local_length(game, problem, first, last, step, solver):
+    """The step's length in the barrier's own norm, as :func:`gne_mj.loops.joint.local_length`."""
     data, greatest, slot = problem.data, 0.0, 0
     low, high = data.offsets[first], data.offsets[first + 1]
     for entry in range(data.own_pointer[first], data.own_pointer[first + 1]):
         k = data.own_index[entry]
-        change = 0.0
         for a in range(low, high):
-            change += solver.jacobian[slot] * step[a - low]
+            moved = pace(problem, k, solver) * step[a - low]
+            change = solver.jacobian[slot] * moved * solver.inverse[k]
+            second = abs(game.constraint_hessian(data.parameters, k, a, a, solver.mixed))
+            change = change * change + second * moved * moved * solver.inverse[k]
+            if not change <= greatest:
+                greatest = change
             slot += 1
-        change = abs(change) * pace(problem, k, solver) * solver.inverse[k]
-        if not change <= greatest:
-            greatest = change
-    return greatest
+    return np.sqrt(greatest)

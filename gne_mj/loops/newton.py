@@ -23,8 +23,8 @@ from gne_mj.native import copy, kernel
 # How it ended
 SOLVED, ROUNDED, UNSOLVED, OUTSIDE = range(4)
 
-# A step this long, relative to the distances to the bounds, is the last: what is left after it is
-# of the order of its square.
+# A step this long in the barrier's own norm, in which a step of 1 may reach a bound, is the last:
+# what is left after it is of the order of its square.
 LAST_STEP = 1e-6
 GOOD_STEP = 1e-3  # if rounding ends the progress before, the end still counts as accurate
 DECREASE = 1e-4  # of the residual's norm, relative to the step's length
@@ -174,7 +174,9 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         if usable:
             banded.solve_definite(solver.band, n, b, solver.old_step)
             if numbers[USES] < MOST_USES:
-                remaining = equation.local_length(problem, first, last, solver.old_step, solver)
+                remaining = equation.local_length(
+                    game, problem, first, last, solver.old_step, solver
+                )
                 if remaining * max(numbers[LEAVES], remaining) <= ACCURATE:
                     numbers[USES] += 1.0
                     for r in range(low, high):
@@ -196,7 +198,7 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         else:
             numbers[LEAVES] = 1.0
         numbers[USES] = 1.0
-        remaining = equation.local_length(problem, first, last, step, solver)
+        remaining = equation.local_length(game, problem, first, last, step, solver)
         if not remaining < np.inf:
             return UNSOLVED
         length = 1.0
