@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from builders import FIVE, robot_state, robot_system, run_loop
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import reference
@@ -21,6 +21,7 @@ GAME = reference.VelocityGame(3.0, np.full(5, 3.0))
     st.sampled_from(list(SCHEDULES)), st.floats(1e-3, 10), st.floats(0.01, 100), st.floats(0, 200)
 )
 def test_schedules_are_what_they_are_called(kind, start, constant, time):
+    assume(kind != "halving" or abs(time / constant - round(time / constant)) > 1e-6 or time == 0)
     schedule = Schedule(kind, start, 1e-6 * start, constant)
     expected = {
         "exponential": start * np.exp(-time / constant),
