@@ -5,6 +5,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gne_mj.batches import open_batch, run_batch
     from gne_mj.scenario import Scenario, load_scenario
     from gne_mj.simulation import Simulation
     from gne_mj.trajectory import Trajectory
@@ -17,10 +18,21 @@ _LAZY = {
     "Simulation": "gne_mj.simulation",
     "Trajectory": "gne_mj.trajectory",
     "load_scenario": "gne_mj.scenario",
+    "open_batch": "gne_mj.batches",
     "run": "gne_mj.scenario",
+    "run_batch": "gne_mj.batches",
 }
 
-__all__ = ["Scenario", "Simulation", "Trajectory", "__version__", "load_scenario", "run"]
+__all__ = [
+    "Scenario",
+    "Simulation",
+    "Trajectory",
+    "__version__",
+    "load_scenario",
+    "open_batch",
+    "run",
+    "run_batch",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -85,6 +85,12 @@ class SolverError(GneError, RuntimeError):
         super().__init__(f"{message} (residual {residual:.3g} after {iterations} iterations)")
 
 
+class StorageError(GneError, RuntimeError):
+    """Results cannot be written, as on a full disk; what was written before is whole."""
+
+    status = "not_stored"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint for a name that is not known: the nearest one, or all."""
     known = list(known)

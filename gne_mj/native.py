@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numba
 from numba import njit, types
 from numba.core import cgutils
-from numba.extending import register_jitable
+from numba.extending import intrinsic, register_jitable
 from numba.np.arrayobj import make_array, populate_array
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -106,3 +106,16 @@ def array_at(context: Any, builder: Any, kind: types.Array, address: Any, length
         meminfo=None,
     )
     return array._getvalue()
+
+
+@intrinsic
+def call_loop(typingctx: Any, function: Any, table: Any, room: Any, steps: Any) -> Any:
+    """Call a native loop, a C function of three integers, at an address; returns an integer."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from llvmlite import ir
+
+        kind = ir.FunctionType(cgutils.intp_t, [cgutils.intp_t] * 3)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.int64(types.int64, types.int64, types.int64, types.int64), codegen

@@ -30,8 +30,9 @@ from gne_mj.loops import explicit, faultless, joint, local
 from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
+from gne_mj.loops.layout import Clock as LoopClock
+from gne_mj.loops.layout import Setup
 from gne_mj.loops.ode import MODES, OdeLoop
-from gne_mj.loops.ode import Clock as LoopClock
 from gne_mj.margins import Disturbance, influence
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
@@ -409,13 +410,68 @@ class System:
         return loop
 
     def _closed_loop(self, clock: Clock, plant: "MujocoPlant | None") -> ClosedLoop:
+        setup = self.setup(clock)
+        laws, game, memory = self.law.kernels, self.game.kernels, self.loop_memory
+        if self.engine == "mujoco":
+            # Late: MuJoCo is slow to import, and the twins do not need it.
+            from gne_mj.loops.mujoco import MujocoLoop
+
+            fleet: MujocoPlant | MjcfPlant
+            if plant is None:
+                fleet = self.mujoco_plant(clock)
+                if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
+                    self._try_slopes(fleet, clock)
+            else:
+                fleet = plant
+                plant.model.opt.timestep = plant.timestep = clock.timestep
+                plant.reset(self.state)
+            return MujocoLoop(fleet, laws, game, setup, memory, self.acting, self.fault_kernels)
+        if self.integrator == "rosenbrock" and self.law.graph is not None:
+            from gne_mj.loops.rosenbrock import RosenbrockLoop
+
+            return RosenbrockLoop(
+                self.agents.kind, laws, game, setup.problem,
+                Channels(self.agents.parameters, setup.rest), self.law.graph, clock.timestep,
+                self.state, self.memory,
+            )  # fmt: skip
+        return OdeLoop(
+            self.agents, laws, game, setup, self.state, memory, self.acting, self.fault_kernels
+        )
+
+    @property
+    def fault_kernels(self) -> ModuleType:
+        """The module of what goes wrong in this system's loops."""
+        return native_faults if self.faults else faultless
+
+    @property
+    def loop_memory(self) -> NDArray[np.float64]:
+        """What a loop's memory begins with, see :meth:`with_links`."""
+        return self.with_links(self.memory)
+
+    def with_links(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A law's memory, and where messages can fail behind it what was heard over each link."""
+        if not strikes_messages(self.faults):
+            return memory
+        assert self.law.graph is not None
+        m = self.game.actions
+        heard = links_memory(self.law.graph, m, memory, message_delay(self.faults))
+        return np.concatenate([memory, heard])
+
+    def setup(self, clock: Clock) -> Setup:
+        """What a loop of this system is made of, besides its plant, its start and its kernels.
+
+        Raises:
+            InvalidInput: see :meth:`closed_loop`.
+        """
         self._check_step(clock)
         self._check_slopes(clock)
-        rest = self.agents.equilibrium(self.equilibrium.action)
+        settings = self.law.settings(self.rho)
+        if strikes_messages(self.faults):
+            settings[LINKS] = len(self.memory)
         problem = Problem(
             data=self.game.data,
             graph=self.law.graph_data,
-            settings=self.law.settings(self.rho),
+            settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.equilibrium.action,
             propagator=(
@@ -427,62 +483,40 @@ class System:
             order=self.rows,
             faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
-        laws, game, m = self.law.kernels, self.game.kernels, self.game.actions
-        period, mode = clock.steps(clock.control_period), MODES[self.mode]
-        acting, memory = self.acting, self.memory
-        faults: ModuleType = native_faults if self.faults else faultless
-        if strikes_messages(self.faults):
-            assert self.law.graph is not None
-            problem.settings[LINKS] = len(memory)
-            heard = links_memory(self.law.graph, m, memory, message_delay(self.faults))
-            memory = np.concatenate([memory, heard])
-        late = sensor_delay(self.faults)
-        sizes = Sizes(
+        return Setup(
+            problem,
+            self.agents.equilibrium(self.equilibrium.action),
+            LoopClock(
+                clock.timestep,
+                clock.steps(clock.control_period),
+                MODES[self.mode],
+                METHODS.get(self.integrator, -1),  # the Rosenbrock loop has no use for it
+            ),
+            *self._sizes,
+        )
+
+    @property
+    def _sizes(self) -> Sizes:
+        m, late = self.game.actions, sensor_delay(self.faults)
+        return Sizes(
             history=(late + 1) * m * (self.agents.states + 1) if late else 0,
-            solver=acting.solver_length(
+            solver=self.acting.solver_length(
                 m, self.game.constraints_count,
                 len(self.game.actions_in_constraints[1]), self.agents.states,
                 int(self.rows.band[0]),
             ),
         )  # fmt: skip
-        if self.engine == "mujoco":
-            # Late: MuJoCo is slow to import, and the twins do not need it.
-            from gne_mj.loops.mujoco import MujocoLoop, room
 
-            if plant is None:
-                needed = room(self.game, self.agents, len(memory), mode, sizes)
-                fleet = self._mujoco_plant(clock.timestep, *needed)
-                if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
-                    self._try_slopes(fleet, clock)
-            else:
-                fleet = plant
-                plant.model.opt.timestep = plant.timestep = clock.timestep
-                plant.reset(self.state)
-            return MujocoLoop(
-                fleet, laws, game, problem, rest, mode, period, memory, acting, faults, sizes
-            )
-        channels = Channels(self.agents.parameters, rest)
-        kind = self.agents.kind
-        if self.integrator == "rosenbrock" and self.law.graph is not None:
-            from gne_mj.loops.rosenbrock import RosenbrockLoop
-
-            return RosenbrockLoop(
-                kind, laws, game, problem, channels, self.law.graph, clock.timestep,
-                self.state, self.memory,
-            )  # fmt: skip
-        loop_clock = LoopClock(clock.timestep, period, mode, METHODS[self.integrator])
-        return OdeLoop(
-            kind, laws, game, problem, channels, loop_clock, self.state, memory, acting, faults,
-            sizes,
-        )  # fmt: skip
-
-    def _mujoco_plant(
-        self, timestep: float, userdata: int, memory: int
-    ) -> "MujocoPlant | MjcfPlant":
-        """The fleet, reset to the start."""
+    def mujoco_plant(self, clock: Clock) -> "MujocoPlant | MjcfPlant":
+        """The fleet, reset to the start, with room for this system's loop."""
+        from gne_mj.loops.mujoco import room
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
 
+        userdata, memory = room(
+            self.game, self.agents, len(self.loop_memory), MODES[self.mode], self._sizes
+        )
+        timestep = clock.timestep
         if not isinstance(self.agents, MjcfRobots):
             fleet = MujocoPlant(
                 self.agents, timestep, self.integrator, userdata=userdata, memory=memory

@@ -67,7 +67,7 @@ class Trajectory:
                 attrs={
                     "scenario": source,
                     "seed": seed,
-                    "versions": json.dumps(_versions()),
+                    "versions": json.dumps(versions()),
                     "wall_time": wall_time,
                     "status": _worst(part[3].status for part in parts.values()),
                     "message": "; ".join(
@@ -132,16 +132,25 @@ def _worst(statuses: Iterable[str]) -> str:
     return min(statuses, key=_ORDER.index)
 
 
-def _dataset(
-    system: System, time: NDArray[np.float64], samples: Samples, certificate: Certificate
-) -> "xarray.Dataset":
-    import xarray
+def axis_of(system: System) -> str:
+    """The dimension of actions: agents, where each has one."""
+    return "agent" if system.game.actions == system.game.agents else "action"
 
+
+def variables_of(
+    system: System, time: NDArray[np.float64], samples: Samples
+) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
+    """What is kept of a run's samples: (dimensions, values, attributes) by name.
+
+    Args:
+        system: what was run.
+        time: (samples,) in s.
+        samples: at these times.
+    """
     game, kind = system.game, system.agents.kind
     y = samples.state[:, :, kind.OUTPUT]
     unit = {"units": game.action_unit}
-    # Where every action is a number of its own, agents and actions are the same axis.
-    axis = "agent" if game.actions == game.agents else "action"
+    axis = axis_of(system)
     variables: dict[str, Any] = {
         "action": (("time", axis), y, {**unit, "long_name": game.action_name}),
         "input": (
@@ -225,20 +234,33 @@ def _dataset(
             game.margins,
             {"long_name": "t: the barrier guards g + t < 0"},
         )
-    numbers = np.arange(1, game.agents + 1)
+    return variables
+
+
+def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
+    """The coordinates that go with these variables."""
+    game = system.game
     coordinates: dict[str, Any] = {
         "time": ("time", time, {"units": "s"}),
-        "agent": ("agent", numbers),
+        "agent": ("agent", np.arange(1, game.agents + 1)),
         "constraint_name": ("constraint", np.array(game.constraint_names)),
-        "component": ("component", np.array([name for name, _ in kind.STATES])),
+        "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
     }
-    if axis == "action":
+    if axis_of(system) == "action":
         coordinates["owner"] = ("action", game.agent_of_action + 1)
         coordinates["axis"] = ("action", np.array(game.axis_of_action))
-    report = certificate.to_dict()
+    return coordinates
+
+
+def _dataset(
+    system: System, time: NDArray[np.float64], samples: Samples, certificate: Certificate
+) -> "xarray.Dataset":
+    import xarray
+
+    game, report = system.game, certificate.to_dict()
     return xarray.Dataset(
-        variables,
-        coordinates,
+        variables_of(system, time, samples),
+        coordinates_of(system, time),
         attrs={
             "game": game.name,
             "agent_name": game.agent_name,
@@ -256,6 +278,7 @@ def _dataset(
     )
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of what results may depend on, to the last bit."""
     names = ("gne-mj", "mujoco", "numba", "numpy", "scipy")
     return {"python": platform.python_version(), **{name: version(name) for name in names}}

@@ -31,9 +31,10 @@ from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.loops.ode import CONTINUOUS, Clock, OdeLoop
+from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.ode import CONTINUOUS, OdeLoop
 from gne_mj.native import compiled, source_key
-from gne_mj.plants.ode import EULER, Channels
+from gne_mj.plants.ode import EULER
 
 RHO, EPSILON, GAIN = 0.1, 0.05, 0.7
 COUPLING, TAU = 1.7, 0.3
@@ -75,12 +76,9 @@ def problem_of(game, law, limit=np.inf):
 def loop_at(game, law, y, memory, h=1.0):
     """The product's compiled loop of integrators (state y), Euler, at any state and memory."""
     agents = integrators(game.actions)
-    channels = Channels(agents.parameters, np.zeros((game.actions, 1)))
-    clock = Clock(h, 1, CONTINUOUS, EULER)
-    return OdeLoop(
-        agents.kind, law.kernels, game.kernels, problem_of(game, law), channels, clock,
-        y.reshape(-1, 1), memory,
-    )  # fmt: skip
+    rest, clock = np.zeros((game.actions, 1)), Clock(h, 1, CONTINUOUS, EULER)
+    setup = Setup(problem_of(game, law), rest, clock)
+    return OdeLoop(agents, law.kernels, game.kernels, setup, y.reshape(-1, 1), memory)
 
 
 def step(game, law, y, memory):

@@ -28,8 +28,9 @@ from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.ode import HELD, Clock, OdeLoop
-from gne_mj.plants.ode import RK4, Channels
+from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.ode import HELD, OdeLoop
+from gne_mj.plants.ode import RK4
 from gne_mj.system import System
 
 DELTA = np.full(5, 3.0)
@@ -133,12 +134,9 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
         np.zeros(10),
         law.propagator(period),
     )
-    channels = Channels(np.zeros((10, 0)), np.zeros((10, 1)))
     loop_clock = Clock(period / substeps, substeps, HELD, RK4)
-    agents = integrators(10)
-    loop = OdeLoop(
-        agents.kind, law.kernels, game.kernels, problem, channels, loop_clock, y[:, None], memory
-    )
+    setup = Setup(problem, np.zeros((10, 1)), loop_clock)
+    loop = OdeLoop(integrators(10), law.kernels, game.kernels, setup, y[:, None], memory)
     laplacian = reference.laplacian(10, law.graph.edges)
     recorded = loop.advance(substeps, 1)
     assert len(recorded.input) == substeps, "left the set"

@@ -8,31 +8,48 @@ passed, with the outputs held at their values at the period's start.
 
 from functools import cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.feedback import NO_SIZES, Problem, Sizes, inside, work
-from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj.loops.feedback import inside
+from gne_mj.loops.layout import (
+    ACTIONS,
+    AGENTS,
+    CONSTRAINTS,
+    HISTORY,
+    MEMORY,
+    PLANT_TABLE,
+    RECORDER,
+    SOLVER,
+    STATES,
+    STEP,
+    STEP_NOW,
+    Setup,
+    channels_in,
+    clock_in,
+    parts_of,
+    problem_in,
+    room_needed,
+    table_arrays,
+)
+from gne_mj.loops.recorder import Recorder, record
+from gne_mj.native import callback, copy, kernel, source_key
 from gne_mj.plants import held_map
-from gne_mj.plants.ode import RK4, Channels, held_step
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.ode import RK4, held_step
+from gne_mj.table import Table, floats_at, integers
+
+LOOP = types.int64(types.int64, types.int64, types.int64)
 
 # Mode implicit is held like sampled; what differs is how the input is found, a module of its own
 CONTINUOUS, HELD = 0, 1
 MODES = {"continuous": CONTINUOUS, "sampled": HELD, "implicit": HELD}
-
-
-class Clock(NamedTuple):
-    """How a loop steps."""
-
-    h: float  # step in s
-    period: int  # steps per control period, held modes
-    mode: int
-    method: int
 
 
 @kernel
@@ -137,152 +154,156 @@ def build(
     acting: ModuleType = explicit,
     faults: ModuleType = faultless,
 ) -> Any:
-    """The native loop for an agent type, a law and a game.
+    """The native loop for an agent type, a law and a game: a C function.
 
-    With ``every`` = 0 it observes the present state, and does not move on.
+    It takes the addresses of a run's table and room, and moves the run on by so many steps, or,
+    if that is 0, observes the present state without moving on. It returns False once the run has
+    left. Behind the room's other parts are [flat state, memory, scratch].
     """
     source = source_key(agent, law, game)
 
-    @compiled
-    def advance(
-        problem, channels, clock, step, every, state, u, monitor, work, scratch,
-        samples_state, samples_u, samples_seen, samples_acts,
-    ):  # fmt: skip
+    def advance(table, address, count):
         _ = source
-        m, states = channels.rest.shape
-        n, h = len(state), clock.h
-        stages = 4 if clock.mode == CONTINUOUS and clock.method == RK4 else 1
+        sizes = integers(table, STEP)
+        m, states = sizes[ACTIONS], sizes[STATES]
+        size, n = m * states, m * states + sizes[MEMORY]
+        room = floats_at(address, room_length(sizes))
+        problem, clock, channels = problem_in(table), clock_in(table), channels_in(table, m, states)
+        monitor, u, work, rest = parts_of(room, 0, sizes)
+        if monitor[watch.EXIT] != watch.INSIDE:
+            return 0
+        state, scratch, h = rest[:n], rest[n:], clock.h
+        width = len(scratch) // 5
         # of the state's own length, so that the memory behind the channels has its own too
-        k, trial = scratch[:4], scratch[4, :n]
-        for sample in range(len(samples_u)):
-            for substep in range(max(every, 1)):
-                storage = stored(agent, channels, state)
-                for stage in range(stages):
-                    now = state
-                    if stage > 0:
-                        stage_state(stage, h, state, k, trial)
-                        now = trial
-                    time = step * h + (0.0, 0.5 * h, 0.5 * h, h)[stage]
-                    if not look(
-                        acting, faults, held_map, (), agent, law, game, problem, channels, clock,
-                        time, step, stage, storage, now, now[m * states :], u, monitor, work,
-                    ):  # fmt: skip
-                        # a step that began inside has its row, even if a later stage left
-                        return sample + (substep > 0 or stage > 0), step
-                    if substep == 0 and stage == 0:
-                        copy(state, samples_state[sample])
-                        copy(u, samples_u[sample])
-                        faults.record(
-                            agent, states, problem, clock, step, state, u, work,
-                            samples_seen[sample], samples_acts[sample],
-                        )  # fmt: skip
-                    if clock.mode == CONTINUOUS and every > 0:
-                        acts = faults.push(problem, clock, step, work.u, work.acts)
-                        seen = faults.choose(work.y, work.seen)
-                        rates(agent, law, problem, channels, now, acts, seen, k[stage, :n])
-                if every == 0:
-                    return sample + 1, step
-                if stages == 4:
-                    for r in range(n):
-                        rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
-                        state[r] += h / 6.0 * rise
-                else:
-                    acts = faults.push(problem, clock, step, u, work.acts)
-                    held_step(
-                        agent, channels.parameters, states, clock.method, h, state, acts, scratch[4]
-                    )
-                    if clock.mode == CONTINUOUS:  # Euler's method for the memory
-                        for r in range(m * states, n):
-                            state[r] += h * k[0, r]
-                step += 1
-        return len(samples_u), step
+        k, trial = scratch[: 4 * width].reshape((4, width)), scratch[4 * width : 4 * width + n]
+        step, block = np.int64(room[STEP_NOW]), np.int64(room[RECORDER])
+        stages = 4 if clock.mode == CONTINUOUS and clock.method == RK4 and count > 0 else 1
+        for _substep in range(max(count, 1)):
+            storage = stored(agent, channels, state)
+            for stage in range(stages):
+                now = state
+                if stage > 0:
+                    stage_state(stage, h, state, k, trial)
+                    now = trial
+                time = step * h + (0.0, 0.5 * h, 0.5 * h, h)[stage]
+                if not look(
+                    acting, faults, held_map, (), agent, law, game, problem, channels, clock,
+                    time, step, stage, storage, now, now[size:], u, monitor, work,
+                ):  # fmt: skip
+                    room[STEP_NOW] = step
+                    return 0
+                if stage == 0 and block > 0:
+                    record(
+                        block, faults, agent, states, problem, clock, step, state[:size], u,
+                        state[size:], work,
+                    )  # fmt: skip
+                if clock.mode == CONTINUOUS and count > 0:
+                    acts = faults.push(problem, clock, step, work.u, work.acts)
+                    seen = faults.choose(work.y, work.seen)
+                    rates(agent, law, problem, channels, now, acts, seen, k[stage, :n])
+            if count == 0:
+                return 1
+            if stages == 4:
+                for r in range(n):
+                    rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
+                    state[r] += h / 6.0 * rise
+            else:
+                acts = faults.push(problem, clock, step, u, work.acts)
+                held_step(
+                    agent, channels.parameters, states, clock.method, h, state, acts,
+                    scratch[4 * width :],
+                )  # fmt: skip
+                if clock.mode == CONTINUOUS:  # Euler's method for the memory
+                    for r in range(size, n):
+                        state[r] += h * k[0, r]
+            step += 1
+        room[STEP_NOW] = step
+        return 1
 
-    return advance
+    return callback(LOOP, advance)
+
+
+@kernel
+def scratch_width(sizes):
+    """Entries of each of the five scratch rows behind state and memory."""
+    m, states = sizes[ACTIONS], sizes[STATES]
+    return max(m * states + sizes[MEMORY], m, 5 * states)
+
+
+@kernel
+def room_length(sizes):
+    """Entries of the room of a loop of these sizes, as a table has them."""
+    needed = room_needed(
+        sizes[ACTIONS], sizes[CONSTRAINTS], sizes[AGENTS], sizes[HISTORY], sizes[SOLVER]
+    )
+    return needed + sizes[ACTIONS] * sizes[STATES] + sizes[MEMORY] + 5 * scratch_width(sizes)
+
+
+def ode_table(setup: Setup, agents: Agents, memory: int) -> Table:
+    """The table of a run of ODE agents; ``memory`` is the length of the law's."""
+    nothing = [np.zeros(0)] * PLANT_TABLE
+    return Table(table_arrays(nothing, setup, agents.parameters, memory, 1))
 
 
 class OdeLoop(ClosedLoop):
     """The closed loop of ODE agents with a fixed step.
 
     Args:
-        agent, law, game: the three modules of kernels.
-        problem: what the law reads.
-        channels: the agents' channels.
-        clock: how to step.
+        agents: the agents.
+        law, game: modules of kernels.
+        setup: what the run is made of.
         state: (m, states) at the start.
         memory: the law's, at the start.
         acting, faults: modules of kernels, see :func:`look`.
-        sizes: of the scratch arrays that they need.
     """
 
     def __init__(
         self,
-        agent: ModuleType,
+        agents: Agents,
         law: ModuleType,
         game: ModuleType,
-        problem: Problem,
-        channels: Channels,
-        clock: Clock,
+        setup: Setup,
         state: NDArray[np.float64],
         memory: NDArray[np.float64],
         acting: ModuleType = explicit,
         faults: ModuleType = faultless,
-        sizes: Sizes = NO_SIZES,
     ) -> None:
-        self._advance = build(agent, law, game, acting, faults)
-        self._fixed = (problem, channels, clock)
-        self._clock = clock
-        self._shape = state.shape
-        self._state = np.concatenate([state.ravel(), memory])
-        actions, constraints = len(state), len(problem.data.member_pointer) - 1
-        self._u = np.zeros(actions)
-        self._faulty = int(faults is not faultless)
-        self._work = work(actions, constraints, len(problem.data.offsets) - 1, sizes)
-        self._scratch = np.zeros((5, max(len(self._state), actions, 5 * state.shape[1])))
-        self._step = 0
-        self.monitor = np.zeros(watch.length(actions, constraints))
+        self._advance = build(agents.kind, law, game, acting, faults).ctypes
+        self._table = ode_table(setup, agents, len(memory))
+        self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
+        self._faulty = faults is not faultless
+        sizes = self._table.arrays[STEP]
+        self._room = np.zeros(room_length(sizes))
+        self.monitor, self._u, _, rest = parts_of(self._room, 0, sizes)
+        self._state = rest[: state.size + len(memory)]
+        self._state[:] = np.concatenate([state.ravel(), memory])
 
     @property
     def time(self) -> float:
         """Time of the present state in s."""
-        return self._step * self._clock.h
+        return float(self._room[STEP_NOW] * self._h)
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
-        if self.monitor[watch.EXIT] != watch.INSIDE:
-            samples = 0
-        return self._samples(*self._record(samples, every))
+        return self._run(samples, every, samples * every)
 
     def finish(self) -> Samples:
         """See the base class."""
-        rows = self._record(1, 0)
-        if len(rows[0]):
-            return self._samples(*rows)
-        nothing = (np.full((1, row.shape[1]), np.nan) for row in rows[1:])
-        return self._samples(self._state[None].copy(), *nothing)
+        rows = self._run(1, 1, 0)
+        if len(rows.input):
+            return rows
+        size = len(self._state) - self._memory
+        state, memory = self._state[:size].reshape(1, *self._shape), self._state[None, size:]
+        none = (np.full((1, row.shape[1]), np.nan) for row in (rows.input, rows.seen, rows.acts))
+        u, seen, acts = none
+        return Samples(state.copy(), u, memory.copy(), seen, acts)
 
-    def _record(self, samples: int, every: int) -> list[NDArray[np.float64]]:
-        """Rows of states, inputs, and where there are faults of what was seen and what acted."""
-        m = len(self._u)
-        widths = (len(self._state), m, m * self._faulty, m * self._faulty)
-        rows = [np.empty((samples, width)) for width in widths]
-        done, self._step = self._advance(
-            *self._fixed, self._step, every, self._state, self._u, self.monitor, self._work,
-            self._scratch, *rows,
+    def _run(self, rows: int, every: int, steps: int) -> Samples:
+        recorder = Recorder(
+            1, rows, self._shape, self._memory, self._faulty,
+            first=int(self._room[STEP_NOW]), every=every,
         )  # fmt: skip
-        return [row[:done] for row in rows]
-
-    def _samples(
-        self,
-        states: NDArray[np.float64],
-        inputs: NDArray[np.float64],
-        seen: NDArray[np.float64],
-        acts: NDArray[np.float64],
-    ) -> Samples:
-        size = self._shape[0] * self._shape[1]
-        return Samples(
-            state=states[:, :size].reshape(-1, *self._shape),
-            input=inputs,
-            memory=states[:, size:],
-            seen=seen,
-            acts=acts,
-        )
+        self._room[RECORDER] = recorder.addresses[0]
+        self._advance(self._table.address, self._room.ctypes.data, steps)
+        self._room[RECORDER] = 0.0
+        return recorder.samples(0)

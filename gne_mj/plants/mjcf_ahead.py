@@ -6,7 +6,8 @@ callback of a loop acts on it.
 """
 
 from gne_mj.native import copy, kernel
-from gne_mj.plants.native_mujoco import call, field, integers
+from gne_mj.plants.native_mujoco import call, field
+from gne_mj.table import integers
 
 # Of a fleet's table (see gne_mj.plants.mujoco): where the robots' numbers are, and sizes
 PLACES, _, SIZES = range(3)

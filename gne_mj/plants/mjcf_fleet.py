@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.native import kernel
 from gne_mj.plants import mjcf_ahead, mjcf_robot
+from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import read_model
 from gne_mj.plants.mjcf_ahead import ACTUATOR, OUTPUT_AT, POSITION_AT, actuator_of, gather
@@ -18,10 +19,10 @@ from gne_mj.plants.mujoco import INTEGRATORS, run_steps
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     USERDATA_HEADER,
-    Table,
     callbacks,
     step_address,
 )
+from gne_mj.table import Table
 
 __all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "stored"]
 
@@ -98,6 +99,16 @@ class MjcfPlant(Plant):
         )  # fmt: skip
         self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
         self._table = Table(self.table_arrays)
+
+    def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
+        """The table's arrays; such robots have no numbers but those in their files."""
+        return self.table_arrays
+
+    def model_fields(
+        self, parameters: NDArray[np.float64]
+    ) -> list[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
+        """No numbers, no fields."""
+        return []
 
     @property
     def measures_every_stage(self) -> bool:

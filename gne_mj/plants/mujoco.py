@@ -19,24 +19,21 @@ from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     USERDATA_HEADER,
     Offsets,
-    Table,
     address_of,
     call,
     callbacks,
     field,
-    floats,
-    integers,
     offsets,
     step_address,
     table_of,
 )
+from gne_mj.table import Table, floats, integers
 
 INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
 STAGES = {"euler": 1, "rk4": 4}  # evaluations of the dynamics in one step
 
 # A fleet's arrays at the start of every table
 PLACES, ATAN, SIZES = range(3)
-PLANT_TABLE = 3
 
 # A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
 MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
@@ -147,6 +144,8 @@ class MujocoPlant(Plant):
             callbacks the springs lack their atan term.
     """
 
+    measures_every_stage = True
+
     def __init__(
         self,
         agents: Agents,
@@ -198,6 +197,30 @@ class MujocoPlant(Plant):
             self.places,
             np.ascontiguousarray(self.agents.parameters[:, 3]),
             np.array(sizes, dtype=np.int64),
+        ]
+
+    def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
+        """The table's arrays for agents with numbers of their own, as in a batch of runs."""
+        places, _, sizes = self.table_arrays
+        return [places, np.ascontiguousarray(agents.parameters[:, 3]), sizes]
+
+    def model_fields(
+        self, parameters: NDArray[np.float64]
+    ) -> list[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
+        """What robots' numbers (runs, m, 5) are in mjModel: field, its entries, values (runs, k).
+
+        What MuJoCo derives from them (``mj_setConst``) is not among them, nor is the atan term.
+        """
+        d, bodies = self.agents.dimension, range(1, self.agents.count + 1)
+        springs = element_names("spring", self.agents.channels, d)
+        tendons = np.array([self.model.tendon(name).id for name in springs])
+        main = np.array([self.model.body(f"robot_{i}/main").id for i in bodies])
+        appendage = np.array([self.model.body(f"robot_{i}/appendage").id for i in bodies])
+        return [
+            ("body_mass", main, parameters[:, ::d, 0]),
+            ("body_mass", appendage, parameters[:, ::d, 1]),
+            ("tendon_stiffness", tendons, parameters[:, :, 2]),
+            ("tendon_damping", tendons, parameters[:, :, 4]),
         ]
 
     @property

@@ -10,7 +10,7 @@ left alone.
 
 import ctypes
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -21,7 +21,6 @@ import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word
@@ -173,58 +172,6 @@ def step_address(function: str = "mj_step") -> int:
         library = ctypes.CDLL(str(path))
         return ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0
     raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
-
-
-class Table:
-    """Arrays that callbacks read, as one block of (address, length) pairs.
-
-    The arrays are kept alive as long as the table is; so keep the plant or loop that made a
-    simulation for as long as that simulation, or a copy of it, is stepped with its callbacks.
-    """
-
-    def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
-        for array in arrays:
-            if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
-                raise EngineError(
-                    f"native code reads contiguous arrays of 8-byte items, not {array.dtype}"
-                )
-        self._arrays = tuple(arrays)
-        pairs = [(array.ctypes.data, array.size) for array in arrays]
-        self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
-
-    @property
-    def address(self) -> float:
-        """Where the pairs lie; a double holds a user-space address exactly."""
-        address = self._pairs.ctypes.data
-        if int(float(address)) != address:
-            raise EngineError(f"the address {address} does not fit into a double")
-        return float(address)
-
-
-@intrinsic
-def floats(typingctx: Any, table: Any, index: Any) -> Any:
-    """The float array at this index of the table at an address."""
-    return _entry(types.float64)
-
-
-@intrinsic
-def integers(typingctx: Any, table: Any, index: Any) -> Any:
-    """The integer array at this index of the table at an address."""
-    return _entry(types.int64)
-
-
-def _entry(item: types.Type) -> Any:
-    kind = types.Array(item, 1, "C")
-
-    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        table, index = arguments
-        pair = builder.add(table, builder.mul(index, context.get_constant(types.intp, 16)))
-        length = builder.add(pair, context.get_constant(types.intp, 8))
-        return array_at(
-            context, builder, kind, load_word(builder, pair), load_word(builder, length)
-        )
-
-    return kind(types.int64, types.int64), codegen
 
 
 @kernel

@@ -1,0 +1,324 @@
+"""What a batch consists of: a scenario, what is swept, random starts. Nothing here runs anything.
+
+Runs are numbered combination by combination, and start by start within one. The k-th start has the
+same seed in every combination: the same direction and share of the way to the boundary, and the
+same noise, so that combinations are compared on equal terms.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.batches.starts import interior_profile, random_starts
+from gne_mj.batches.sweep import Sweep
+from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
+from gne_mj.scenario import Scenario, load_scenario
+from gne_mj.scenario_tables import SystemTable
+from gne_mj.system import Clock, System
+from gne_mj.trajectory import versions
+
+FORMAT = 1  # of the manifest and of the store
+# Sweeping these would give runs that one dataset cannot hold, or has no meaning
+_NOT_SWEPT = {
+    "simulation.duration": "all runs of a batch last as long",
+    "simulation.seed": "every start has a seed of its own",
+    "recording.period": "all runs of a batch share their sample times",
+    "description": "it changes nothing",
+}
+_CHUNK_RUNS = 256
+_CHUNK_BYTES = 2**26
+_LEAST_CHUNKS = 16  # of a small batch, so that its progress is seen and little is lost
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One point of the sweep's grid.
+
+    Attributes:
+        number: which.
+        changes: swept keys and their values.
+        scenario: with them.
+        system: at the scenario's own start or, with random starts, at any inside; None if that
+            start is not inside.
+        clock: of its runs.
+    """
+
+    number: int
+    changes: Mapping[str, Any]
+    scenario: Scenario
+    system: System | None
+    clock: Clock
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A batch, before it runs.
+
+    Args:
+        scenario: tables with one system, complete.
+        sweeps: what varies; all combinations are run.
+        starts: random interior starts of each combination; 0 for the scenario's own start.
+        seed: from which the starts' seeds follow.
+        spread: how far towards the boundary random starts lie, between 0 and 1.
+        record: every which sample is kept; 0 for summaries only.
+        chunk: runs that are stored together; chosen if 0.
+    """
+
+    scenario: Mapping[str, Any]
+    sweeps: tuple[Sweep, ...] = ()
+    starts: int = 0
+    seed: int = 0
+    spread: float = 0.9
+    record: int = 0
+    chunk: int = 0
+
+    def __post_init__(self) -> None:
+        for key, least in (("starts", 0), ("seed", 0), ("record", 0), ("chunk", 0)):
+            if getattr(self, key) < least:
+                option = "runs" if key == "starts" else key
+                raise InvalidInput(f"--{option}", getattr(self, key), "it must not be negative")
+        if not 0.0 < self.spread < 1.0:
+            raise InvalidInput("--spread", self.spread, "it must be between 0 and 1")
+        keys = [sweep.key for sweep in self.sweeps]
+        for at, key in enumerate(keys):
+            if key in keys[:at]:
+                raise InvalidInput("--sweep", key, "every key may be swept once only")
+            if key in _NOT_SWEPT:
+                raise InvalidInput("--sweep", key, f"it cannot be swept: {_NOT_SWEPT[key]}")
+        if not self.chunk:
+            object.__setattr__(self, "chunk", self._fitting_chunk())
+
+    def _fitting_chunk(self) -> int:
+        runs = min(_CHUNK_RUNS, max(1, -(-self.runs // _LEAST_CHUNKS)))
+        if self.record:
+            system = self._first_system
+            m, agents = system.game.actions, system.game.agents
+            width = m * (system.agents.states + 2) + len(system.memory) * (agents + 1)
+            row = 8 * (width + system.game.constraints_count)
+            rows = self._clock.steps(self._clock.duration) // self._every + 2
+            runs = min(runs, max(1, _CHUNK_BYTES // (row * rows)))
+        return runs
+
+    @cached_property
+    def _clock(self) -> Clock:
+        return load_scenario(self.scenario).clock()
+
+    @property
+    def _every(self) -> int:
+        """Steps between samples."""
+        return self._clock.steps(self._clock.sample_period)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values of each sweep."""
+        return tuple(len(sweep.values) for sweep in self.sweeps)
+
+    @property
+    def combinations(self) -> int:
+        """Points of the sweep's grid."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def each(self) -> int:
+        """Runs of each combination."""
+        return max(self.starts, 1)
+
+    @property
+    def runs(self) -> int:
+        """Of the whole batch."""
+        return self.combinations * self.each
+
+    @property
+    def chunks(self) -> int:
+        """How many parts are stored one at a time."""
+        return -(-self.runs // self.chunk)
+
+    @property
+    def name(self) -> str:
+        """The system's."""
+        return str(next(iter(self.scenario["systems"])))
+
+    @cached_property
+    def seeds(self) -> NDArray[np.int64]:
+        """Of each start."""
+        words = np.random.SeedSequence(self.seed).generate_state(self.each, np.uint64)
+        return (words >> np.uint64(11)).astype(np.int64)
+
+    def of_run(self, run: int) -> tuple[int, int]:
+        """A run's combination and start."""
+        return run // self.each, run % self.each
+
+    def changes(self, combination: int) -> dict[str, Any]:
+        """Swept keys and their values in a combination."""
+        at = np.unravel_index(combination, self.shape) if self.sweeps else ()
+        return {sweep.key: sweep.values[int(k)] for sweep, k in zip(self.sweeps, at, strict=True)}
+
+    def labels(self) -> dict[str, NDArray[Any]]:
+        """The swept values of every run, by key."""
+        grid = np.arange(self.runs) // self.each
+        found = {}
+        for axis, sweep in enumerate(self.sweeps):
+            labels = np.array(sweep.labels)
+            found[sweep.key] = labels[np.unravel_index(grid, self.shape)[axis]]
+        return found
+
+    def combination(self, number: int) -> Combination:
+        """Build and check one combination.
+
+        Raises:
+            InvalidInput: a swept value does not fit; the combination is named.
+        """
+        changes = self.changes(number)
+        try:
+            scenario = load_scenario(self.scenario, changes)
+            clock = scenario.clock()
+            return Combination(number, changes, scenario, self._system(scenario), clock)
+        except InvalidInput as error:
+            if not changes:
+                raise
+            where = ", ".join(f"{key} = {value}" for key, value in changes.items())
+            raise InvalidInput(error.key, error.value, f"{error.expected} (with {where})") from None
+
+    def _system(self, scenario: Scenario) -> System | None:
+        table, simulation = scenario.systems[self.name], scenario.simulation
+        try:
+            return table.build(self.name, simulation)
+        except InfeasibleStart:
+            if not self.starts:
+                return None
+        game = table.game.build(table.agents.count)
+        given = table.initial.action
+        wanted = (
+            table.game.default_start(table.agents.count)
+            if given is None
+            else np.asarray(given, dtype=np.float64).ravel() + np.zeros(game.actions)
+        )
+        return start_at(table, interior_profile(game, wanted), game.sizes).build(
+            self.name, simulation
+        )
+
+    @cached_property
+    def _first_system(self) -> System:
+        for number in range(self.combinations):
+            system = self.combination(number).system
+            if system is not None:
+                return system
+        raise InvalidInput(
+            "initial.action", "given", "in no combination of the sweep is it strictly inside"
+        )
+
+    def profiles(self, combination: Combination, starts: Sequence[int]) -> NDArray[np.float64]:
+        """y(0) of these starts, (starts, m)."""
+        system = combination.system
+        assert system is not None
+        if not self.starts:
+            return np.tile(system.start, (len(starts), 1))
+        middle = system.equilibrium.action
+        return random_starts(system.game, middle, self.seeds[list(starts)].tolist(), self.spread)
+
+    def alone(self, run: int) -> Scenario:
+        """The scenario of one run, with its start and seed written out.
+
+        Raises:
+            InvalidInput: there is no such run.
+        """
+        if not 0 <= run < self.runs:
+            raise InvalidInput("--index", run, f"runs are numbered from 0 to {self.runs - 1}")
+        number, start = self.of_run(run)
+        combination = self.combination(number)
+        scenario = combination.scenario
+        if not self.starts:
+            return scenario
+        y = self.profiles(combination, [start])[0]
+        assert combination.system is not None
+        table = start_at(scenario.systems[self.name], y, combination.system.game.sizes)
+        simulation = scenario.simulation.model_copy(update={"seed": int(self.seeds[start])})
+        return scenario.model_copy(update={"systems": {self.name: table}, "simulation": simulation})
+
+    def manifest(self) -> dict[str, Any]:
+        """All that decides the results, as plain data."""
+        return {
+            "format": FORMAT,
+            "scenario": self.scenario,
+            "sweeps": [[sweep.key, list(sweep.values)] for sweep in self.sweeps],
+            "runs": self.starts,
+            "seed": self.seed,
+            "spread": self.spread,
+            "record": self.record,
+            "chunk": self.chunk,
+            "files": _digests(self.scenario),
+            "versions": versions(),
+        }
+
+    @classmethod
+    def from_manifest(cls, manifest: Mapping[str, Any]) -> "Plan":
+        """The plan that a manifest was made from."""
+        return cls(
+            scenario=manifest["scenario"],
+            sweeps=tuple(Sweep(key, tuple(values)) for key, values in manifest["sweeps"]),
+            starts=manifest["runs"],
+            seed=manifest["seed"],
+            spread=manifest["spread"],
+            record=manifest["record"],
+            chunk=manifest["chunk"],
+        )
+
+
+def make_plan(
+    source: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None = None,
+    *,
+    system: str | None = None,
+    sweeps: Sequence[Sweep] = (),
+    **options: Any,
+) -> Plan:
+    """A plan from a scenario; see :class:`Plan` for the options.
+
+    Args:
+        source, changes: see :func:`gne_mj.scenario.load_scenario`.
+        system: which; may be left out if there is only one.
+
+    Raises:
+        InvalidInput: names the key, the value and what would be right.
+    """
+    scenario = load_scenario(source, changes)
+    names = list(scenario.systems)
+    if system is None and len(names) > 1:
+        raise InvalidInput("--system", None, f"name one of {', '.join(names)}")
+    name = system or names[0]
+    if name not in names:
+        raise InvalidInput("--system", system, nearest(name, names))
+    one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
+    tables = json.loads(one.model_dump_json(exclude_none=True))
+    return Plan(scenario=tables, sweeps=tuple(sweeps), **options)
+
+
+def start_at(table: SystemTable, y: NDArray[np.float64], sizes: Sequence[int]) -> SystemTable:
+    """The same system with y(0) = y, shape (m,), of agents with so many entries each."""
+    blocks = np.split(y, np.cumsum(sizes)[:-1])
+    action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
+    initial = table.initial.model_copy(update={"action": action})
+    return table.model_copy(update={"initial": initial})
+
+
+def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:
+    """Of the user's own files that a scenario names."""
+    found = {}
+    for system in scenario["systems"].values():
+        for table in system.values():
+            given = table.get("file", []) if isinstance(table, dict) else []
+            for name in [given] if isinstance(given, str) else given:
+                try:
+                    found[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
+                except OSError as error:
+                    raise InvalidInput(
+                        "file", name, f"it cannot be read: {error.strerror}"
+                    ) from None
+    return found

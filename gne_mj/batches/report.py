@@ -1,0 +1,113 @@
+"""Tables and the figure of a batch's folder."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gne_mj import plots
+from gne_mj.batches.store import Store
+from gne_mj.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+STAYED = ("converged", "completed")
+
+
+def write_report(
+    store: Store, folder: Path | None = None, formats: tuple[str, ...] = ("png",)
+) -> list[Path]:
+    """Write ``combinations.csv``, ``runs.csv`` and the figure ``summary``; returns their paths.
+
+    Args:
+        store: of the batch, complete or not.
+        folder: where to; the batch's own if left out.
+        formats: of the figure.
+
+    Raises:
+        InvalidInput: no run is stored yet.
+    """
+    target = store.folder if folder is None else folder
+    runs = figures_of(store)
+    if runs.sizes["run"] == 0:
+        raise InvalidInput("DIR", str(store.folder), "it must hold at least one run")
+    target.mkdir(parents=True, exist_ok=True)
+    tables = {"combinations.csv": combinations(runs), "runs.csv": runs.to_dataframe()}
+    paths = []
+    for name, table in tables.items():
+        table.to_csv(target / name, index=name == "runs.csv")
+        paths.append(target / name)
+    for kind in formats:
+        paths.append(target / f"summary.{kind}")
+        plots.save_batch(runs, paths[-1])
+    return paths
+
+
+def figures_of(store: Store) -> "xarray.Dataset":
+    """What is one number (or word) a run, of the runs that are stored, in memory."""
+    whole = store.dataset()
+    one = [name for name, variable in whole.data_vars.items() if variable.dims == ("run",)]
+    kept = whole[one]
+    others = [name for name, coordinate in kept.coords.items() if coordinate.dims != ("run",)]
+    runs = kept.drop_vars(others).load()
+    return runs.isel(run=np.flatnonzero(runs["status"].notnull().to_numpy()))
+
+
+def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
+    """One row for each combination of swept values: how its runs ended, and their figures."""
+    import pandas
+
+    keys = list(runs.attrs["swept"])
+    frame = runs.to_dataframe()
+    groups: Any = frame.groupby(keys, sort=False) if keys else [((), frame)]
+    rows = []
+    for values, own in groups:
+        row: dict[str, Any] = dict(zip(keys, values, strict=True))
+        stayed = own["status"].isin(STAYED)
+        row |= {
+            "runs": len(own),
+            "left": int((~stayed).sum()),
+            "converged": int((own["status"] == "converged").sum()),
+        }
+        for name, ways in (
+            ("least_margin", ("min", "median")),
+            ("settling_time", ("median", "max")),
+            ("final_error", ("median", "max")),
+            ("peak_input", ("max",)),
+        ):
+            for way in ways:
+                row[f"{name}_{way}"] = getattr(own[name], way)() if name in own else np.nan
+        row["not_settled"] = int(own["settling_time"].isna().sum()) if len(own) else 0
+        rows.append(row)
+    return pandas.DataFrame(rows)
+
+
+def summary(table: "pandas.DataFrame", keys: list[str], rows: int = 24) -> Iterator[str]:
+    """The table of combinations in words, in lines; no more than so many."""
+    names = {
+        **{key: key for key in keys},
+        "runs": "runs",
+        "left": "left",
+        "least_margin_min": "worst margin",
+        "settling_time_median": "settling (s)",
+        "final_error_max": "final error",
+    }
+    shown = table.head(rows)
+    cells = [[_cell(row[key]) for key in names] for _, row in shown.iterrows()]
+    widths = [
+        max(len(title), *(len(line[at]) for line in cells))
+        for at, title in enumerate(names.values())
+    ]
+    for line in ([*names.values()], *cells):
+        yield "  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
+    if len(table) > rows:
+        yield f"... and {len(table) - rows} more combinations: see combinations.csv"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return "-" if np.isnan(value) else f"{value:.4g}"
+    return str(value)

@@ -1,0 +1,324 @@
+"""A batch on disk: a manifest, and one labelled Zarr store that xarray alone can read.
+
+``DIR/manifest.json`` has all that decides the results; ``DIR/runs.zarr`` has one array a variable,
+each cut along ``run`` as the plan's chunks are. A chunk's runs are there once its statuses are:
+they are written last, in one file that appears whole or not at all. Until then the chunk's runs
+read as missing, and to resume computes them again.
+"""
+
+import fcntl
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.batches.plan import Combination, Plan
+from gne_mj.batches.summary import Variables, columns_of, join, kept, times
+from gne_mj.errors import InvalidInput, StorageError
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.batch import Outcome, Span
+from gne_mj.loops.recorder import Recorder
+from gne_mj.trajectory import coordinates_of
+
+if TYPE_CHECKING:
+    import xarray
+
+MANIFEST, RUNS = "manifest.json", "runs.zarr"
+
+
+class Store:
+    """A batch's folder.
+
+    Attributes:
+        folder: where.
+        plan: what it is the result of.
+    """
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        self.folder, self.plan = folder, plan
+
+    @classmethod
+    def create(cls, folder: Path, plan: Plan) -> "Store":
+        """A new folder with an empty store; it appears when it is complete.
+
+        Raises:
+            InvalidInput: the folder exists, or combinations have no common layout.
+        """
+        if folder.exists():
+            raise InvalidInput(
+                "--out",
+                str(folder),
+                "it exists already; name a folder that does not, or add --resume to go on with it",
+            )
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        except OSError as error:
+            raise InvalidInput(
+                "--out", str(folder), f"it cannot be written: {error.strerror}"
+            ) from None
+        try:
+            text = json.dumps(plan.manifest(), indent=2)
+            (scratch / MANIFEST).write_text(text + "\n", encoding="utf-8")
+            _create_arrays(scratch / RUNS, plan)
+            scratch.chmod(0o755)
+            scratch.rename(folder)
+        except BaseException:
+            shutil.rmtree(scratch, ignore_errors=True)
+            raise
+        return cls(folder, plan)
+
+    @classmethod
+    def open(cls, folder: Path) -> "Store":
+        """The store of an existing folder.
+
+        Raises:
+            InvalidInput: it is not that of a batch.
+        """
+        return cls(folder, Plan.from_manifest(_manifest(folder)))
+
+    @classmethod
+    def resume(cls, folder: Path, plan: Plan) -> "Store":
+        """The store of a folder that this very plan has begun.
+
+        Raises:
+            InvalidInput: it was another plan, or other versions; the first difference is named.
+        """
+        before, now = _manifest(folder), json.loads(json.dumps(plan.manifest()))
+        difference = next(_differences(before, now), None)
+        if difference is not None:
+            key, was, value = difference
+            raise InvalidInput(
+                key, value, f"the batch in {folder} was begun with {was}; go on with that, or"
+                " name another folder",
+            )  # fmt: skip
+        return cls(folder, Plan.from_manifest(before))
+
+    @classmethod
+    def continued(cls, folder: Path) -> "Store":
+        """The store of a folder, to go on with what its manifest says.
+
+        Raises:
+            InvalidInput: versions or files are not those that it was begun with.
+        """
+        return cls.resume(folder, cls.open(folder).plan)
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes of this machine from writing; ends with the process at the latest.
+
+        Raises:
+            InvalidInput: another one is writing.
+        """
+        with (self.folder / MANIFEST).open(encoding="utf-8") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InvalidInput(
+                    "--out", str(self.folder), "another process is running this batch right now"
+                ) from None
+            yield
+
+    def statuses(self) -> NDArray[np.str_]:
+        """(runs,) how each run ended; empty if it has not been run."""
+        import zarr
+
+        array: Any = zarr.open_array(self.folder / RUNS, path="status", mode="r")
+        found: NDArray[np.str_] = array[:]
+        return found
+
+    def missing(self) -> list[int]:
+        """Chunks that are not there yet."""
+        first = self.statuses()[:: self.plan.chunk]
+        return np.flatnonzero(first == "").tolist()
+
+    def write(self, chunk: int, variables: Variables) -> None:
+        """Add a chunk; its runs are there when this returns, and otherwise not.
+
+        Raises:
+            StorageError: it cannot be written, as on a full disk.
+        """
+        import xarray
+
+        first = chunk * self.plan.chunk
+        region = {"run": slice(first, first + len(variables["status"][1]))}
+        others = {
+            name: (dimensions, values)
+            for name, (dimensions, values, _) in variables.items()
+            if name != "status"
+        }
+        status = {"status": variables["status"][:2]}
+        try:
+            for part in (others, status):
+                if part:
+                    xarray.Dataset(part).to_zarr(
+                        self.folder / RUNS, region=region, zarr_format=2, consolidated=True
+                    )
+        except OSError as error:
+            raise StorageError(
+                f"{self.folder}: {error.strerror or error}; the runs stored so far are readable,"
+                " and --resume goes on from there"
+            ) from None
+
+    def dataset(self) -> "xarray.Dataset":
+        """All runs, read when they are used."""
+        import xarray
+
+        found: xarray.Dataset = xarray.open_dataset(self.folder / RUNS, engine="zarr", chunks=None)
+        return found
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InvalidInput(
+            "DIR", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
+        ) from None
+    return found
+
+
+def _differences(
+    before: Mapping[str, Any], now: Mapping[str, Any], path: str = ""
+) -> Iterator[tuple[str, Any, Any]]:
+    """Where two trees of plain data differ: key, value before, value now."""
+    for key in dict.fromkeys([*before, *now]):
+        was, value, name = before.get(key), now.get(key), f"{path}{key}"
+        if isinstance(was, dict) and isinstance(value, dict):
+            yield from _differences(was, value, f"{name}.")
+        elif was != value:
+            yield name, was, value
+
+
+def _create_arrays(path: Path, plan: Plan) -> None:
+    """The store's arrays and coordinates, with no run in it yet."""
+    import zarr
+
+    first, schema = _schema(plan)
+    group = zarr.open_group(path, mode="w-", zarr_format=2)
+    group.attrs.update(_attributes(plan, first))
+    sizes = {"run": plan.runs}
+
+    def add(
+        name: str,
+        dimensions: tuple[str, ...],
+        values: NDArray[Any],
+        attributes: Mapping[str, Any],
+        fill: Any = None,
+    ) -> Any:
+        chunks = tuple(plan.chunk if d == "run" else sizes[d] for d in dimensions)
+        return group.create_array(
+            name,
+            shape=tuple(sizes[d] for d in dimensions),
+            chunks=tuple(max(length, 1) for length in chunks),
+            dtype=values.dtype,
+            fill_value=fill,
+            attributes={"_ARRAY_DIMENSIONS": list(dimensions), **attributes},
+        )
+
+    system = first.system
+    assert system is not None
+    span = _span(first)
+    coordinates: dict[str, Any] = {
+        "run": ("run", np.arange(plan.runs), {"long_name": "number of the run"}),
+        "start": ("run", np.arange(plan.runs) % plan.each, {"long_name": "number of the start"}),
+        "seed": ("run", np.tile(plan.seeds, plan.combinations), {"long_name": "of the start"}),
+        **{key: ("run", values, {}) for key, values in plan.labels().items()},
+        **coordinates_of(system, times(first, span)[kept(span, max(plan.record, 1))]),
+    }
+    del coordinates["component"]
+    if not plan.record:
+        del coordinates["time"]
+    for dimension, values, *_ in coordinates.values():
+        sizes.setdefault(dimension, len(values))
+    for name, (dimensions, like, attributes) in schema.items():
+        for dimension, length in zip(dimensions[1:], like.shape[1:], strict=True):
+            sizes.setdefault(dimension, length)
+        fill = "" if like.dtype.kind == "U" else np.nan
+        add(name, dimensions, like, attributes, fill)
+    for name, (dimension, values, *rest) in coordinates.items():
+        values = np.asarray(values)
+        add(name, (dimension,), values, rest[0] if rest else {})[:] = values
+    group.attrs["coordinates"] = " ".join(
+        name for name, (dimension, *_) in coordinates.items() if name != dimension
+    )
+    zarr.consolidate_metadata(path, zarr_format=2)
+
+
+def _attributes(plan: Plan, first: Combination) -> dict[str, Any]:
+    system = first.system
+    assert system is not None
+    return {
+        "system": plan.name,
+        "game": system.game.name,
+        "agent_name": system.game.agent_name,
+        "engine": system.engine,
+        "swept": [sweep.key for sweep in plan.sweeps],
+        "manifest": json.dumps(plan.manifest()),
+    }
+
+
+def _schema(plan: Plan) -> tuple[Combination, Variables]:
+    """A combination that can run, and the variables that the combinations have, of one run each.
+
+    Raises:
+        InvalidInput: they differ in agents or constraints, which one dataset cannot hold.
+    """
+    first: Combination | None = None
+    known: dict[Any, Variables] = {}
+    for number in range(plan.combinations):
+        combination = plan.combination(number)
+        system = combination.system
+        if system is None:
+            continue
+        if first is None:
+            first = combination
+        _check_layout(first, combination)
+        kind = (
+            system.law.information, bool(system.faults), system.schedule is None, system.mode,
+            len(system.memory), bool(np.any(system.game.margins)),
+        )  # fmt: skip
+        if kind not in known:
+            known[kind] = _one_run(combination, plan.record)
+    if first is None:
+        raise InvalidInput(
+            "initial.action", "given", "it is strictly inside in no combination of the sweep"
+        )
+    return first, join(list(known.values()))
+
+
+def _check_layout(first: Combination, other: Combination) -> None:
+    one, two = first.system, other.system
+    assert one is not None
+    assert two is not None
+    same = one.game.sizes == two.game.sizes
+    if not (same and one.game.constraint_names == two.game.constraint_names):
+        raise InvalidInput(
+            "--sweep",
+            ", ".join(other.changes),
+            "the agents and constraints must be the same ones in all combinations",
+        )
+
+
+def _span(combination: Combination) -> Span:
+    clock = combination.clock
+    return Span(clock.steps(clock.duration), clock.steps(clock.sample_period))
+
+
+def _one_run(combination: Combination, record: int) -> Variables:
+    """What one run of a combination would have, nothing of it being a number."""
+    system, span = combination.system, _span(combination)
+    assert system is not None
+    m = system.game.actions
+    rows = Recorder(
+        1, span.rows, (m, system.agents.states), len(system.loop_memory), bool(system.faults)
+    )
+    monitor = np.zeros((1, watch.length(m, system.game.constraints_count)))
+    return columns_of(combination, span, Outcome(rows.all(), monitor), record)

@@ -1,0 +1,215 @@
+"""What is kept of every run of a batch: figures from its monitor and rows, and rows themselves."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.batches.plan import Combination
+from gne_mj.certificate import SETTLED, TAIL
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.base import Samples
+from gne_mj.loops.batch import Outcome, Span
+from gne_mj.trajectory import axis_of, variables_of
+
+# name -> (dimensions, values, attributes); the first dimension is always "run"
+Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]
+
+STATUS = "<U28"  # long enough for the longest status
+_EXITS = {
+    watch.LEFT_SET: "left_feasible_set",
+    watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
+    watch.DIVERGED: "diverged",
+}
+
+
+def columns_of(combination: Combination, span: Span, outcome: Outcome, record: int) -> Variables:
+    """The variables of runs of one combination.
+
+    Args:
+        combination: whose.
+        span: of the runs.
+        outcome: what they showed.
+        record: every which row is kept; 0 for none. The last one always is.
+    """
+    system, clock = combination.system, combination.clock
+    assert system is not None
+    game, monitors, samples = system.game, outcome.monitors, outcome.samples
+    p, m, runs = game.constraints_count, game.actions, len(monitors)
+    time = times(combination, span)
+    y = samples.state[:, :, :, system.agents.kind.OUTPUT]
+    distance = np.max(np.abs(y - system.equilibrium.action), axis=2)
+    left = monitors[:, watch.EXIT] != watch.INSIDE
+    late = np.max(distance[:, time >= time[-1] - TAIL * clock.duration - 1e-9], axis=1)
+    status = np.where(late <= combination.scenario.simulation.tolerance, "converged", "completed")
+    for code, name in _EXITS.items():
+        status = np.where(monitors[:, watch.EXIT] == code, name, status)
+    worst, when = _worst(monitors, p)
+    tightest = np.argmax(worst, axis=1)
+    rows = np.arange(runs)
+    at = int(watch.inputs_at(p))
+    peak, peak_time, square, energy = np.moveaxis(
+        monitors[:, at : at + 4 * m].reshape(runs, 4, m), 1, 0
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rms = np.sqrt(square / monitors[:, watch.TIME, None])
+    known = left & (monitors[:, watch.EXIT] != watch.DIVERGED)
+    axis = axis_of(system)
+    unit = {"units": game.action_unit}
+    second = {"units": "s"}
+
+    def where(condition: NDArray[np.bool_], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(condition, values, np.nan)
+
+    found: Variables = {
+        "status": (("run",), status.astype(STATUS), {"long_name": "how the run ended"}),
+        "least_margin": (
+            ("run",),
+            -worst[rows, tightest],
+            {"long_name": "least -g over constraints and integration steps"},
+        ),
+        "least_margin_time": (("run",), when[rows, tightest], second),
+        "least_margin_constraint": (("run",), 1.0 + tightest, {"long_name": "numbered from 1"}),
+        "margin": (("run", "constraint"), -worst, {"long_name": "least -g of each constraint"}),
+        "settling_time": (
+            ("run",),
+            _settling(time, distance),
+            {"long_name": "until max |y - y*| stays within 2% of its start", **second},
+        ),
+        "final_error": (
+            ("run",),
+            distance[:, -1],
+            {"long_name": "max |y - y*| at the end", **unit},
+        ),
+        "end_time": (("run",), where(~left, monitors[:, watch.TIME]), second),
+        "exit_time": (("run",), where(left, monitors[:, watch.EXIT_TIME]), second),
+        "exit_constraint": (
+            ("run",),
+            where(known, 1.0 + monitors[:, watch.EXIT_CONSTRAINT]),
+            {"long_name": "which was violated, numbered from 1"},
+        ),
+        "exit_agent": (
+            ("run",),
+            where(known & (monitors[:, watch.EXIT_AGENT] >= 0), 1 + monitors[:, watch.EXIT_AGENT]),
+            {"long_name": "whose estimates left"},
+        ),
+        "exit_value": (("run",), where(left, monitors[:, watch.EXIT_VALUE]), {}),
+        "exit_at_instant": (
+            ("run",),
+            where(left, 1.0 - monitors[:, watch.EXIT_BETWEEN]),
+            {"long_name": "1: seen at a control instant, 0: between two"},
+        ),
+        "peak_input": (("run",), np.max(peak, axis=1), {"units": system.agents.kind.INPUT_UNIT}),
+        "peak_input_time": (("run",), peak_time[rows, np.argmax(peak, axis=1)], second),
+        "rms_input": (("run", axis), rms, {"units": system.agents.kind.INPUT_UNIT}),
+        "energy": (("run", axis), energy, {"long_name": "integral of u y"}),
+        "saturated_time": (
+            ("run",),
+            where(monitors[:, watch.SATURATED] > 0, monitors[:, watch.SATURATED_TIME]),
+            {"long_name": "when an input limit was first met", **second},
+        ),
+        "lyapunov_rise": (
+            ("run",),
+            monitors[:, watch.STORAGE_RISE],
+            {"long_name": "largest rise of V from one step to the next"},
+        ),
+        "steps": (("run",), monitors[:, watch.STEPS].copy(), {}),
+        "initial_action": (("run", axis), y[:, 0].copy(), unit),
+        "final_action": (("run", axis), y[:, -1].copy(), unit),
+        "equilibrium": (
+            ("run", axis),
+            np.tile(system.equilibrium.action, (runs, 1)),
+            {**unit, "long_name": "y*"},
+        ),
+    }
+    if system.mode == "implicit":
+        for name, entry in (
+            ("solutions", watch.SOLUTIONS),
+            ("newton_steps", watch.SOLVER_STEPS),
+            ("not_accurate", watch.UNSOLVED),
+            ("prediction_error", watch.PREDICTION),
+            ("periods_not_monotone", watch.NOT_MONOTONE),
+        ):
+            found[name] = (("run",), monitors[:, entry].copy(), {})
+    if record:
+        found.update(_recorded(combination, time, samples, kept(span, record)))
+    return found
+
+
+def refused_columns(runs: int) -> Variables:
+    """Of runs that cannot begin, since their start is not inside."""
+    return {"status": (("run",), np.full(runs, "infeasible_start", dtype=STATUS), {})}
+
+
+def times(combination: Combination, span: Span) -> NDArray[np.float64]:
+    """(rows,) sample times in s."""
+    steps = np.append(span.every * np.arange(span.rows - 1, dtype=np.float64), span.steps)
+    return steps * combination.clock.timestep
+
+
+def kept(span: Span, record: int) -> NDArray[np.int64]:
+    """Which rows are recorded: every so many, and the last."""
+    return np.unique(np.append(np.arange(0, span.rows, record), span.rows - 1))
+
+
+def join(parts: Sequence[Variables]) -> Variables:
+    """One after the other; what a part lacks is not a number there."""
+    names = dict.fromkeys(name for part in parts for name in part)
+    joined: Variables = {}
+    for name in names:
+        dimensions, like, attributes = next(part[name] for part in parts if name in part)
+        pieces = [
+            part[name][1]
+            if name in part
+            else np.full((len(part["status"][1]), *like.shape[1:]), np.nan)
+            for part in parts
+        ]
+        joined[name] = (dimensions, np.concatenate(pieces), attributes)
+    return joined
+
+
+def _worst(monitors: NDArray[np.float64], p: int) -> tuple[NDArray[np.float64], ...]:
+    """Each constraint's greatest value and when, (runs, p), that at an exit included."""
+    at = int(watch.worst_at(p))
+    worst, when = monitors[:, at : at + p].copy(), monitors[:, at + p : at + 2 * p].copy()
+    worst[monitors[:, watch.STARTED] == 0.0] = -np.inf
+    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET):
+        index, value = int(monitors[run, watch.EXIT_CONSTRAINT]), monitors[run, watch.EXIT_VALUE]
+        if value > worst[run, index]:
+            worst[run, index], when[run, index] = value, monitors[run, watch.EXIT_TIME]
+    return worst, when
+
+
+def _settling(time: NDArray[np.float64], distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(runs,) as in a certificate; not a number where a run has not settled."""
+    outside = ~(distance <= SETTLED * distance[:, :1])
+    last = outside.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
+    last = np.where(outside.any(axis=1), last, -1)
+    return np.append(time, np.nan)[last + 1]
+
+
+def _recorded(
+    combination: Combination,
+    time: NDArray[np.float64],
+    samples: Samples,
+    rows: NDArray[np.int64],
+) -> Variables:
+    """Rows of the same variables that a trajectory has, with a run dimension before them."""
+    system = combination.system
+    assert system is not None
+    chosen = [getattr(samples, name)[:, rows] for name in Samples.__dataclass_fields__]
+    runs = len(chosen[0])
+    flat = Samples(*(c.reshape(runs * len(rows), *c.shape[2:]) for c in chosen))
+    found: Variables = {}
+    for name, (dimensions, values, attributes) in variables_of(
+        system, np.tile(time[rows], runs), flat
+    ).items():
+        if name in ("state", "equilibrium"):  # kept by its components, and once a run
+            continue
+        if dimensions[:1] == ("time",):
+            values = values.reshape(runs, len(rows), *values.shape[1:])
+        else:
+            values = np.broadcast_to(values, (runs, *np.shape(values))).copy()
+        found[name] = (("run", *dimensions), values, attributes)
+    return found

@@ -1,0 +1,248 @@
+"""Commands that examine a scenario: equilibria, guarantees, plants, where a set is left."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from gne_mj.cli.application import app
+from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, settings
+from gne_mj.cli.output import PREPARING, progress, results, working
+from gne_mj.cli.runs import load
+
+
+@app.command()
+def solve(
+    scenario: SCENARIO,
+    set_: SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Solve this system only.")
+    ] = None,
+    rho: Annotated[
+        list[float] | None,
+        typer.Option("--rho", help="In place of the scenario's penalty; may be repeated."),
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option("--path", metavar="FROM:TO:COUNT", help="Equilibria over a range of rho."),
+    ] = None,
+    out: OUT = None,
+    as_json: JSON = False,
+) -> None:
+    """Compute a scenario's penalised and variational equilibria, without running it.
+
+    --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
+    """
+    from gne_mj import solve as solving
+    from gne_mj.errors import InvalidInput, nearest
+
+    rhos = [] if path is None else solving.parse_path(path)
+    simulation = load(scenario, set_, quiet=as_json)
+    systems = [each for each in simulation.systems if system in (None, each.name)]
+    if not systems:
+        names = [each.name for each in simulation.systems]
+        raise InvalidInput("--system", system, nearest(str(system), names))
+    with working(as_json, PREPARING):
+        solutions = [solving.solve_system(each, rho or (), rhos) for each in systems]
+    report = json.dumps({each.name: each.to_dict() for each in solutions}, indent=2)
+    with results(out, replace=False) as folder:
+        if folder is not None:
+            (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+            if path is not None:
+                from gne_mj import plots
+
+                for each in solutions:
+                    solving.write_path(each, folder / f"{each.name}-path.csv")
+                    plots.save_path(each, folder / f"{each.name}-path.png")
+    if as_json:
+        print(report)
+    else:
+        print("\n\n".join("\n".join(solving.summary(each)) for each in solutions))
+
+
+@app.command()
+def certify(
+    scenario: SCENARIO,
+    set_: SET = None,
+    as_json: JSON = False,
+    search: Annotated[
+        bool,
+        typer.Option(
+            "--search-epsilon", help="Find by trial runs the largest epsilon that stays inside."
+        ),
+    ] = False,
+    period: Annotated[
+        bool,
+        typer.Option(
+            "--search-period",
+            help="Mode implicit: find by trial runs the longest period that stays inside between"
+            " the control instants too.",
+        ),
+    ] = False,
+    push: Annotated[
+        bool,
+        typer.Option(
+            "--search-push",
+            help="Mode implicit: find by trial runs the smallest push that leaves the set.",
+        ),
+    ] = False,
+) -> None:
+    """Tell what the theory guarantees for a scenario's systems, and what it does not."""
+    from dataclasses import asdict, replace
+
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import load_scenario
+    from gne_mj.theory import certify as examine
+    from gne_mj.theory import search_epsilon, search_period, search_push, words
+
+    loaded = load_scenario(scenario, settings(set_))
+    clock = loaded.clock()
+    systems = loaded.system_objects()
+    reports = {system.name: examine(system, clock) for system in systems}
+    if search:
+        searched = [s for s in systems if reports[s.name].epsilon is not None]
+        if not searched:
+            raise InvalidInput("--search-epsilon", scenario, "no system has the distributed law")
+        for system in searched:
+            with working(as_json, f"searching epsilon of {system.name}") as tell:
+                found = asdict(search_epsilon(system, clock, tell))
+            epsilon = {**(reports[system.name].epsilon or {}), "search": found}
+            reports[system.name] = replace(reports[system.name], epsilon=epsilon)
+    for option, wanted, key, hunt in (
+        ("--search-period", period, "period_search", search_period),
+        ("--search-push", push, "push_search", search_push),
+    ):
+        searched = [s for s in systems if wanted and reports[s.name].held is not None]
+        if wanted and not searched:
+            raise InvalidInput(option, scenario, "no system is in mode 'implicit'")
+        for system in searched:
+            with working(as_json, f"searching for {system.name}") as tell:
+                found = asdict(hunt(system, clock, tell))
+            held = {**(reports[system.name].held or {}), key: found}
+            reports[system.name] = replace(reports[system.name], held=held)
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    else:
+        for report in reports.values():
+            print("\n".join(words(report)))
+
+
+@app.command()
+def passivity(
+    scenario: SCENARIO,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="This one; all if left out.")
+    ] = None,
+    set_: SET = None,
+    trials: Annotated[int, typer.Option("--trials", help="Trials for each agent.")] = 24,
+    seed: Annotated[int, typer.Option("--seed", help="Of the random inputs and states.")] = 0,
+    as_json: JSON = False,
+) -> None:
+    """Look for violations of equilibrium-independent passivity in the plants of a scenario.
+
+    Trials last as long as the scenario, and use its step and half of it; input limits and the law
+    do not matter here. That no violation is found is no proof.
+    """
+    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.passivity import examine, plants_of
+    from gne_mj.scenario import load_scenario
+
+    loaded = load_scenario(scenario, settings(set_))
+    if system is not None and system not in loaded.systems:
+        raise InvalidInput("--system", system, nearest(system, loaded.systems))
+    reports = {}
+    for name in loaded.systems if system is None else (system,):
+        with working(as_json, PREPARING):
+            built = loaded.systems[name].build(name, loaded.simulation)
+            reports[name] = examine(
+                plants_of(built.agents, built.engine, built.integrator),
+                loaded.simulation.timestep,
+                duration=loaded.simulation.duration,
+                trials=trials,
+                seed=seed,
+                outputs=built.game.box or (-1.0, 1.0),
+                owners=built.game.agent_of_action,
+            )
+        if not as_json:
+            print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
+
+
+@app.command(name="map")
+def map_(
+    scenario: SCENARIO,
+    set_: SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Which; needed if several.")
+    ] = None,
+    periods: Annotated[
+        str, typer.Option("--periods", metavar="FROM:TO:COUNT", help="Control periods in s.")
+    ] = "0.001:1:7",
+    margins: Annotated[
+        str,
+        typer.Option(
+            "--margins", metavar="FROM:TO:COUNT", help="Shares of the way to the boundary left."
+        ),
+    ] = "1e-6:0.5:6",
+    pushes: Annotated[
+        str, typer.Option("--pushes", metavar="A,B,...", help="Forces on every agent.")
+    ] = "0,2,10",
+    runs: Annotated[int, typer.Option("--runs", help="Random starts for each cell.")] = 20,
+    duration: Annotated[float, typer.Option("--duration", help="Of each run, in s.")] = 3.0,
+    seed: Annotated[int, typer.Option("--seed", help="Of starts and directions.")] = 0,
+    out: OUT = None,
+    as_json: JSON = False,
+) -> None:
+    """Map where modes `sampled` and `implicit` leave the set: period x start margin x push.
+
+    --out keeps the figure map.png and the table map.csv. Ctrl-C ends it early and keeps what was
+    done.
+    """
+    from dataclasses import asdict
+
+    from gne_mj import exit_map as mapping
+    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.scenario import load_scenario
+    from gne_mj.simulation import interruption
+    from gne_mj.solve import parse_path
+
+    loaded = load_scenario(scenario, settings(set_))
+    names = list(loaded.systems)
+    if system is None and len(names) > 1:
+        raise InvalidInput("--system", None, f"name one of {', '.join(names)}")
+    name = system or names[0]
+    if name not in names:
+        raise InvalidInput("--system", system, nearest(str(system), names))
+    try:
+        forces = tuple(float(force) for force in pushes.split(","))
+    except ValueError:
+        raise InvalidInput("--pushes", pushes, "it must be numbers, A,B,...") from None
+    grid = mapping.Grid(
+        periods=tuple(parse_path(periods, "--periods")),
+        margins=tuple(parse_path(margins, "--margins")),
+        pushes=forces,
+        runs=runs,
+        duration=duration,
+        seed=seed,
+    )
+    built = loaded.systems[name].build(name, loaded.simulation)
+    with (
+        interruption() as stop,
+        results(out, replace=False) as folder,
+        progress(float(grid.total), as_json, "runs") as show,
+    ):
+        cells = mapping.exit_map(built, loaded.simulation.timestep, grid, show, stopped=stop.is_set)
+        if folder is not None:
+            from gne_mj import plots
+
+            mapping.write(cells, folder / "map.csv")
+            plots.save_map(cells, folder / "map.png")
+    if as_json:
+        print(json.dumps([asdict(cell) for cell in cells], indent=2))
+    else:
+        print("\n".join(mapping.summary(cells)))
+        if out is not None:
+            print(f"\nfigure      {out / 'map.png'}\ntable       {out / 'map.csv'}")
+    raise typer.Exit(1 if stop.is_set() else 0)

@@ -1,0 +1,49 @@
+"""Arguments and options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+SCENARIO = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario (see `scenarios`), or a .toml file.")
+]
+
+
+SET = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be repeated."),
+]
+
+
+OUT = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder to write; must not exist.")
+]
+
+
+JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
+
+
+def settings(changes: list[str] | None) -> dict[str, Any]:
+    """What --set asks for: dotted keys to values."""
+    from gne_mj.errors import InvalidInput
+    from gne_mj.scenario import parse_value
+
+    found: dict[str, Any] = {}
+    for change in changes or []:
+        key, equals, value = change.partition("=")
+        if not (key and equals):
+            raise InvalidInput("--set", change, "it must read KEY=VALUE")
+        found[key.strip()] = parse_value(value.strip())
+    return found
+
+
+def formats(given: list[str] | None) -> tuple[str, ...]:
+    """What --format asks for; png if it is left out."""
+    from gne_mj.errors import InvalidInput
+    from gne_mj.plots import FORMATS
+
+    for name in given or []:
+        if name not in FORMATS:
+            raise InvalidInput("--format", name, f"choose from {', '.join(FORMATS)}")
+    return tuple(given or ("png",))

@@ -1,0 +1,203 @@
+"""Commands that run many runs, and tell of them."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gne_mj.cli.application import app
+from gne_mj.cli.arguments import JSON, SET, settings
+from gne_mj.cli.output import on_terminal
+
+if TYPE_CHECKING:
+    from gne_mj.batches import Progress, Store
+
+
+@app.command()
+def batch(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help="As for `run`; with --resume it may be left out."),
+    ] = None,
+    sweep: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=VALUES",
+            help="Values A,B,... or FROM:TO:COUNT or FROM:TO:COUNTlog; may be repeated, and all"
+            " combinations are run.",
+        ),
+    ] = None,
+    runs: Annotated[
+        int,
+        typer.Option(
+            "--runs", help="Random interior starts of each combination; 0: the scenario's own."
+        ),
+    ] = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write.")] = Path(
+        "results/batch"
+    ),
+    set_: SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="Which; needed if several.")
+    ] = None,
+    record: Annotated[
+        str,
+        typer.Option(
+            "--record",
+            help="What is kept: 'summaries', 'all' samples too, or every K-th one (a number).",
+        ),
+    ] = "summaries",
+    seed: Annotated[int, typer.Option("--seed", help="From which all starts' seeds follow.")] = 0,
+    spread: Annotated[
+        float, typer.Option("--spread", help="How far towards the boundary starts lie, 0 to 1.")
+    ] = 0.9,
+    chunk: Annotated[
+        int, typer.Option("--chunk", help="Runs that are stored together; 0: chosen.")
+    ] = 0,
+    threads: Annotated[int, typer.Option("--threads", help="0: one a processor.")] = 0,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what is in DIR already.")
+    ] = False,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            "--cluster", metavar="ADDRESS", help="Run on the workers of this Dask scheduler."
+        ),
+    ] = None,
+    fail_on_exit: Annotated[
+        bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run left its set.")
+    ] = False,
+    as_json: JSON = False,
+) -> None:
+    """Run all combinations of swept values from random starts, into one dataset.
+
+    Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
+    that was stopped or killed goes on with --resume, and ends as if it had not been.
+    """
+    from gne_mj.batches import Store, execute, make_plan, parse_sweep
+    from gne_mj.errors import InvalidInput
+    from gne_mj.simulation import interruption
+
+    if threads < 0:
+        raise InvalidInput("--threads", threads, "it must not be negative")
+    if scenario is None:
+        if not resume:
+            raise InvalidInput("SCENARIO", None, "a scenario must be named")
+        store = Store.continued(out)
+    else:
+        plan = make_plan(
+            scenario,
+            settings(set_),
+            system=system,
+            sweeps=[parse_sweep(text) for text in sweep or []],
+            starts=runs,
+            seed=seed,
+            spread=spread,
+            record=_record(record),
+            chunk=chunk,
+        )
+        goes_on = resume and out.exists()
+        store = Store.resume(out, plan) if goes_on else Store.create(out, plan)
+    with interruption() as stop, _showing(store.plan.runs, as_json) as show:
+        now = execute(store, threads=threads, cluster=cluster, progress=show, stopped=stop.is_set)
+        done = now.done == now.total
+        if now.done:
+            _tell(store, now, as_json)
+    if not done and not as_json:
+        print(
+            f"\nstopped: {now.done} of {now.total} runs are stored; go on with"
+            f" `gne-mj batch --resume --out {out}`"
+        )
+    raise typer.Exit(1 if not done or (fail_on_exit and now.left) else 0)
+
+
+@app.command(name="batch-report")
+def batch_report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `batch` wrote.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Where to; DIR if left out.")
+    ] = None,
+    format_: Annotated[
+        list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
+    ] = None,
+    as_json: JSON = False,
+) -> None:
+    """Write a batch's tables (CSV) and its figure, whether it is complete or not."""
+    from gne_mj.batches import Progress, Store
+    from gne_mj.batches.report import write_report
+    from gne_mj.cli.arguments import formats
+
+    kinds = formats(format_)
+    store = Store.open(folder)
+    _print(store, Progress.of(store), write_report(store, out, kinds), as_json)
+
+
+def _record(text: str) -> int:
+    from gne_mj.errors import InvalidInput
+
+    words = {"summaries": 0, "all": 1}
+    if text in words:
+        return words[text]
+    if text.isdecimal() and int(text) > 0:
+        return int(text)
+    raise InvalidInput("--record", text, "it must be 'summaries', 'all' or a whole number from 1")
+
+
+def _tell(store: "Store", now: "Progress", as_json: bool) -> None:
+    """Write the report beside the runs, and print its table."""
+    from gne_mj.batches.report import write_report
+
+    _print(store, now, write_report(store), as_json)
+
+
+def _print(store: "Store", now: "Progress", paths: list[Path], as_json: bool) -> None:
+    from gne_mj.batches.report import combinations, figures_of, summary
+
+    runs = figures_of(store)
+    table = combinations(runs)
+    if as_json:
+        statuses = runs["status"].to_series().value_counts()
+        report: dict[str, Any] = {
+            "runs": now.total,
+            "done": now.done,
+            "statuses": {str(name): int(count) for name, count in statuses.items()},
+            "combinations": json.loads(table.to_json(orient="records")),
+        }
+        print(json.dumps(report, indent=2))
+        return
+    print("\n".join(summary(table, list(runs.attrs["swept"]))))
+    print(f"\nruns        {store.folder / 'runs.zarr'}")
+    for path in paths:
+        print(f"{'figure' if path.stem == 'summary' else 'table':11} {path}")
+
+
+@contextmanager
+def _showing(total: int, quiet: bool) -> Iterator[Any]:
+    """A progress bar on a terminal's stderr: runs done, rate, time left, exits so far."""
+    if not on_terminal(quiet):
+        yield None
+        return
+    from rich import progress
+    from rich.console import Console
+
+    with progress.Progress(
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TextColumn("runs  {task.fields[rate]}"),
+        progress.TimeRemainingColumn(),
+        progress.TextColumn("{task.fields[left]} left the set"),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task("runs", total=total, rate="", left=0)
+
+        def show(now: "Progress") -> None:
+            speed = bar.tasks[0].speed
+            rate = f"{speed:.3g}/s" if speed else ""
+            bar.update(task, completed=now.done, left=now.left, rate=rate)
+
+        yield show

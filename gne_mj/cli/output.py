@@ -1,0 +1,177 @@
+"""Where commands write: result folders, progress, words."""
+
+import json
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gne_mj.trajectory import Trajectory
+
+
+PREPARING = "preparing (a first run compiles for a few seconds)"
+
+
+@contextmanager
+def results(out: Path | None, replace: bool) -> Iterator[Path | None]:
+    """A folder that becomes ``out`` when all is written, and vanishes if something fails.
+
+    `paper` may replace results of its own, and only those.
+    """
+    import tempfile
+
+    from gne_mj.errors import InvalidInput
+
+    if out is None:
+        yield None
+        return
+    if out.exists() and not (replace and _is_of_paper(out)):
+        raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    except OSError as error:
+        raise InvalidInput("--out", str(out), f"it cannot be written: {error.strerror}") from None
+    try:
+        yield folder
+        folder.chmod(0o755)
+        if out.exists():
+            _replace(folder, out)
+        else:
+            folder.rename(out)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _is_of_paper(out: Path) -> bool:
+    """Whether a folder holds what `paper` writes: `run` does not draw."""
+    figures = ("robots-velocities", "robots-gaps", "channels-powers", "channels-total-power")
+    names = ("report.json", "trajectory.zarr", *(f"{figure}.png" for figure in figures))
+    return all((out / name).exists() for name in names)
+
+
+def _replace(folder: Path, out: Path) -> None:
+    """Move all in ``folder`` into ``out``; what has the same names there goes last of all."""
+    import tempfile
+
+    aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
+    for entry in sorted(folder.iterdir()):
+        if (out / entry.name).exists():
+            (out / entry.name).rename(aside / entry.name)
+        entry.rename(out / entry.name)
+    folder.rmdir()
+    shutil.rmtree(aside)
+
+
+def on_terminal(quiet: bool) -> bool:
+    """Whether somebody watches, and wants to."""
+    return not quiet and sys.stderr.isatty()
+
+
+@contextmanager
+def working(quiet: bool, what: str) -> Iterator[Any]:
+    """A word on a terminal's stderr meanwhile; what is handed out changes it."""
+    if not on_terminal(quiet):
+        yield None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(what) as status:
+        yield status.update
+
+
+@contextmanager
+def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
+    """A progress bar on a terminal's stderr, else nothing."""
+    if not on_terminal(quiet):
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn(
+            f"{{task.completed:{'.1f' if unit == 's' else '.0f'}}} of {{task.total:g}} {unit}"
+        ),
+        BarColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task("run", total=total)
+        yield lambda now: bar.update(task, completed=now)
+
+
+def tell(trajectory: "Trajectory", as_json: bool) -> None:
+    """Print a run's summary, or its report as JSON."""
+    if as_json:
+        print(json.dumps(trajectory.report(), indent=2))
+        return
+    for name, report in trajectory.reports.items():
+        print("\n".join(_summary(name, report)))
+        _warn(name, report)
+
+
+def _summary(name: str, report: dict[str, Any]) -> list[str]:
+    worst, gap = report["worst_constraint"], report["worst_gap"]
+    settling, actuators = report["settling_time"], report["actuators"]
+    lyapunov, epsilon = report["lyapunov"], report["epsilon"]
+    distances = report["equilibrium"]
+    unknown = distances["final_distance_to_variational"] is None
+    rows = {
+        "status": f"{report['status']}: {report['message']}",
+        "least margin": "nothing was observed"
+        if worst is None
+        else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
+        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
+        "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
+        + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
+        "Lyapunov function": "not known of MJCF robots"
+        if not lyapunov["known"]
+        else ("never rose" if lyapunov["monotone"] else "rose")
+        + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
+        + f" (largest rise {lyapunov['largest_rise']:.2g}; "
+        + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
+        "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
+        f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
+    }
+    if gap is not None:
+        rows["widest gap"] = (
+            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
+            f" {gap['time']:.4g} s"
+        )
+    implicit = report["implicit"]
+    if implicit is not None:
+        rows["held inputs"] = (
+            f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
+            f" steps each; predicted outputs off by up to"
+            f" {implicit['largest_prediction_error']:.2g}"
+        )
+        for key, what in (
+            ("not_accurate", "not accurate (though inside)"),
+            ("periods_not_monotone", "periods without dy+/du > 0"),
+        ):
+            if implicit[key]:
+                rows["held inputs"] += f"; {implicit[key]} {what}"
+    if epsilon["measured"] is not None:
+        rows["epsilon"] = (
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
+            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
+            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
+        )
+    return [f"\n{name}", *(f"  {key:20} {value}" for key, value in rows.items())]
+
+
+def _warn(name: str, report: dict[str, Any]) -> None:
+    saturated = report["actuators"]["saturated"]
+    if saturated is not None:
+        print(
+            f"gne-mj: warning: systems.{name}: the law asked agent {saturated['agent']} for"
+            f" {saturated['demand']:.4g} at {saturated['time']:.4g} s, beyond its input limit"
+            f" {saturated['limit']:g}; from then on nothing is guaranteed",
+            file=sys.stderr,
+        )

@@ -1,0 +1,111 @@
+"""Rows that native loops write at sample times: one block of arrays for each run.
+
+A loop knows a block by its address; 0 stands for none. The block is [first step of which a row is
+written, steps between rows, rows that there is room for, rows written], and then a pair (address,
+length) for each column.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.loops.base import Samples
+from gne_mj.native import copy, kernel
+from gne_mj.table import exact, floats, integers_at
+
+FIRST, EVERY, ROWS, DONE = range(4)
+HEADER = 4  # the same as two pairs of a table
+STATE, INPUT, MEMORY, SEEN, ACTS = range(2, 7)
+WORDS = HEADER + 10
+
+
+@kernel
+def row_of(column, rows, row):
+    """One row of a column; its start and width."""
+    width = len(column) // rows
+    return row * width, width
+
+
+@kernel
+def record(block, faults, agent, states, problem, clock, step, state, u, memory, work):
+    """Write this step's row, if one is due; state and u are flat, as they are at its start."""
+    head = integers_at(block, HEADER)
+    behind = step - head[FIRST]
+    if behind < 0 or behind % head[EVERY] != 0 or behind // head[EVERY] >= head[ROWS]:
+        return
+    row, rows = behind // head[EVERY], head[ROWS]
+    for r in range(2):
+        source = state if r == 0 else u
+        column = floats(block, STATE if r == 0 else INPUT)
+        at, width = row_of(column, rows, row)
+        copy(source[:width], column[at : at + width])
+    column = floats(block, MEMORY)
+    at, width = row_of(column, rows, row)
+    copy(memory[:width], column[at : at + width])
+    seen, acts = floats(block, SEEN), floats(block, ACTS)
+    at, width = row_of(seen, rows, row)
+    faults.record(
+        agent, states, problem, clock, step, state, u, work, seen[at : at + width],
+        acts[at : at + width],
+    )  # fmt: skip
+    head[DONE] = row + 1
+
+
+class Recorder:
+    """Room for rows of several runs.
+
+    Args:
+        runs: how many.
+        rows: of each run.
+        shape: (m, states) of the agents' channels.
+        memory: entries of the law's memory.
+        faulty: whether what was seen and what acted is recorded too.
+        first: step of the first row.
+        every: steps between rows.
+
+    Attributes:
+        blocks: (runs, WORDS), what the loops know.
+    """
+
+    def __init__(
+        self,
+        runs: int,
+        rows: int,
+        shape: tuple[int, int],
+        memory: int,
+        faulty: bool,
+        *,
+        first: int = 0,
+        every: int = 1,
+    ) -> None:
+        m = shape[0]
+        struck = m * int(faulty)
+        columns = [np.empty((runs, rows, width)) for width in (m, memory, struck, struck)]
+        self._columns = [np.empty((runs, rows, *shape)), *columns]
+        self.blocks = np.zeros((runs, WORDS), dtype=np.int64)
+        self.blocks[:, : DONE + 1] = first, every, rows, 0
+        for at, column in enumerate(self._columns, start=STATE):
+            size = column[0].size if runs else 0
+            self.blocks[:, 2 * at] = column.ctypes.data + 8 * size * np.arange(runs)
+            self.blocks[:, 2 * at + 1] = size
+
+    @property
+    def addresses(self) -> NDArray[np.int64]:
+        """(runs,) the blocks' addresses."""
+        exact(self.blocks.ctypes.data + self.blocks.nbytes)
+        return self.blocks.ctypes.data + 8 * WORDS * np.arange(len(self.blocks))
+
+    @property
+    def done(self) -> NDArray[np.int64]:
+        """(runs,) rows written."""
+        return self.blocks[:, DONE]
+
+    def samples(self, run: int) -> Samples:
+        """The rows of one run."""
+        return Samples(*(column[run, : self.done[run]] for column in self._columns))
+
+    def all(self) -> Samples:
+        """The rows of all runs, (runs, rows, ...); those not written are not numbers."""
+        missing = np.arange(self._columns[0].shape[1]) >= self.done[:, None]
+        for column in self._columns:
+            column[missing] = np.nan
+        return Samples(*self._columns)

@@ -1,0 +1,152 @@
+"""Figures of a trajectory: actions and derived quantities over time.
+
+What is drawn follows from the trajectory alone, so a game of one's own is drawn like any other.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style
+from gne_mj.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
+    """All figures of a trajectory's systems, by name.
+
+    For each system its actions, one panel for each of their axes, as ``robots-velocities``, and
+    each quantity that its game derives, with its bounds, as ``robots-gaps`` or, where it is one
+    number, ``channels-total-power``.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    figures = {}
+    with matplotlib.rc_context(STYLE):
+        for name in trajectory.tree.children:
+            data = trajectory[name]
+            figures[f"{name}-{_plural(data['action'].attrs['long_name'])}"] = _actions(data)
+            for quantity in json.loads(data.attrs["quantities"]):
+                title = quantity if data[quantity].ndim == 1 else _plural(quantity)
+                figures[f"{name}-{title.replace('_', '-')}"] = _quantity(data, quantity)
+    return figures
+
+
+def save(
+    trajectory: Trajectory, folder: str | Path, formats: tuple[str, ...] = ("png",)
+) -> list[Path]:
+    """Write every figure of :func:`draw` into a folder; returns the files' paths."""
+    import matplotlib.pyplot as plt
+
+    paths = []
+    for name, figure in draw(trajectory).items():
+        for kind in formats:
+            path = Path(folder) / f"{name}.{kind}"
+            figure.savefig(path, dpi=200)
+            paths.append(path)
+        plt.close(figure)
+    return paths
+
+
+def _plural(noun: str) -> str:
+    noun = noun.replace(" ", "-")
+    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+
+
+def _figure(data: "xarray.Dataset", panels: int, width: float) -> tuple["Figure", list["Axes"]]:
+    """Empty panels above each other, over time."""
+    import matplotlib.pyplot as plt
+
+    figure, grid = plt.subplots(
+        panels, 1, figsize=(width, 1.0 + 1.9 * panels), layout="constrained", sharex=True,
+        squeeze=False,
+    )  # fmt: skip
+    time = data["time"].to_numpy()
+    axes: list[Axes] = list(grid[:, 0])
+    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
+    if data.attrs["status"] not in ("converged", "completed"):
+        axes[0].set_title(data.attrs["status"].replace("_", " "), color="#B00020", fontsize=9)
+        for panel in axes:
+            panel.axvline(time[-1], color="#B00020", linewidth=1.0)
+    return figure, axes
+
+
+def _legend(figure: "Figure", axes: "Axes", title: str | None) -> None:
+    """Beside the axes, so that it hides nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside right center", title=title, handlelength=2.4)
+
+
+def _actions(data: "xarray.Dataset") -> "Figure":
+    """Every agent's action, a panel for each axis."""
+    action = data["action"]
+    values = action.to_numpy()
+    if action.dims[1] == "agent":
+        panels = {"": (values, data["agent"].to_numpy())}
+    else:
+        axis, owner = data["axis"].to_numpy(), data["owner"].to_numpy()
+        panels = {
+            str(name): (values[:, axis == name], owner[axis == name])
+            for name in dict.fromkeys(axis.tolist())
+        }
+    figure, axes = _figure(data, len(panels), 4.6)
+    for panel, (name, (columns, owners)) in zip(axes, panels.items(), strict=True):
+        names = [str(number) for number in owners]
+        _lines(panel, data["time"].to_numpy(), columns, owners - 1, names)
+        symbol = f"y_{{i,{name}}}" if name else "y_i"
+        panel.set_ylabel(axis_label(action.attrs["long_name"], symbol, action.attrs["units"]))
+    _legend(figure, axes[0], data.attrs["agent_name"])
+    return figure
+
+
+def _quantity(data: "xarray.Dataset", name: str) -> "Figure":
+    """A derived quantity with its bounds."""
+    quantity = data[name]
+    values = quantity.to_numpy().reshape(len(quantity), -1)
+    single, of_agents = quantity.ndim == 1, "agent" in quantity.dims
+    names = [str(n) for n in data["agent" if of_agents else "constraint_name"].to_numpy()]
+    figure, (axes,) = _figure(data, 1, 4.6 if single or of_agents else 5.6)
+    numbers = np.arange(values.shape[1])
+    _lines(axes, data["time"].to_numpy(), values, numbers, [] if single else names)
+    labelled = False
+    for bound in (f"{name}_bound", f"{name}_lower_bound"):
+        if bound in data:
+            _bounds(axes, np.atleast_1d(data[bound].to_numpy()), "bound" if not labelled else None)
+            labelled = True
+    axes.set_ylabel(axis_label(*(quantity.attrs[key] for key in ("long_name", "symbol", "units"))))
+    _legend(figure, axes, data.attrs["agent_name"] if of_agents else None)
+    return figure
+
+
+def _lines(
+    axes: "Axes",
+    time: NDArray[np.float64],
+    values: NDArray[np.float64],
+    numbers: NDArray[np.int64],
+    names: list[str],
+) -> None:
+    """One line a column; columns of one number look alike in every panel."""
+    labels = names if len(names) <= LEGEND else []
+    for index, number in enumerate(numbers):
+        label = labels[index] if labels else None
+        axes.plot(time, values[:, index], label=label, **line_style(int(number)))
+
+
+def _bounds(axes: "Axes", bounds: NDArray[np.float64], label: str | None) -> None:
+    """Each bound once: in black, or in its line's colour where it is one line's of several."""
+    values, first, counts = np.unique(bounds, return_index=True, return_counts=True)
+    for value, number, count in zip(values, first, counts, strict=True):
+        own = count == 1 and len(bounds) > 1
+        colour = line_style(int(number))["color"] if own else "black"
+        axes.axhline(value, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), label=label)
+        label = None

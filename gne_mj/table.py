@@ -1,0 +1,100 @@
+"""Tables of arrays that native code reaches by one address: read-only to it, unless it says so.
+
+A callback gets two pointers and nothing else, and a loop over many runs wants one number a run.
+Both find their arrays through the address of a block of (address, length) pairs.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from gne_mj.errors import EngineError
+from gne_mj.native import array_at, load_word
+
+
+class Table:
+    """Arrays that native code reads, as one block of (address, length) pairs.
+
+    The arrays are kept alive as long as the table is; so keep the plant or loop that made a
+    simulation for as long as that simulation, or a copy of it, is stepped with its callbacks.
+
+    Attributes:
+        arrays: as they were given.
+    """
+
+    def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
+        for array in arrays:
+            if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
+                raise EngineError(
+                    f"native code reads contiguous arrays of 8-byte items, not {array.dtype}"
+                )
+        self.arrays = tuple(arrays)
+        pairs = [(array.ctypes.data, array.size) for array in arrays]
+        self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
+
+    @property
+    def address(self) -> int:
+        """Where the pairs lie; a double, which is what MuJoCo can keep, holds it exactly.
+
+        Raises:
+            EngineError: it does not.
+        """
+        return exact(self._pairs.ctypes.data)
+
+
+def exact(address: int) -> int:
+    """The same address, if a double holds it exactly, as all user-space addresses so far."""
+    if int(float(address)) != address:
+        raise EngineError(f"the address {address} does not fit into a double")
+    return address
+
+
+@intrinsic
+def floats(typingctx: Any, table: Any, index: Any) -> Any:
+    """The float array at this index of the table at an address."""
+    return _entry(types.float64)
+
+
+@intrinsic
+def integers(typingctx: Any, table: Any, index: Any) -> Any:
+    """The integer array at this index of the table at an address."""
+    return _entry(types.int64)
+
+
+def _entry(item: types.Type) -> Any:
+    kind = types.Array(item, 1, "C")
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        table, index = arguments
+        pair = builder.add(table, builder.mul(index, context.get_constant(types.intp, 16)))
+        length = builder.add(pair, context.get_constant(types.intp, 8))
+        return array_at(
+            context, builder, kind, load_word(builder, pair), load_word(builder, length)
+        )
+
+    return kind(types.int64, types.int64), codegen
+
+
+@intrinsic
+def floats_at(typingctx: Any, address: Any, length: Any) -> Any:
+    """The float array of a length at an address."""
+    return _block(types.float64)
+
+
+@intrinsic
+def integers_at(typingctx: Any, address: Any, length: Any) -> Any:
+    """The integer array of a length at an address."""
+    return _block(types.int64)
+
+
+def _block(item: types.Type) -> Any:
+    kind = types.Array(item, 1, "C")
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return array_at(context, builder, kind, *arguments)
+
+    return kind(types.int64, types.int64), codegen
