@@ -35,7 +35,7 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails.
+    The exit status is 2, but 1 where a function of the user's own fails or the disk is full.
     """
     try:
         app()
@@ -44,7 +44,7 @@ def main() -> None:
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:
-        from gne_mj.errors import GneError, UserCodeError
+        from gne_mj.errors import GneError, StorageError, UserCodeError
 
         if type(error).__module__.startswith("numba"):
             from gne_mj.user_files import compiler_complaint
@@ -53,7 +53,7 @@ def main() -> None:
                 _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
             raise
-        code = 1 if isinstance(error, UserCodeError) else 2
+        code = 1 if isinstance(error, UserCodeError | StorageError) else 2
         _fail(str(error), getattr(error, "status", None), code)
 
 

@@ -114,7 +114,11 @@ def _over(
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
     swept, values = runs[key].to_numpy(), runs[panel.name].to_numpy()
-    positive = panel.log and np.all(values[np.isfinite(values)] > 0)
+    finite = values[np.isfinite(values)]
+    axes.set_xlabel(key)
+    if len(finite) == 0:
+        _nothing(axes)
+        return
     for number, (label, mine) in enumerate(lines):
         xs = np.unique(swept[mine])
         table = np.full((len(xs), 4), np.nan)
@@ -132,9 +136,8 @@ def _over(
         axes.plot(xs, table[:, 3], ".", color=style["color"], markersize=3)
     if _is_log(swept):
         axes.set_xscale("log")
-    if positive and np.any(np.isfinite(values)):
+    if panel.log and _is_log(finite):
         axes.set_yscale("log")
-    axes.set_xlabel(key)
 
 
 def _share(
@@ -165,9 +168,14 @@ def _histogram(axes: "Axes", values: NDArray[np.float64], label: str) -> None:
     if len(values):
         axes.hist(values, bins=min(40, max(5, len(values) // 5)), color=line_style(0)["color"])
     else:
-        axes.text(0.5, 0.5, "none", ha="center", transform=axes.transAxes)
+        _nothing(axes)
     axes.set_xlabel(label)
     axes.set_ylabel("runs")
+
+
+def _nothing(axes: "Axes") -> None:
+    axes.text(0.5, 0.5, "no run has one", ha="center", transform=axes.transAxes)
+    axes.set(xticks=[], yticks=[])
 
 
 def _is_log(values: NDArray[np.float64]) -> bool:
