@@ -113,6 +113,8 @@ class Store:
     def locked(self) -> Iterator[None]:
         """Keep other processes of this machine from writing; ends with the process at the latest.
 
+        What a killed process was just writing is removed: nothing refers to it.
+
         Raises:
             InvalidInput: another one is writing.
         """
@@ -123,6 +125,8 @@ class Store:
                 raise InvalidInput(
                     "--out", str(self.folder), "another process is running this batch right now"
                 ) from None
+            for leftover in (self.folder / RUNS).glob("*/*.partial"):
+                leftover.unlink(missing_ok=True)
             yield
 
     def statuses(self) -> NDArray[np.str_]:
