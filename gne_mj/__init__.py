@@ -5,6 +5,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gne_mj.environment import load_environment
     from gne_mj.scenario import Scenario, load_scenario
     from gne_mj.simulation import Simulation
     from gne_mj.trajectory import Trajectory
@@ -16,11 +17,20 @@ _LAZY = {
     "Scenario": "gne_mj.scenario",
     "Simulation": "gne_mj.simulation",
     "Trajectory": "gne_mj.trajectory",
+    "load_environment": "gne_mj.environment",
     "load_scenario": "gne_mj.scenario",
     "run": "gne_mj.scenario",
 }
 
-__all__ = ["Scenario", "Simulation", "Trajectory", "__version__", "load_scenario", "run"]
+__all__ = [
+    "Scenario",
+    "Simulation",
+    "Trajectory",
+    "__version__",
+    "load_environment",
+    "load_scenario",
+    "run",
+]
 
 
 def __getattr__(name: str) -> Any:
