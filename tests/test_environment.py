@@ -212,6 +212,9 @@ def test_each_structure_tells_what_its_law_may_measure():
             assert np.array_equal(seen[f"{name}/neighbours"], FIVE[heard[i]])
             assert np.allclose(seen[f"{name}/constraints"], g[constraints[i]], rtol=1e-14, atol=0)
         shared = [key for key in seen if key.startswith("all/")]
+        arrays = list(seen.values())
+        for i, array in enumerate(arrays):
+            assert not any(np.shares_memory(array, other) for other in arrays[:i])
         assert len(seen) == 15 + len(shared)
         if structure == "full":
             assert shared == ["all/output", "all/state", "all/constraint", "all/gap"]

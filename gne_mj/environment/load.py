@@ -107,7 +107,7 @@ def environment_of(
         exit_cost = float(
             np.maximum(0.0, round(periods) * finite_costs(system.game, system.start).sum())
         )
-    physics = FleetPhysics(_plant(system, clock.timestep), system.game, system.state)
+    physics = _physics(system, clock.timestep)
     task = FleetTask(
         system,
         _information(system, information, graph),
@@ -120,11 +120,11 @@ def environment_of(
     return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
 
 
-def _plant(system: System, timestep: float) -> MujocoPlant | MjcfPlant:
+def _physics(system: System, timestep: float) -> FleetPhysics:
+    kind = MjcfPlant if isinstance(system.agents, MjcfRobots) else MujocoPlant
     try:
-        if isinstance(system.agents, MjcfRobots):
-            return MjcfPlant(system.agents, timestep, system.integrator)
-        return MujocoPlant(system.agents, timestep, system.integrator)
+        plant = kind(system.agents, timestep, system.integrator)  # type: ignore[arg-type]
+        return FleetPhysics(plant, system.game, system.state)
     except InvalidInput as error:
         where = f"systems.{system.name}.{error.key}"
         raise InvalidInput(where, error.value, error.expected) from None

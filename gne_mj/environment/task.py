@@ -127,9 +127,15 @@ class FleetTask(control.Task):
             physics.restore()
 
     def _finite(self, physics: FleetPhysics) -> bool:
-        parts: list[Any] = [physics.data.qpos, physics.data.qvel, physics.data.act]
-        parts += [physics.state, physics.constraint]
-        return all(np.all(np.isfinite(part)) for part in [*parts, self.costs(physics)])
+        data = physics.data
+        parts = [data.qpos, data.qvel, data.act, physics.state, physics.constraint]
+        parts += [self.costs(physics), *self._derived(physics).values()]
+        return all(np.all(np.isfinite(part)) for part in parts)
+
+    def _derived(self, physics: FleetPhysics) -> dict[str, NDArray[np.float64]]:
+        """What the game derives from its actions, by name."""
+        game, y = self.system.game, physics.output[None]
+        return {each.name: each.at(y, game.entries(each))[0].copy() for each in game.quantities}
 
     def action_spec(self, physics: FleetPhysics) -> specs.BoundedArray:
         """One force for each channel, shape (m,), in the inputs' unit, within their limits.
@@ -151,13 +157,12 @@ class FleetTask(control.Task):
         Raises:
             NotFinite: an entry that is not a number.
         """
-        game, told = self.system.game, self.information
+        told, data = self.information, physics.data
         state, y, g = physics.state, physics.output, physics.constraint
-        data = physics.data
         seen: Observation = OrderedDict()
         for i, own in enumerate(self._own):
             name = f"agent_{i + 1}"
-            seen[f"{name}/own"] = state[own].ravel()
+            seen[f"{name}/own"] = state[own].flatten()
             if physics.joints:
                 parts = zip((data.qpos, data.qvel, data.act), physics.joints[i], strict=True)
                 seen[f"{name}/joints"] = np.concatenate([array[part] for array, part in parts])
@@ -165,9 +170,8 @@ class FleetTask(control.Task):
             seen[f"{name}/constraints"] = g[told.constraints[i]]
         if told.structure == "full":
             seen["all/output"], seen["all/state"], seen["all/constraint"] = y, state, g
-            for quantity in game.quantities:
-                values = quantity.at(y[None], game.entries(quantity))[0]
-                seen[f"all/{quantity.name}"] = np.array(values)
+            for name, values in self._derived(physics).items():
+                seen[f"all/{name}"] = values
         if not np.all(np.isfinite(np.concatenate([values.ravel() for values in seen.values()]))):
             names = [name for name, values in seen.items() if not np.all(np.isfinite(values))]
             raise NotFinite(f"observation '{names[0]}' is not finite: {seen[names[0]].tolist()}")
