@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gne_mj.batches import open_batch, run_batch
+    from gne_mj.environment import load_environment
     from gne_mj.scenario import Scenario, load_scenario
     from gne_mj.simulation import Simulation
     from gne_mj.trajectory import Trajectory
@@ -17,6 +18,7 @@ _LAZY = {
     "Scenario": "gne_mj.scenario",
     "Simulation": "gne_mj.simulation",
     "Trajectory": "gne_mj.trajectory",
+    "load_environment": "gne_mj.environment",
     "load_scenario": "gne_mj.scenario",
     "open_batch": "gne_mj.batches",
     "run": "gne_mj.scenario",
@@ -28,6 +30,7 @@ __all__ = [
     "Simulation",
     "Trajectory",
     "__version__",
+    "load_environment",
     "load_scenario",
     "open_batch",
     "run",

@@ -19,12 +19,12 @@ import gne_mj
 from gne_mj.batches import Plan, Store, Sweep, execute, make_plan, parse_sweep, run_batch
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.execute import Progress
-from gne_mj.batches.starts import interior_profile, random_starts
 from gne_mj.batches.summary import join
 from gne_mj.cli import main
 from gne_mj.errors import InvalidInput, StorageError, UserCodeError
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.plants.fleet import compile_model, compose
+from gne_mj.starts import interior_profile, random_starts
 
 SHORT = {"simulation.duration": 1.0, "simulation.timestep": 0.01, "recording.period": 0.1}
 ODE = {**SHORT, "plant.engine": "ode"}

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.batches.starts import interior_profile, random_starts
 from gne_mj.batches.sweep import Sweep
 from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.scenario_tables import SystemTable
+from gne_mj.starts import interior_profile, random_starts
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import versions
 
