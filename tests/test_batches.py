@@ -3,9 +3,11 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
@@ -16,9 +18,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gne_mj
-from gne_mj.batches import Plan, Store, Sweep, execute, make_plan, parse_sweep, run_batch
+from gne_mj.batches import (
+    Plan,
+    Progress,
+    Store,
+    Sweep,
+    cluster,
+    execute,
+    make_plan,
+    parse_sweep,
+    run_batch,
+)
 from gne_mj.batches.chunk import Runner
-from gne_mj.batches.execute import Progress
 from gne_mj.batches.summary import join
 from gne_mj.cli import main
 from gne_mj.errors import InvalidInput, StorageError, UserCodeError
@@ -565,6 +576,65 @@ def test_files_that_cannot_grow_end_a_batch_cleanly(tmp_path):
     assert Progress.of(Store.open(tmp_path / "a")).done == 0
 
 
+# Clusters
+
+
+@contextmanager
+def dask_cluster(workers, folder):
+    """A scheduler and workers of Dask's own, each a process; their address and the workers."""
+    commands = "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"
+    started = []
+
+    def start(module, *arguments):
+        environment = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s"}
+        process = subprocess.Popen(
+            [sys.executable, "-m", module, *arguments], cwd=folder, env=environment,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    try:
+        start(commands[0], "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+        running = [
+            start(
+                commands[1], address, "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny",
+                "--no-dashboard", "--name", f"worker-{number}",
+            )
+            for number in range(workers)
+        ]  # fmt: skip
+        yield address, running
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+def test_a_cluster_runs_a_batch_and_survives_a_lost_worker(tmp_path):
+    whole, spread = tmp_path / "whole", tmp_path / "spread"
+    longer = ["--set", "simulation.duration=40"]
+    subprocess.run(command(whole, *longer), check=True, capture_output=True)
+    with dask_cluster(3, tmp_path) as (address, workers):
+        process = subprocess.Popen(
+            command(spread, *longer, "--cluster", address), stdout=subprocess.PIPE, text=True
+        )
+        while not (spread.exists() and Progress.of(Store.open(spread)).done > 6):
+            assert process.poll() is None
+            time.sleep(0.05)
+        workers[0].kill()
+        before = Progress.of(Store.open(spread)).done
+        printed, _ = process.communicate(timeout=300)
+    assert process.returncode == 0
+    assert before < 120, "the worker was killed too late to matter"
+    assert "runs.zarr" in printed
+    assert contents(spread) == contents(whole)
+
+
 # Commands
 
 
@@ -665,7 +735,8 @@ def test_a_run_of_a_batch_is_run_alone(tmp_path, capsys):
         ),
     ],
 )
-def test_mistakes_are_answered_in_one_sentence(arguments, words, tmp_path, capsys):
+def test_mistakes_are_answered_in_one_sentence(arguments, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", "1s")
     small(tmp_path, "batch")
     places = {"{batch}": str(tmp_path / "batch"), "{tmp}": str(tmp_path)}
     given = []

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gne_mj.batches.execute import Progress, execute
+from gne_mj.batches.cluster import connected
+from gne_mj.batches.execute import execute
 from gne_mj.batches.plan import Plan, make_plan
+from gne_mj.batches.progress import Progress
 from gne_mj.batches.store import Store
 from gne_mj.batches.sweep import Sweep, parse_sweep
 
@@ -17,6 +19,7 @@ __all__ = [
     "Progress",
     "Store",
     "Sweep",
+    "connected",
     "execute",
     "make_plan",
     "open_batch",
@@ -61,9 +64,10 @@ def run_batch(
     sweeps = [Sweep(key, tuple(_plain(v) for v in values)) for key, values in (sweep or {}).items()]
     plan = make_plan(source, changes, sweeps=sweeps, **options)
     folder = Path(out)
-    exists = resume and folder.exists()
-    store = Store.resume(folder, plan) if exists else Store.create(folder, plan)
-    execute(store, threads=threads, cluster=cluster, progress=progress)
+    goes_on = resume and folder.exists()
+    with connected(cluster) as client:
+        store = Store.resume(folder, plan) if goes_on else Store.create(folder, plan)
+        execute(store, threads=threads, cluster=client, progress=progress)
     return store.dataset()
 
 

@@ -113,7 +113,7 @@ class Store:
     def locked(self) -> Iterator[None]:
         """Keep other processes of this machine from writing; ends with the process at the latest.
 
-        What a killed process was just writing is removed: nothing refers to it.
+        What a killed process was just writing is removed, since nothing refers to it.
 
         Raises:
             InvalidInput: another one is writing.
@@ -125,9 +125,13 @@ class Store:
                 raise InvalidInput(
                     "--out", str(self.folder), "another process is running this batch right now"
                 ) from None
-            for leftover in (self.folder / RUNS).glob("*/*.partial"):
-                leftover.unlink(missing_ok=True)
+            self._tidy()
             yield
+            self._tidy()
+
+    def _tidy(self) -> None:
+        for leftover in (self.folder / RUNS).glob("*/*.partial"):
+            leftover.unlink(missing_ok=True)
 
     def statuses(self) -> NDArray[np.str_]:
         """(runs,) how each run ended; empty if it has not been run."""

@@ -78,32 +78,35 @@ def batch(
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
     that was stopped or killed goes on with --resume, and ends as if it had not been.
     """
-    from gne_mj.batches import Store, execute, make_plan, parse_sweep
+    from gne_mj.batches import Store, connected, execute, make_plan, parse_sweep
     from gne_mj.errors import InvalidInput
     from gne_mj.simulation import interruption
 
     if threads < 0:
         raise InvalidInput("--threads", threads, "it must not be negative")
-    if scenario is None:
-        if not resume:
-            raise InvalidInput("SCENARIO", None, "a scenario must be named")
-        store = Store.continued(out)
-    else:
-        plan = make_plan(
-            scenario,
-            settings(set_),
-            system=system,
-            sweeps=[parse_sweep(text) for text in sweep or []],
-            starts=runs,
-            seed=seed,
-            spread=spread,
-            record=_record(record),
-            chunk=chunk,
-        )
-        goes_on = resume and out.exists()
-        store = Store.resume(out, plan) if goes_on else Store.create(out, plan)
-    with interruption() as stop, _showing(store.plan.runs, as_json) as show:
-        now = execute(store, threads=threads, cluster=cluster, progress=show, stopped=stop.is_set)
+    with connected(cluster) as client, interruption() as stop:
+        if scenario is None:
+            if not resume:
+                raise InvalidInput("SCENARIO", None, "a scenario must be named")
+            store = Store.continued(out)
+        else:
+            plan = make_plan(
+                scenario,
+                settings(set_),
+                system=system,
+                sweeps=[parse_sweep(text) for text in sweep or []],
+                starts=runs,
+                seed=seed,
+                spread=spread,
+                record=_record(record),
+                chunk=chunk,
+            )
+            goes_on = resume and out.exists()
+            store = Store.resume(out, plan) if goes_on else Store.create(out, plan)
+        with _showing(store.plan.runs, as_json) as show:
+            now = execute(
+                store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
+            )
         done = now.done == now.total
         if now.done:
             _tell(store, now, as_json)

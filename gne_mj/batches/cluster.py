@@ -1,0 +1,94 @@
+"""Chunks of a batch on the workers of an existing Dask scheduler, each writing its own."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gne_mj.batches.chunk import Runner
+from gne_mj.batches.progress import count_left
+from gne_mj.batches.store import Store
+from gne_mj.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+RETRIES = 5  # of a chunk that failed; one whose worker was lost is run elsewhere besides
+PATIENCE = "10s"  # for a scheduler to answer
+
+
+@contextmanager
+def connected(address: str | None) -> Iterator["Client | None"]:
+    """A client of the scheduler at an address; none without one.
+
+    Raises:
+        InvalidInput: Dask is not installed, or no scheduler answers.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InvalidInput(
+            "--cluster", address, "it needs Dask: pip install 'gne-mj[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise InvalidInput("--cluster", address, f"no scheduler answers there: {reason}") from None
+    with client:
+        yield client
+
+
+def on_cluster(
+    store: Store, client: "Client", stopped: Callable[[], bool]
+) -> Iterator[tuple[int, int]]:
+    """Run what is missing; the runs of each chunk, and how many left, as workers finish them."""
+    from distributed import wait
+
+    manifest = store.plan.manifest()
+    futures = [
+        client.submit(
+            run_chunk, str(store.folder.resolve()), manifest, chunk, pure=False, retries=RETRIES,
+            key=f"gne-mj-{store.folder.name}-{chunk}-{os.getpid()}",
+        )
+        for chunk in store.missing()
+    ]  # fmt: skip
+    waiting = set(futures)
+    with client.as_current():
+        while waiting and not stopped():
+            try:
+                finished, waiting = wait(waiting, timeout=0.5, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                continue
+            for future in finished:
+                yield future.result()
+        client.cancel(list(waiting))
+
+
+def run_chunk(folder: str, manifest: dict[str, Any], chunk: int) -> tuple[int, int]:
+    """On a worker: run and store one chunk; its runs, and how many of them left.
+
+    Raises:
+        InvalidInput: the worker does not see the folder, or has other versions or files.
+    """
+    store = Store.open(Path(folder))
+    if store.plan.manifest() != manifest:
+        raise InvalidInput(
+            "--cluster", folder, "a worker's versions or files differ from those here"
+        )
+    variables = _runner(folder).run(chunk)
+    assert variables is not None
+    store.write(chunk, variables)
+    statuses = variables["status"][1]
+    return len(statuses), count_left(statuses)
+
+
+@lru_cache(maxsize=1)
+def _runner(folder: str) -> Runner:
+    # one thread: it is the scheduler that says how much a worker does at once
+    return Runner(Store.open(Path(folder)).plan, 1)
