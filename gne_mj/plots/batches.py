@@ -131,9 +131,11 @@ def _over(
         style = line_style(number)
         axes.plot(xs, table[:, 1], label=label or None, **style)
         axes.fill_between(
-            xs, table[:, 0], table[:, 2], color=style["color"], alpha=0.15, linewidth=0
+            xs, table[:, 0], table[:, 2], color=style["color"], alpha=0.12, linewidth=0
         )
         axes.plot(xs, table[:, 3], ".", color=style["color"], markersize=3)
+    if panel.worst == "min" and finite.min() < 0.0:  # beyond the bound
+        axes.axhline(0.0, color=_RED, linewidth=0.9, linestyle=(0, (4, 3)))
     if _is_log(swept):
         axes.set_xscale("log")
     if panel.log and _is_log(finite):
