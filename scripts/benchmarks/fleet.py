@@ -1,10 +1,10 @@
 """The closed loop in MuJoCo against bare mj_step, and against a loop as one would write it."""
 
-import statistics
 import time
 
 import mujoco
 import numpy as np
+from turns import in_turns, row
 
 from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.games import velocity_game
@@ -68,38 +68,23 @@ def _closed_loop(
         "bare, plain model": lambda: _bare(plain, state, steps),
     }
     if law.information == "full":
-        script = _Script(same, y)
+        script = Script(same, y)
         kinds["Python loop"] = lambda: script.run(steps // 20) * 20
-    times: dict[str, list[float]] = {name: [] for name in kinds}
-    for measure in kinds.values():
-        measure()  # warm
-    for _ in range(runs):
-        for name, measure in kinds.items():
-            times[name].append(1e6 * measure() / steps)
-    what = f"{count} robots, {integrator}, {law.information} information, {mode}: us per step"
-    ours = statistics.median(times["ours"])
-    pairs = {
-        "bare": (target, "ours / bare mj_step of the same robots"),
-        "bare, plain model": ("", "ours / bare mj_step without decoration"),
-        "Python loop": (">= 4" if integrator == "euler" else "", "Python loop / ours"),
+    per_step = {
+        name: (lambda measure=measure: 1e6 * measure() / steps) for name, measure in kinds.items()
     }
-    result = []
-    for name, (goal, meaning) in pairs.items():
-        if name not in times:
-            continue
-        other = statistics.median(times[name])
-        ratios = [a / b for a, b in zip(times["ours"], times[name], strict=True)]
-        ratio = statistics.median(ratios)
-        result.append(
-            {
-                "what": f"{what}; {meaning}",
-                "ours": f"{ours:.2f}",
-                "other": f"{other:.2f}",
-                "ratio": f"{1 / ratio if name == 'Python loop' else ratio:.3f}",
-                "target": goal,
-            }
-        )
-    return result
+    times = in_turns(per_step, runs)
+    what = f"{count} robots, {integrator}, {law.information} information, {mode}: us per step"
+    pairs = {
+        "bare": (target, "ours / bare mj_step of the same robots", False),
+        "bare, plain model": ("", "ours / bare mj_step without decoration", False),
+        "Python loop": (">= 4" if integrator == "euler" else "", "Python loop / ours", True),
+    }
+    return [
+        row(f"{what}; {meaning}", times, "ours", name, goal, upside_down=upside_down)
+        for name, (goal, meaning, upside_down) in pairs.items()
+        if name in times
+    ]
 
 
 def _ours(system: System, clock: Clock, steps: int) -> float:
@@ -124,7 +109,7 @@ def _bare(model: mujoco.MjModel, state: np.ndarray, steps: int) -> float:
     return time.perf_counter() - started
 
 
-class _Script:
+class Script:
     """The loop as researchers write it: a NumPy law, the spring's atan term by Python."""
 
     def __init__(self, model: mujoco.MjModel, y: np.ndarray) -> None:
@@ -132,11 +117,13 @@ class _Script:
         self.delta, self.rho, self.v0 = 3.0, 0.1, 3.0
 
     def spring(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """The springs' atan terms, as MuJoCo's passive callback."""
         pull = np.arctan(data.qpos[0::2] - data.qpos[1::2])
         data.qfrc_passive[0::2] -= pull
         data.qfrc_passive[1::2] += pull
 
     def law(self, data: mujoco.MjData) -> np.ndarray:
+        """The full-information law."""
         gap = np.diff(data.qvel[0::2], prepend=self.v0)
         slope = 2.0 * gap * self.rho / (self.delta**2 - gap**2)
         u = -2.0 * gap - slope
@@ -144,6 +131,7 @@ class _Script:
         return u
 
     def run(self, steps: int) -> float:
+        """Seconds for so many steps."""
         data = mujoco.MjData(self.model)
         data.qvel[0::2] = data.qvel[1::2] = self.y
         mujoco.set_mjcb_passive(self.spring)
