@@ -2,7 +2,7 @@
 
 Import it before anything that makes JAX choose its devices, as importing cbfpy and MJX does. JAX
 gets as many CPU devices as there are cores, since XLA spreads a batch of so small steps over cores
-only when it is told to (a batch is then split by :func:`over_cores`); double precision; and one
+only when it is told to (:func:`over_cores`); double precision; and one
 thread per operation, as cbfpy recommends and as none of these operations is large enough for more.
 """
 
@@ -81,11 +81,15 @@ def ours(one: System, clock: Clock, states: np.ndarray) -> tuple[float, np.ndarr
     return spent, np.stack(last)
 
 
-def over_cores(batch: np.ndarray) -> jax.Array:
-    """A batch on JAX's devices, one share of its rows on each."""
+def over_cores(one: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function of one run for a batch of them, each device taking its share of the rows.
+
+    How many rows there are must be a multiple of the devices.
+    """
     mesh = jax.make_mesh((len(jax.devices()),), ("runs",), (jax.sharding.AxisType.Auto,))
-    share = jax.sharding.NamedSharding(mesh, jax.sharding.PartitionSpec("runs"))
-    return jax.device_put(batch, share)
+    rows = jax.sharding.PartitionSpec("runs")
+    batch = jax.shard_map(jax.vmap(one), mesh=mesh, in_specs=rows, out_specs=rows, check_vma=False)
+    return jax.jit(batch)
 
 
 def seconds(call: Callable[[], Any]) -> float:
