@@ -55,11 +55,14 @@ def system(engine: str, integrator: str, mode: str) -> System:
     )  # fmt: skip
 
 
-def starts(runs: int, widest: float = 0.9) -> np.ndarray:
-    """(runs, 5, 4) states: gaps up to ``widest`` of their bounds, springs stretched up to 1 m."""
+def starts(runs: int, widest: float = 0.9, stretch: float = 1.0) -> np.ndarray:
+    """(runs, 5, 4) states: gaps up to ``widest`` of their bounds, springs stretched or pressed.
+
+    By up to ``stretch`` in m, at rates up to so many m/s.
+    """
     rng = np.random.default_rng(0)
     velocity = V0 + np.cumsum(rng.uniform(-widest * DELTA, widest * DELTA, (runs, N)), axis=1)
-    extension, slip = rng.uniform(-1.0, 1.0, (2, runs, N))
+    extension, slip = stretch * rng.uniform(-1.0, 1.0, (2, runs, N))
     return np.stack([extension, velocity, velocity + slip, np.zeros((runs, N))], axis=2)
 
 
