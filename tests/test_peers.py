@@ -1,9 +1,12 @@
-"""Our variational equilibria beside NashOpt's, which solves the same conditions by other methods.
+"""Our results beside those of other packages, which come by other methods to the same ones.
 
-Needs the extra `peers`; NashOpt's compiler takes its time.
+Variational equilibria beside NashOpt's, closed loops beside MJX's and diffrax's, and cbfpy's filter
+as scripts/benchmark runs it. Needs the extra `peers`, whose compilers take their time.
 """
 
+import importlib
 import warnings
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -89,3 +92,64 @@ def test_desired_velocities_with_affine_bounds(peer, method, count):
     assert np.allclose(
         2.0 * gap * ours.multipliers, multipliers[:count] - multipliers[count:], atol=1e-7
     )
+
+
+@pytest.fixture(scope="module")
+def script():
+    """A module of scripts/benchmarks, by name and by the packages that it needs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(Path(__file__).parents[1] / "scripts" / "benchmarks")
+
+        def load(name, *packages):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                for package in packages:
+                    pytest.importorskip(package)
+                return importlib.import_module(name)
+
+        yield load
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_closed_loops_in_mjx(script, integrator):
+    mjx = script("peer_mjx", "mujoco.mjx")
+    states = mjx.common.starts(6)
+    _, theirs = mjx.Batch(integrator, 100).run(states)()
+    _, mine = mjx.ours(integrator, 100, states)
+    assert np.max(np.abs(mine - states[:, :, 1])) > 0.1
+    assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
+
+
+def test_robots_in_diffrax(script):
+    peer = script("peer_diffrax", "diffrax")
+    states = peer.common.starts(4)
+    _, theirs = peer.batch(peer.fixed(peer.Rk4())(peer.STEPS), states)()
+    _, mine = peer.our_robots(peer.STEPS, states)
+    assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
+    _, theirs = peer.batch(peer.adaptive(peer.diffrax.Dopri8())(1e-10), states)()
+    _, mine = peer.our_robots(20 * peer.STEPS, states)
+    assert np.allclose(mine, theirs, rtol=0, atol=1e-8)
+
+
+def test_stiff_twin_in_diffrax(script):
+    peer = script("peer_diffrax", "diffrax")
+    case = peer.twin.Twin(peer.pi_cascade, 0.1, 1e-2)
+    _, theirs = peer.stiff(case, peer.diffrax.Kvaerno3())(1e-7)
+    _, mine = case.ours(1e-7)
+    assert np.allclose(mine, theirs, rtol=0, atol=1e-6)
+
+
+def test_filter_of_cbfpy(script):
+    peer = script("peer_cbfpy", "cbfpy", "elastiqp")
+    states = peer.common.starts(20, 0.99)
+    for solver in peer.SOLVERS:
+        control = peer.jax.jit(peer.law(solver))
+        for state in states[:, :, :3]:
+            gap, u = (
+                np.diff(state[:, 1], prepend=peer.common.V0),
+                np.asarray(control(state.ravel())),
+            )
+            pull = state[:, 0] + np.arctan(state[:, 0]) + state[:, 1] - state[:, 2]
+            rate = -2.0 * gap * np.diff(u - pull, prepend=0.0)
+            assert np.all(rate >= -(peer.common.DELTA**2 - gap**2) - 1e-2)  # h' >= -h, and relaxed
+    assert np.all(peer.filtered(states[:3], 0.001, 0.1) > 0)

@@ -6,6 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 import fleet
+import peer_cbfpy
+import peer_diffrax
+import peer_mjx
 import solver
 import twin
 
@@ -17,7 +20,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
     options = parser.parse_args()
     rows: list[dict[str, str]] = []
-    for group in (fleet, solver, twin):
+    for group in (fleet, solver, twin, peer_mjx, peer_diffrax, peer_cbfpy):
         rows.extend(group.rows(options.runs))
         if options.out:  # after each group, so that an interruption keeps what was measured
             options.out.write_text(table(rows, options.runs), encoding="utf-8")
@@ -27,14 +30,17 @@ def main() -> None:
 
 def table(rows: list[dict[str, str]], runs: int) -> str:
     """The rows in Markdown, with the machine and the versions named."""
-    packages = ("gne-mj", "mujoco", "numba", "numpy", "scipy", "nashopt")
+    packages = (
+        "gne-mj", "mujoco", "numba", "numpy", "scipy", "nashopt", "jax", "mujoco-mjx", "diffrax",
+        "cbfpy", "elastiqp", "qpax",
+    )  # fmt: skip
     versions = ", ".join(f"{name} {version(name)}" for name in packages)
     lines = [
         "# Benchmarks",
         "",
-        f"Medians of {runs} turns in one process, compiled and warm, one thread. Machine:"
-        f" {_processor()}; Python {platform.python_version()}, {versions}. Repeat with"
-        " `scripts/benchmark`.",
+        f"Medians of {runs} turns in one process, compiled and warm, one thread where no"
+        f" cores are named. Machine: {_processor()}; Python {platform.python_version()},"
+        f" {versions}. Repeat with `scripts/benchmark`.",
         "",
         "| what | ours | other | ratio | target |",
         "|---|---|---|---|---|",

@@ -1,0 +1,124 @@
+"""What the comparisons with peers written in JAX share: JAX's settings, five robots, turns.
+
+Import it before anything that makes JAX choose its devices, as importing cbfpy and MJX does. JAX
+gets as many CPU devices as there are cores, since XLA spreads a batch of so small steps over cores
+only when it is told to (:func:`over_cores`); double precision; and one
+thread per operation, as cbfpy recommends and as none of these operations is large enough for more.
+"""
+
+import os
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import jax
+import numpy as np
+
+from gne_mj.controllers import FullInformation
+from gne_mj.games import velocity_game
+from gne_mj.loops import monitor as watch
+from gne_mj.plants import flexible_robot
+from gne_mj.plants.agents import Agents
+from gne_mj.system import Clock, System
+
+N, V0, DELTA, RHO = 5, 3.0, 3.0, 0.1
+CORES = len(os.sched_getaffinity(0))
+
+
+def _set_up() -> None:
+    flag = "--xla_cpu_multi_thread_eigen=false"
+    flags = os.environ.get("XLA_FLAGS", "")
+    if "xla_cpu_multi_thread_eigen" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} {flag}".strip()
+    os.environ.setdefault("JAX_ENABLE_X64", "1")  # cbfpy looks there
+    jax.config.update("jax_enable_x64", True)
+    try:
+        jax.config.update("jax_num_cpu_devices", CORES)
+    except RuntimeError:  # the devices are there already: one, in a test process
+        return
+
+
+_set_up()
+
+
+def system(engine: str, integrator: str, mode: str) -> System:
+    """The paper's five robots (all their numbers 1) under full information."""
+    agents = Agents(
+        flexible_robot, np.ones((N, len(flexible_robot.PARAMETERS))), np.full(N, np.inf)
+    )
+    return System(
+        "robots", velocity_game(N, V0, DELTA), agents, FullInformation(), RHO,
+        agents.equilibrium(V0 - np.linspace(0.0, 2.0, N)),
+        engine=engine, integrator=integrator, mode=mode,
+    )  # fmt: skip
+
+
+def starts(runs: int, widest: float = 0.9, stretch: float = 1.0) -> np.ndarray:
+    """(runs, 5, 4) states: gaps up to ``widest`` of their bounds, springs stretched or pressed.
+
+    By up to ``stretch`` in m, at rates up to so many m/s.
+    """
+    rng = np.random.default_rng(0)
+    velocity = V0 + np.cumsum(rng.uniform(-widest * DELTA, widest * DELTA, (runs, N)), axis=1)
+    extension, slip = stretch * rng.uniform(-1.0, 1.0, (2, runs, N))
+    return np.stack([extension, velocity, velocity + slip, np.zeros((runs, N))], axis=2)
+
+
+def ours(one: System, clock: Clock, states: np.ndarray) -> tuple[float, np.ndarray]:
+    """Seconds in which our native loop moves all runs to the clock's end, and their last states.
+
+    One run after the other, in one thread; making the loops is not counted.
+    """
+    spent, last, plant = 0.0, [], None
+    for state in states:
+        loop: Any = replace(one, state=state).closed_loop(clock, plant)
+        plant = getattr(loop, "plant", None)
+        began = time.perf_counter()
+        loop.advance(1, clock.steps(clock.duration))
+        spent += time.perf_counter() - began
+        last.append(loop.finish().state[0])
+        if loop.monitor[watch.EXIT] != watch.INSIDE:
+            raise ArithmeticError("a run left the set, where the law has no value to compare")
+    return spent, np.stack(last)
+
+
+def over_cores(one: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function of one run for a batch of them, each device taking its share of the rows.
+
+    How many rows there are must be a multiple of the devices.
+    """
+    mesh = jax.make_mesh((len(jax.devices()),), ("runs",), (jax.sharding.AxisType.Auto,))
+    rows = jax.sharding.PartitionSpec("runs")
+    batch = jax.shard_map(jax.vmap(one), mesh=mesh, in_specs=rows, out_specs=rows, check_vma=False)
+    return jax.jit(batch)
+
+
+def seconds(call: Callable[[], Any]) -> float:
+    """Of one call, until its result is there."""
+    began = time.perf_counter()
+    jax.block_until_ready(call())
+    return time.perf_counter() - began
+
+
+def in_turns(calls: dict[str, Callable[[], float]], runs: int) -> dict[str, float]:
+    """Median of what each call says it took, after a warm one; in turns, on the same machine."""
+    for call in calls.values():
+        call()
+    spent: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(runs):
+        for name, call in calls.items():
+            spent[name].append(call())
+    return {name: statistics.median(values) for name, values in spent.items()}
+
+
+def row(what: str, ours: float, other: float, target: str = "") -> dict[str, str]:
+    """One line; the ratio is other / ours."""
+    return {
+        "what": what,
+        "ours": f"{ours:.3g}",
+        "other": f"{other:.3g}",
+        "ratio": f"{other / ours:.3g}",
+        "target": target,
+    }

@@ -1,0 +1,249 @@
+#!/usr/bin/env python
+"""The ODE twins beside diffrax, compiled and warm, in double precision.
+
+Robots: 256 runs of 5 s under full information, mode continuous, from starts with gaps up to 0.9 of
+their bounds and stretched springs. diffrax is given the classic Runge-Kutta method as a tableau
+(it has none of its own), with our step: the same numbers come out. A second row lets it choose:
+each of its methods takes the loosest step or tolerance of a grid whose greatest error in any state
+of any run at the end is at most 1e-6, ours the longest step of such a grid, and diffrax's fastest
+counts. Its batch is vmapped and shared among all cores; ours moves run after run in one thread.
+
+OSNR: the stiff twin of :mod:`twin` under the fully distributed law, one run of 30 s with 601
+samples, error at most 1e-6 in all of them; diffrax has no Rosenbrock method, so that its
+Kvaerno ones compete, and the explicit Tsit5. Equal tolerances, absolute and relative, and a PI
+controller of steps served it best, as did interpolating the samples over making steps end there.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import peer_common as common
+import twin
+
+from gne_mj.plants import pi_cascade
+from gne_mj.system import Clock
+
+RUNS, END, STEPS = 256, 5.0, 200
+ACCURACY = 1e-6
+SAME = 1e-11  # how far two classic Runge-Kutta methods may be apart
+MORE_STEPS = tuple(round(50 * 2 ** (k / 4)) for k in range(20))
+TOLERANCES = 10.0 ** -np.arange(5.0, 9.1, 0.25)
+FREELY: dict[str, Any] = {"throw": False, "adjoint": diffrax.ForwardMode()}
+
+
+class Rk4(diffrax.AbstractERK):
+    """The classic Runge-Kutta method of order four."""
+
+    tableau: ClassVar[diffrax.ButcherTableau] = diffrax.ButcherTableau(
+        a_lower=(np.array([0.5]), np.array([0.0, 0.5]), np.array([0.0, 0.0, 1.0])),
+        b_sol=np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
+        b_error=np.zeros(4),
+        c=np.array([0.5, 0.5, 1.0]),
+    )
+    interpolation_cls: ClassVar[Callable[..., Any]] = (
+        diffrax.ThirdOrderHermitePolynomialInterpolation.from_k
+    )
+
+    def order(self, terms: Any) -> int:
+        """Of the method."""
+        return 4
+
+
+def robots(_time: Any, state: Any, _: Any) -> Any:
+    """Rates of extensions, velocities and appendage velocities, each (N,)."""
+    extension, velocity, appendage = state
+    pull = extension + jnp.arctan(extension) + velocity - appendage
+    gap = jnp.diff(velocity, prepend=common.V0)
+    slope = 2.0 * common.RHO * gap / (common.DELTA**2 - gap**2)
+    u = -2.0 * gap - slope + jnp.append(slope[1:], 0.0)
+    return velocity - appendage, u - pull, pull
+
+
+def fixed(solver: Any) -> Callable[[float], Any]:
+    """From a number of steps to the function of one run that returns its last state."""
+
+    def solve(steps: float) -> Callable[..., Any]:
+        return _to_the_end(solver, diffrax.ConstantStepSize(), END / steps)
+
+    return solve
+
+
+def adaptive(solver: Any) -> Callable[[float], Any]:
+    """The same from a tolerance."""
+
+    def solve(tolerance: float) -> Callable[..., Any]:
+        controller = diffrax.PIDController(rtol=tolerance, atol=tolerance, pcoeff=0.3, icoeff=0.4)
+        return _to_the_end(solver, controller, None)
+
+    return solve
+
+
+def _to_the_end(solver: Any, controller: Any, step: float | None) -> Callable[..., Any]:
+    def one(*state: jax.Array) -> tuple[jax.Array, ...]:
+        found = diffrax.diffeqsolve(
+            diffrax.ODETerm(robots), solver, 0.0, END, step, state,
+            saveat=diffrax.SaveAt(t1=True), stepsize_controller=controller, max_steps=None,
+            **FREELY,
+        )  # fmt: skip
+        return tuple(part[0] for part in found.ys)
+
+    return one
+
+
+METHODS = {
+    "Tsit5, constant steps": (fixed(diffrax.Tsit5()), MORE_STEPS),
+    "Tsit5, adaptive": (adaptive(diffrax.Tsit5()), TOLERANCES),
+    "Dopri8, adaptive": (adaptive(diffrax.Dopri8()), TOLERANCES),
+}
+
+
+def batch(one: Callable[..., Any], states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
+    """What moves all runs once: seconds and the last states (runs, N, 3)."""
+    compiled = common.over_cores(one)
+    start = [jnp.asarray(states[:, :, s]) for s in range(3)]
+
+    def call() -> tuple[float, np.ndarray]:
+        began = time.perf_counter()
+        last = jax.block_until_ready(compiled(*start))
+        return time.perf_counter() - began, np.stack(last, axis=2)
+
+    return call
+
+
+def our_robots(steps: int, states: np.ndarray) -> tuple[float, np.ndarray]:
+    """The same of our loop."""
+    one = common.system("ode", "rk4", "continuous")
+    spent, last = common.ours(one, Clock(END, END / steps, END / steps, END), states)
+    return spent, last[:, :, :3]
+
+
+def _loosest(
+    tries: Callable[[Any], Callable[[], tuple[float, np.ndarray]]], grid: Any, reference: np.ndarray
+) -> Any:
+    """The first entry of a grid that is accurate enough."""
+    for entry in grid:
+        if np.max(np.abs(tries(entry)()[1] - reference)) <= ACCURACY:
+            return entry
+    raise ArithmeticError(f"no step or tolerance of the grid reaches {ACCURACY:g}")
+
+
+def _robots(turns: int) -> list[dict[str, str]]:
+    states = common.starts(RUNS)
+    same = batch(fixed(Rk4())(STEPS), states)
+    apart = float(np.max(np.abs(same()[1] - our_robots(STEPS, states)[1])))
+    if not apart <= SAME:
+        raise ArithmeticError(f"diffrax's classic Runge-Kutta method differs by {apart:.1e}")
+    reference = our_robots(50 * STEPS, states)[1]
+    steps = _loosest(lambda n: lambda: our_robots(n, states), MORE_STEPS, reference)
+    calls = {"ours": lambda: our_robots(STEPS, states)[0], "same": lambda: same()[0]}
+    calls["ours, accurate"] = lambda: our_robots(steps, states)[0]
+    for name, (method, grid) in METHODS.items():
+        entry = _loosest(lambda one, method=method: batch(method(one), states), grid, reference)
+        run = batch(method(entry), states)
+        calls[name] = lambda run=run: run()[0]
+    spent = {name: 1e3 * value for name, value in common.in_turns(calls, turns).items()}
+    best = min(METHODS, key=lambda name: spent[name])
+    what = f"robots' ODE twin, {RUNS} runs of {END:g} s, continuous"
+    where = f"on {len(jax.devices())} cores / ours, runs one after the other"
+    return [
+        common.row(
+            f"{what}, {STEPS} steps of RK4 (equal within {apart:.0e}): ms; diffrax {where}",
+            spent["ours"], spent["same"],
+        ),
+        common.row(
+            f"{what}, error {ACCURACY:g}: ms; diffrax {best}, {where}",
+            spent["ours, accurate"], spent[best],
+        ),
+    ]  # fmt: skip
+
+
+def osnr(case: twin.Twin) -> Callable[..., jax.Array]:
+    """The rate of the OSNR twin, on SciPy's state of :class:`twin.Twin`."""
+    n, size = twin.N, twin.N * case.states
+    q, laplacian = case.game.parameters, jnp.asarray(case.graph.laplacian)
+    price, weight, gain, noise = (q[2 + n * k : 2 + n * (k + 1)] for k in range(4))
+    crosstalk, limit = q[2 + 4 * n :].reshape(n, n) + np.diag(gain), q[1]
+    others = ~np.eye(n, dtype=bool)
+    held = np.diag(np.arange(n) * case.states)  # where agent i keeps its estimate of j, or itself
+    held[others] = size + np.arange(n * (n - 1))
+    cascade = case.kind is pi_cascade
+
+    def rate(_time: Any, v: jax.Array, _: Any) -> jax.Array:
+        x, z, estimate = v[:size].reshape(n, case.states), v[size + n * (n - 1) :], v[held]
+        y = x[:, 0]
+        room = limit - (jnp.sum(estimate, axis=1) - y + z)
+        slope = price - weight * gain / (noise + jnp.sum(crosstalk * estimate, axis=1))
+        u = -case.gain * (slope + twin.RHO / room - twin.RHO / z)
+        agents = jnp.stack([u - y + 0.5 * x[:, 1], u], axis=1).ravel() if cascade else u
+        flow = (laplacian @ estimate)[others]
+        return jnp.concatenate([agents, -flow / case.epsilon, (y - z) / case.epsilon])
+
+    return rate
+
+
+STIFF = {
+    "Kvaerno3": diffrax.Kvaerno3(),
+    "Kvaerno5": diffrax.Kvaerno5(),
+    "Tsit5": diffrax.Tsit5(),
+}
+
+
+def stiff(case: twin.Twin, solver: Any) -> Callable[[float], tuple[float, np.ndarray]]:
+    """From a tolerance to seconds and all samples, (601, states)."""
+    rate, start, times = osnr(case), jnp.asarray(case.first), jnp.asarray(twin.TIMES)
+
+    @jax.jit
+    def solve(tolerance: jax.Array) -> Any:
+        return diffrax.diffeqsolve(
+            diffrax.ODETerm(rate), solver, 0.0, twin.END, None, start,
+            saveat=diffrax.SaveAt(ts=times), max_steps=20_000,
+            stepsize_controller=diffrax.PIDController(
+                rtol=tolerance, atol=tolerance, pcoeff=0.3, icoeff=0.4
+            ),
+            **FREELY,
+        ).ys  # fmt: skip
+
+    def call(tolerance: float) -> tuple[float, np.ndarray]:
+        began = time.perf_counter()
+        samples = solve(tolerance).block_until_ready()
+        return time.perf_counter() - began, np.asarray(samples)
+
+    return call
+
+
+def _osnr(gain: float, epsilon: float, turns: int) -> dict[str, str]:
+    case = twin.Twin(pi_cascade, gain, epsilon)
+    reference = case.scipy("DOP853", 1e-12, 1e-13, case.rate)[1]
+    calls = {"ours": case.ours} | {name: stiff(case, solver) for name, solver in STIFF.items()}
+    found = {name: twin.loosest(call, reference) for name, call in calls.items()}
+    accurate = {name: entry for name, entry in found.items() if entry is not None}
+    if len(accurate) < 2 or "ours" not in accurate:
+        raise ArithmeticError(f"no tolerance of the grid reaches {twin.ACCURACY:g}")
+    best = min(accurate.keys() - {"ours"}, key=lambda name: accurate[name][0])
+    spent = common.in_turns(
+        {
+            name: lambda call=calls[name], rtol=accurate[name][1]: call(rtol)[0]
+            for name in ("ours", best)
+        },
+        turns,
+    )
+    return common.row(
+        f"OSNR twin, {pi_cascade.NAME}, k = {gain:g}, epsilon = {epsilon:g}, T = 30 s, error 1e-6:"
+        f" ms; diffrax {best} / ours",
+        1e3 * spent["ours"], 1e3 * spent[best],
+    )  # fmt: skip
+
+
+def rows(runs: int = 20) -> list[dict[str, str]]:
+    """Medians over ``runs`` turns, in ms for all runs together."""
+    return _robots(runs) + [_osnr(gain, epsilon, runs) for gain, epsilon in twin.CASES]
+
+
+if __name__ == "__main__":
+    for line in rows():
+        print(*line.values(), sep="  ")
