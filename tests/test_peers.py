@@ -115,7 +115,7 @@ def test_closed_loops_in_mjx(script, integrator):
     mjx = script("peer_mjx", "mujoco.mjx")
     states = mjx.common.starts(6)
     _, theirs = mjx.Batch(integrator, 100).run(states)()
-    _, mine = mjx.ours(integrator, 100, states)
+    _, mine = mjx.ours(integrator, 100, states)()
     assert np.max(np.abs(mine - states[:, :, 1])) > 0.1
     assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
 
@@ -124,10 +124,10 @@ def test_robots_in_diffrax(script):
     peer = script("peer_diffrax", "diffrax")
     states = peer.common.starts(4)
     _, theirs = peer.batch(peer.fixed(peer.Rk4())(peer.STEPS), states)()
-    _, mine = peer.our_robots(peer.STEPS, states)
+    _, mine = peer.our_robots(peer.STEPS, states)()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
     _, theirs = peer.batch(peer.adaptive(peer.diffrax.Dopri8())(1e-10), states)()
-    _, mine = peer.our_robots(20 * peer.STEPS, states)
+    _, mine = peer.our_robots(20 * peer.STEPS, states)()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-8)
 
 

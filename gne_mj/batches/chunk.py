@@ -4,41 +4,25 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.plan import Combination, Plan
+from gne_mj.batches.structure import Structure, key_of
 from gne_mj.batches.summary import Variables, columns_of, join, refused_columns
 from gne_mj.loops.base import ClosedLoop
-from gne_mj.loops.batch import BatchLoop, Case, EachLoop, Span
+from gne_mj.loops.batch import Case, Span
 from gne_mj.loops.faults import SEED
 from gne_mj.loops.layout import Setup
-from gne_mj.loops.ode import ode_table
-from gne_mj.loops.ode_batch import OdeBatch
 from gne_mj.plain import raise_pending
-from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.scenario_tables.table import per_action
 from gne_mj.system import System
-from gne_mj.table import Table
-
-if TYPE_CHECKING:
-    from gne_mj.plants.mjcf_fleet import MjcfPlant
-    from gne_mj.plants.mujoco import MujocoPlant
 
 _STRUCTURES, _COMBINATIONS = 16, 1024  # that are kept; a structure has a model, rows and threads
 
 # MuJoCo's callbacks are global to the process, and workers of a cluster may have several threads
 _ONE_AT_A_TIME = threading.Lock()
-
-
-@dataclass(frozen=True)
-class _Structure:
-    """What runs with the same kernels, shapes and step share."""
-
-    loop: BatchLoop
-    plant: "MujocoPlant | MjcfPlant | None"
 
 
 @dataclass(frozen=True)
@@ -61,7 +45,7 @@ class Runner:
     def __init__(self, plan: Plan, threads: int) -> None:
         self.plan, self.threads = plan, threads
         self._prepared: OrderedDict[int, _Prepared] = OrderedDict()
-        self._structures: OrderedDict[Hashable, _Structure] = OrderedDict()
+        self._structures: OrderedDict[Hashable, Structure] = OrderedDict()
 
     def run(self, chunk: int, stopped: Callable[[], bool] = lambda: False) -> Variables | None:
         """The variables of a chunk's runs, or None if ``stopped`` said so meanwhile.
@@ -107,63 +91,38 @@ class Runner:
         if number not in self._prepared:
             combination = self.plan.combination(number)
             prepared = _Prepared(combination)
-            if combination.system is not None:
-                setup = combination.system.setup(combination.clock)
-                prepared = _Prepared(combination, _key(combination, setup), setup)
+            system = combination.system
+            if system is not None:
+                setup = system.setup(combination.clock)
+                prepared = _Prepared(combination, key_of(system, combination.clock, setup), setup)
             self._prepared[number] = prepared
             while len(self._prepared) > _COMBINATIONS:
                 self._prepared.popitem(last=False)
         return self._prepared[number]
 
-    def _structure(self, prepared: _Prepared) -> _Structure:
-        key = prepared.key
+    def _structure(self, prepared: _Prepared) -> Structure:
+        key, combination = prepared.key, prepared.combination
         if key not in self._structures:
-            self._structures[key] = self._make_structure(prepared.combination)
+            assert combination.system is not None
+            self._structures[key] = Structure(
+                combination.system, combination.clock, self.threads, self.plan.chunk
+            )
             while len(self._structures) > _STRUCTURES:
                 self._structures.popitem(last=False)
         self._structures.move_to_end(key)
         return self._structures[key]
-
-    def _make_structure(self, combination: Combination) -> _Structure:
-        system = combination.system
-        assert system is not None
-        if system.integrator == "rosenbrock":
-            return _Structure(EachLoop(self.threads), None)
-        kernels = (system.law.kernels, system.game.kernels, system.acting, system.fault_kernels)
-        faulty = bool(system.faults)
-        if system.engine == "ode":
-            return _Structure(OdeBatch(system.agents, *kernels, faulty, self.threads), None)
-        # Late: MuJoCo is slow to import, and the twins do not need it.
-        from gne_mj.loops.mujoco_batch import MujocoBatch
-
-        plant = system.mujoco_plant(combination.clock)
-        # Mode implicit looks ahead in a second mjData, of which a plant has one.
-        alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
-        threads = 1 if alone else self.threads
-        return _Structure(MujocoBatch(plant, *kernels, faulty, threads, self.plan.chunk), plant)
-
-    def _table(self, prepared: _Prepared, setup: Setup) -> Table | None:
-        system, plant = prepared.combination.system, self._structure(prepared).plant
-        assert system is not None
-        if system.integrator == "rosenbrock":
-            return None
-        memory = len(system.loop_memory)
-        if plant is None:
-            return ode_table(setup, system.agents, memory)
-        from gne_mj.loops.mujoco import mujoco_table
-
-        return mujoco_table(plant, setup, system.agents, memory)
 
     def _cases(self, prepared: _Prepared, starts: list[int]) -> Iterator[Case]:
         plan, combination, setup = self.plan, prepared.combination, prepared.setup
         system = combination.system
         assert system is not None
         assert setup is not None
-        table = self._table(prepared, setup)
+        structure = self._structure(prepared)
+        table = structure.table(system, setup)
         for start, y in zip(starts, plan.profiles(combination, starts), strict=True):
             seed = int(plan.seeds[start]) if plan.starts else system.seed
             if system.faults and seed != system.seed:  # what is random in them
-                table = self._table(prepared, _seeded(setup, seed))
+                table = structure.table(system, _seeded(setup, seed))
             state, memory = _start(combination, y)
             yield Case(
                 state=state,
@@ -189,20 +148,6 @@ class _Alone:
 
 def _unused() -> ClosedLoop:
     raise NotImplementedError("native batches make no loops")
-
-
-def _key(combination: Combination, setup: Setup) -> Hashable:
-    """The same for combinations whose runs one native batch can hold."""
-    system, clock = combination.system, combination.clock
-    assert system is not None
-    agents, game = system.agents, system.game
-    return (
-        system.engine, system.integrator, clock.timestep, agents.kind, agents.dimension,
-        agents.robots if isinstance(agents, MjcfRobots) else None,
-        system.law.kernels, game.kernels, system.acting, system.fault_kernels,
-        game.actions, game.constraints_count, game.agents, agents.states,
-        len(system.loop_memory), setup.clock.mode, setup.history, setup.solver,
-    )  # fmt: skip
 
 
 def _seeded(setup: Setup, seed: int) -> Setup:

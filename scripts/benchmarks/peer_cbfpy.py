@@ -29,6 +29,7 @@ import numpy as np
 import peer_common as common
 from cbfpy import CBF, CBFConfig
 from numba import njit
+from turns import in_turns, row
 
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.loops import monitor as watch
@@ -206,17 +207,17 @@ def rows(runs: int = 20) -> list[dict[str, str]]:
     calls["ours called"], calls["ours looped"] = our_calls()
     for solver in SOLVERS:
         calls[f"{solver} called"], calls[f"{solver} looped"] = filter_calls(solver)
-    spent = {name: 1e6 * value for name, value in common.in_turns(calls, runs).items()}
+    measured = {name: lambda call=call: 1e6 * call() for name, call in calls.items()}
+    spent = in_turns(measured, runs)
     where = {"called": "called from Python", "looped": "in a compiled loop"}
     times = [
-        common.row(
+        row(
             f"one control of 5 robots, {meaning}: us; cbfpy's filter ({solver}, {name}) / our law",
-            spent[f"ours {way}"],
-            spent[f"{solver} {way}"],
+            spent, f"ours {way}", f"{solver} {way}", "", upside_down=True,
         )
         for way, meaning in where.items()
         for solver, (name, _) in SOLVERS.items()
-    ]
+    ]  # fmt: skip
     return times + [_kept(stretch, period) for stretch in STRETCHES for period in PERIODS]
 
 

@@ -7,18 +7,18 @@ thread per operation, as cbfpy recommends and as none of these operations is lar
 """
 
 import os
-import statistics
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import jax
 import numpy as np
 
+from gne_mj.batches.structure import Structure
 from gne_mj.controllers import FullInformation
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
+from gne_mj.loops.batch import Case, Span
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.system import Clock, System
@@ -66,22 +66,29 @@ def starts(runs: int, widest: float = 0.9, stretch: float = 1.0) -> np.ndarray:
     return np.stack([extension, velocity, velocity + slip, np.zeros((runs, N))], axis=2)
 
 
-def ours(one: System, clock: Clock, states: np.ndarray) -> tuple[float, np.ndarray]:
-    """Seconds in which our native loop moves all runs to the clock's end, and their last states.
+def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
+    """What moves all runs to the clock's end by our native batch on all cores, as often as called.
 
-    One run after the other, in one thread; making the loops is not counted.
+    It returns the seconds, from putting the starts into their rows to the last observation, and the
+    last states (runs, N, 4).
     """
-    spent, last, plant = 0.0, [], None
-    for state in states:
-        loop: Any = replace(one, state=state).closed_loop(clock, plant)
-        plant = getattr(loop, "plant", None)
+    structure = Structure(one, clock, CORES, len(states))
+    table = structure.table(one, one.setup(clock))
+    cases = [
+        Case(state, one.loop_memory, one.agents.parameters, table, one.closed_loop)
+        for state in states
+    ]
+    span = Span(clock.steps(clock.duration), clock.steps(clock.duration))
+
+    def call() -> tuple[float, np.ndarray]:
         began = time.perf_counter()
-        loop.advance(1, clock.steps(clock.duration))
-        spent += time.perf_counter() - began
-        last.append(loop.finish().state[0])
-        if loop.monitor[watch.EXIT] != watch.INSIDE:
+        outcome = structure.loop.run(cases, span, lambda: False)
+        spent = time.perf_counter() - began
+        if outcome is None or np.any(outcome.monitors[:, watch.EXIT] != watch.INSIDE):
             raise ArithmeticError("a run left the set, where the law has no value to compare")
-    return spent, np.stack(last)
+        return spent, outcome.samples.state[:, -1]
+
+    return call
 
 
 def over_cores(one: Callable[..., Any]) -> Callable[..., Any]:
@@ -100,25 +107,3 @@ def seconds(call: Callable[[], Any]) -> float:
     began = time.perf_counter()
     jax.block_until_ready(call())
     return time.perf_counter() - began
-
-
-def in_turns(calls: dict[str, Callable[[], float]], runs: int) -> dict[str, float]:
-    """Median of what each call says it took, after a warm one; in turns, on the same machine."""
-    for call in calls.values():
-        call()
-    spent: dict[str, list[float]] = {name: [] for name in calls}
-    for _ in range(runs):
-        for name, call in calls.items():
-            spent[name].append(call())
-    return {name: statistics.median(values) for name, values in spent.items()}
-
-
-def row(what: str, ours: float, other: float, target: str = "") -> dict[str, str]:
-    """One line; the ratio is other / ours."""
-    return {
-        "what": what,
-        "ours": f"{ours:.3g}",
-        "other": f"{other:.3g}",
-        "ratio": f"{other / ours:.3g}",
-        "target": target,
-    }

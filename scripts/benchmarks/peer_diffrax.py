@@ -6,7 +6,7 @@ their bounds and stretched springs. diffrax is given the classic Runge-Kutta met
 (it has none of its own), with our step: the same numbers come out. A second row lets it choose:
 each of its methods takes the loosest step or tolerance of a grid whose greatest error in any state
 of any run at the end is at most 1e-6, ours the longest step of such a grid, and diffrax's fastest
-counts. Its batch is vmapped and shared among all cores; ours moves run after run in one thread.
+counts. Both batches are shared among all cores, diffrax's being vmapped.
 
 OSNR: the stiff twin of :mod:`twin` under the fully distributed law, one run of 30 s with 601
 samples, error at most 1e-6 in all of them; diffrax has no Rosenbrock method, so that its
@@ -14,6 +14,7 @@ Kvaerno ones compete, and the explicit Tsit5. Equal tolerances, absolute and rel
 controller of steps served it best, as did interpolating the samples over making steps end there.
 """
 
+import statistics
 import time
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -24,6 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 import peer_common as common
 import twin
+from turns import in_turns, row
 
 from gne_mj.plants import pi_cascade
 from gne_mj.system import Clock
@@ -115,11 +117,16 @@ def batch(one: Callable[..., Any], states: np.ndarray) -> Callable[[], tuple[flo
     return call
 
 
-def our_robots(steps: int, states: np.ndarray) -> tuple[float, np.ndarray]:
-    """The same of our loop."""
+def our_robots(steps: int, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
+    """The same of our batch."""
     one = common.system("ode", "rk4", "continuous")
-    spent, last = common.ours(one, Clock(END, END / steps, END / steps, END), states)
-    return spent, last[:, :, :3]
+    call = common.ours(one, Clock(END, END / steps, END / steps, END), states)
+
+    def known_to_diffrax() -> tuple[float, np.ndarray]:
+        spent, last = call()
+        return spent, last[:, :, :3]
+
+    return known_to_diffrax
 
 
 def _loosest(
@@ -134,31 +141,26 @@ def _loosest(
 
 def _robots(turns: int) -> list[dict[str, str]]:
     states = common.starts(RUNS)
-    same = batch(fixed(Rk4())(STEPS), states)
-    apart = float(np.max(np.abs(same()[1] - our_robots(STEPS, states)[1])))
+    same, mine = batch(fixed(Rk4())(STEPS), states), our_robots(STEPS, states)
+    apart = float(np.max(np.abs(same()[1] - mine()[1])))
     if not apart <= SAME:
         raise ArithmeticError(f"diffrax's classic Runge-Kutta method differs by {apart:.1e}")
-    reference = our_robots(50 * STEPS, states)[1]
-    steps = _loosest(lambda n: lambda: our_robots(n, states), MORE_STEPS, reference)
-    calls = {"ours": lambda: our_robots(STEPS, states)[0], "same": lambda: same()[0]}
-    calls["ours, accurate"] = lambda: our_robots(steps, states)[0]
+    reference = our_robots(50 * STEPS, states)()[1]
+    steps = _loosest(lambda n: our_robots(n, states), MORE_STEPS, reference)
+    found = {"ours": mine, "same": same, "ours, accurate": our_robots(steps, states)}
     for name, (method, grid) in METHODS.items():
         entry = _loosest(lambda one, method=method: batch(method(one), states), grid, reference)
-        run = batch(method(entry), states)
-        calls[name] = lambda run=run: run()[0]
-    spent = {name: 1e3 * value for name, value in common.in_turns(calls, turns).items()}
-    best = min(METHODS, key=lambda name: spent[name])
-    what = f"robots' ODE twin, {RUNS} runs of {END:g} s, continuous"
-    where = f"on {len(jax.devices())} cores / ours, runs one after the other"
+        found[name] = batch(method(entry), states)
+    times = in_turns(
+        {name: lambda call=call: 1e3 * call()[0] for name, call in found.items()}, turns
+    )
+    best = min(METHODS, key=lambda name: statistics.median(times[name]))
+    what = f"robots' ODE twin, {RUNS} runs of {END:g} s, continuous, {len(jax.devices())} cores"
     return [
-        common.row(
-            f"{what}, {STEPS} steps of RK4 (equal within {apart:.0e}): ms; diffrax {where}",
-            spent["ours"], spent["same"],
-        ),
-        common.row(
-            f"{what}, error {ACCURACY:g}: ms; diffrax {best}, {where}",
-            spent["ours, accurate"], spent[best],
-        ),
+        row(f"{what}, {STEPS} steps of RK4 (equal within {apart:.0e}): ms; diffrax / our batch",
+            times, "ours", "same", "", upside_down=True),
+        row(f"{what}, error {ACCURACY:g}: ms; diffrax {best} / our batch",
+            times, "ours, accurate", best, "", upside_down=True),
     ]  # fmt: skip
 
 
@@ -225,17 +227,17 @@ def _osnr(gain: float, epsilon: float, turns: int) -> dict[str, str]:
     if len(accurate) < 2 or "ours" not in accurate:
         raise ArithmeticError(f"no tolerance of the grid reaches {twin.ACCURACY:g}")
     best = min(accurate.keys() - {"ours"}, key=lambda name: accurate[name][0])
-    spent = common.in_turns(
+    times = in_turns(
         {
-            name: lambda call=calls[name], rtol=accurate[name][1]: call(rtol)[0]
+            name: lambda call=calls[name], rtol=accurate[name][1]: 1e3 * call(rtol)[0]
             for name in ("ours", best)
         },
         turns,
     )
-    return common.row(
+    return row(
         f"OSNR twin, {pi_cascade.NAME}, k = {gain:g}, epsilon = {epsilon:g}, T = 30 s, error 1e-6:"
         f" ms; diffrax {best} / ours",
-        1e3 * spent["ours"], 1e3 * spent[best],
+        times, "ours", best, "", upside_down=True,
     )  # fmt: skip
 
 

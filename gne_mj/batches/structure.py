@@ -1,0 +1,75 @@
+"""What runs of one structure share: a native batch that holds them, and how their tables are made.
+
+Two systems have one structure if they have the same kernels, shapes, mode, integrator and step. All
+else may differ, and is in a run's table.
+"""
+
+from collections.abc import Hashable
+from typing import TYPE_CHECKING
+
+from gne_mj.loops.batch import BatchLoop, EachLoop
+from gne_mj.loops.layout import Setup
+from gne_mj.loops.ode import ode_table
+from gne_mj.loops.ode_batch import OdeBatch
+from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.system import Clock, System
+from gne_mj.table import Table
+
+if TYPE_CHECKING:
+    from gne_mj.plants.mjcf_fleet import MjcfPlant
+    from gne_mj.plants.mujoco import MujocoPlant
+
+
+class Structure:
+    """A native batch for systems like this one.
+
+    Args:
+        system, clock: of any of the runs.
+        threads: how many native threads.
+        room: the most runs of one call.
+
+    Attributes:
+        loop: runs them.
+    """
+
+    def __init__(self, system: System, clock: Clock, threads: int, room: int) -> None:
+        self._plant: MujocoPlant | MjcfPlant | None = None
+        self._native = system.integrator != "rosenbrock"
+        self.loop: BatchLoop
+        kernels = (system.law.kernels, system.game.kernels, system.acting, system.fault_kernels)
+        faulty = bool(system.faults)
+        if not self._native:
+            self.loop = EachLoop(threads)
+        elif system.engine == "ode":
+            self.loop = OdeBatch(system.agents, *kernels, faulty, threads)
+        else:
+            # Late: MuJoCo is slow to import, and the twins do not need it.
+            from gne_mj.loops.mujoco_batch import MujocoBatch
+
+            self._plant = system.mujoco_plant(clock)
+            # Mode implicit looks ahead in a second mjData, of which a plant has one.
+            alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
+            self.loop = MujocoBatch(self._plant, *kernels, faulty, 1 if alone else threads, room)
+
+    def table(self, system: System, setup: Setup) -> Table | None:
+        """The table of a run; None where each run has a loop of its own."""
+        if not self._native:
+            return None
+        memory = len(system.loop_memory)
+        if self._plant is None:
+            return ode_table(setup, system.agents, memory)
+        from gne_mj.loops.mujoco import mujoco_table
+
+        return mujoco_table(self._plant, setup, system.agents, memory)
+
+
+def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:
+    """The same for systems of one structure, and for no others."""
+    agents, game = system.agents, system.game
+    return (
+        system.engine, system.integrator, clock.timestep, agents.kind, agents.dimension,
+        agents.robots if isinstance(agents, MjcfRobots) else None,
+        system.law.kernels, game.kernels, system.acting, system.fault_kernels,
+        game.actions, game.constraints_count, game.agents, agents.states,
+        len(system.loop_memory), setup.clock.mode, setup.history, setup.solver,
+    )  # fmt: skip
