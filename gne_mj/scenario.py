@@ -14,7 +14,7 @@ from gne_mj.errors import InvalidInput, nearest
 from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
 
-__all__ = ["Scenario", "load_scenario", "parse_value", "run", "shipped"]
+__all__ = ["Scenario", "full_key", "load_scenario", "parse_value", "run", "shipped"]
 
 
 def shipped() -> dict[str, str]:
@@ -97,7 +97,17 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     return tables
 
 
-def _change(tables: dict[str, Any], key: str, value: Any) -> None:
+def full_key(tables: Mapping[str, Any], key: str, value: Any = None) -> list[str]:
+    """The parts of a dotted key, with "systems" and the system's name where they were left out.
+
+    Args:
+        tables: of the scenario.
+        key: as :func:`load_scenario` takes it.
+        value: what was given for it, for messages.
+
+    Raises:
+        InvalidInput: there is no such system or table.
+    """
     systems = tables.get("systems")
     if not isinstance(systems, dict):
         systems = {}
@@ -115,6 +125,11 @@ def _change(tables: dict[str, Any], key: str, value: Any) -> None:
     elif parts[0] not in Scenario.model_fields:
         known = [*Scenario.model_fields, *SystemTable.model_fields, *systems]
         raise InvalidInput(key, value, f"there is no such key; {nearest(parts[0], known)}")
+    return parts
+
+
+def _change(tables: dict[str, Any], key: str, value: Any) -> None:
+    parts = full_key(tables, key, value)
     table = tables
     for part in parts[:-1]:
         table = table.setdefault(part, {})

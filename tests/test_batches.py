@@ -1,7 +1,9 @@
 """Batches: every run as it would be alone, whatever happens to threads, chunks and processes."""
 
+import datetime
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -30,9 +32,10 @@ from gne_mj.batches import (
     run_batch,
 )
 from gne_mj.batches.chunk import Runner
+from gne_mj.batches.report import combinations
 from gne_mj.batches.summary import join
 from gne_mj.cli import main
-from gne_mj.errors import InvalidInput, StorageError, UserCodeError
+from gne_mj.errors import InfeasibleStart, InvalidInput, StorageError, UserCodeError
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.plants.fleet import compile_model, compose
 from gne_mj.starts import interior_profile, random_starts
@@ -63,9 +66,19 @@ CASES = {
         {**SHORT, "controller.mode": "sampled", "simulation.control_period": 0.1},
         [Sweep("simulation.timestep", (0.01, 0.005))],
     ),
+    "first steps that leave": (
+        "desired-velocity",
+        {"simulation.duration": 0.1, "plant.engine": "ode"},
+        [Sweep("barrier.rho", (0.1, 0.2))],
+    ),
     "twin": ("velocity-sync", ODE, [Sweep("controller.mode", ("continuous", "sampled"))]),
 }
 SLOW = {
+    "a start's seed is the scenario's": (
+        "disturbed",
+        {"simulation.duration": 0.5, "simulation.seed": 1153240287915889},
+        [Sweep("barrier.rho", (0.1,))],
+    ),
     "partial information": (
         "velocity-sync",
         {**SHORT, "controller": {"information": "partial", "graph": "ring"}},
@@ -127,6 +140,7 @@ def check_as_alone(name):
         assert whole["least_margin_time"][1][run] == report["worst_constraint"]["time"]
         assert whole["peak_input"][1][run] == report["actuators"]["peak"]
         assert whole["rms_input"][1][run].tolist() == report["actuators"]["rms"]
+        assert whole["energy"][1][run].tolist() == report["actuators"]["energy"]
         rise = report["lyapunov"]["largest_rise"]
         assert whole["lyapunov_rise"][1][run] == pytest.approx(rise, rel=1e-6, abs=1e-12)
         assert whole["steps"][1][run] == report["steps"]
@@ -142,6 +156,11 @@ def check_as_alone(name):
         else:
             assert whole["exit_time"][1][run] == report["exit"]["time"]
             assert whole["exit_value"][1][run] == report["exit"]["value"]
+            assert whole["exit_at_instant"][1][run] == report["exit"]["at_control_instant"]
+            names = plan.combination(0).system.game.constraint_names
+            number = int(whole["exit_constraint"][1][run]) - 1
+            assert names[number] == report["exit"]["constraint"]
+            assert np.isnan(settled)
         for variable in set(whole) & set(data.data_vars) | {"constraint"}:
             if whole[variable][0][:2] == ("run", "time"):
                 rows = len(data["time"]) - (not inside)  # the last one of an exit is outside
@@ -149,7 +168,7 @@ def check_as_alone(name):
                 np.testing.assert_array_equal(
                     recorded[:rows], data[variable].to_numpy()[:rows], err_msg=variable
                 )
-                assert np.all(np.isnan(recorded[rows:]))
+                assert np.all(np.isnan(recorded[rows + (not inside) :]))
     return statuses
 
 
@@ -280,8 +299,12 @@ def test_a_sweep_that_makes_no_sense_is_refused(text, words):
 
 @given(st.lists(st.integers(1, 4), max_size=3), st.integers(0, 5))
 def test_runs_and_combinations_correspond(lengths, starts):
-    sweeps = tuple(Sweep(f"key{axis}", tuple(range(length))) for axis, length in enumerate(lengths))
-    plan = Plan(scenario={"systems": {"a": {}}}, sweeps=sweeps, starts=starts)
+    keys = ("barrier.rho", "agents.damping", "game.gap_bound")
+    sweeps = [
+        Sweep(key, [1.0 + n for n in range(length)])
+        for key, length in zip(keys, lengths, strict=False)
+    ]
+    plan = make_plan("velocity-sync", ODE, sweeps=sweeps, starts=starts, chunk=7)
     seen = set()
     labels = plan.labels()
     for run in range(plan.runs):
@@ -292,6 +315,88 @@ def test_runs_and_combinations_correspond(lengths, starts):
     assert len(seen) == plan.runs == max(starts, 1) * int(np.prod(lengths))
     again = Plan.from_manifest(json.loads(json.dumps(plan.manifest())))
     assert again.manifest() == plan.manifest()
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("barrier.rho", "robots.barrier.rho"),
+        ("barrier.rho", "systems.robots.barrier.rho"),
+        ("barrier", "barrier.rho"),
+        ("systems.robots.barrier.rho", "systems.robots.barrier"),
+    ],
+)
+def test_one_key_is_not_swept_twice_under_two_names(one, other):
+    values = {True: [1.0, 2.0], False: [{"rho": 1.0}, {"rho": 2.0}]}
+    sweeps = [Sweep(key, values[key.endswith("rho")]) for key in (one, other)]
+    with pytest.raises(InvalidInput, match="swept already"):
+        make_plan("velocity-sync", ODE, sweeps=sweeps)
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "words"),
+    [
+        ("recording", [{"period": 0.1}, {"period": 0.2}], "same recording period"),
+        ("simulation", [{"duration": 1.0}, {"duration": 2.0}], "same duration"),
+        ("simulation", [{"duration": 1.0, "seed": 1}, {"duration": 1.0}], "same seed"),
+    ],
+)
+def test_what_runs_share_is_not_swept_by_a_whole_table(key, values, words, tmp_path):
+    with pytest.raises(InvalidInput, match=words):
+        run_batch("velocity-sync", {key: values}, out=tmp_path / "a")
+
+
+def test_values_are_pythons_own():
+    values = (np.float64(0.5), np.array([1.0, 2.0]), (3, 4), np.int64(2))
+    assert Sweep("key", values).values == (0.5, [1.0, 2.0], [3, 4], 2)
+    assert Sweep("key", np.array([1.0, 2.0])).values == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (0.1, "must be a list"),
+        ("ring", "must be a list"),
+        ([datetime.date(1979, 5, 27)], "a number, a word, a list or a table"),
+        ([float("nan")], "finite"),
+        (range(200_000), "at most"),
+    ],
+)
+def test_values_that_no_scenario_can_hold_are_refused(values, words):
+    with pytest.raises(InvalidInput, match=words):
+        Sweep("barrier.rho", values)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"runs": "3"}, "--runs: got '3'"),
+        ({"runs": 2.5}, "--runs: got 2.5"),
+        ({"runs": 10**12}, "10000000 runs at most"),
+        ({"seed": -1}, "--seed: got -1"),
+        ({"record": "some"}, "--record: got 'some'"),
+        ({"record": 1.5}, "--record: got 1.5"),
+        ({"spread": "0.5"}, "--spread"),
+        ({"threads": -1}, "--threads: got -1"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, words, tmp_path):
+    with pytest.raises(InvalidInput, match=words):
+        run_batch("velocity-sync", changes=ODE, out=tmp_path / "a", **options)
+
+
+def test_numpys_whole_numbers_will_do(tmp_path):
+    runs = run_batch(
+        "velocity-sync", changes=ODE, out=tmp_path / "a", runs=np.int64(2), seed=np.int64(3)
+    )
+    assert runs.sizes["run"] == 2
+
+
+def test_rows_in_memory_are_bounded():
+    fine = {**ODE, "simulation.duration": 600.0, "recording.period": 0.01}
+    plan = make_plan("velocity-sync", fine, starts=100_000)
+    assert 1 <= plan.chunk < 20
+    assert make_plan("velocity-sync", ODE, starts=100_000).chunk == 256
 
 
 @pytest.mark.parametrize(
@@ -464,8 +569,9 @@ def test_a_changed_file_of_ones_own_does_not_go_on(tmp_path):
     assert np.all(np.isin(store.statuses(), ["completed", "converged"]))
     with (tmp_path / "charging_plain.py").open("a") as file:
         file.write("\n# changed\n")
-    with pytest.raises(InvalidInput, match=r"charging_plain\.py"):
-        Store.continued(store.folder)
+    for again in (lambda: Store.continued(store.folder), store.check_files):
+        with pytest.raises(InvalidInput, match=r"charging_plain\.py"):
+            again()
 
 
 def test_a_failing_function_of_ones_own_is_told(tmp_path):
@@ -482,6 +588,82 @@ def test_a_failing_function_of_ones_own_is_told(tmp_path):
     plan = make_plan(tmp_path / "s.toml", {"simulation.duration": 20.0}, starts=3)
     with pytest.raises(UserCodeError, match="mine"):
         Runner(plan, 2).run(0)
+
+
+def test_a_stop_is_heard_in_the_middle_of_runs():
+    """Of a million seconds each, which no test waits for."""
+    endless = {**ODE, "simulation.duration": 1e6, "recording.period": 1e5}
+    for changes in (endless, {**endless, "plant.engine": "mujoco"}):
+        plan = make_plan("velocity-sync", changes, starts=4, chunk=4)
+        asked = []
+        assert Runner(plan, 2).run(0, lambda asked=asked: asked.append(1) or len(asked) > 6) is None
+
+
+def test_estimates_that_are_given_may_make_a_start_infeasible():
+    law = {"information": "distributed", "epsilon": 0.1, "graph": "complete", "mode": "sampled"}
+    given = {"controller": law, "initial.estimate": 3.0}
+    plan = make_plan("velocity-sync", {**ODE, **given}, starts=8, spread=0.99, chunk=8)
+    found = Runner(plan, 1).run(0)
+    refused = found["status"][1] == "infeasible_start"
+    assert 0 < np.sum(refused) < 8
+    np.testing.assert_array_equal(np.isnan(found["least_margin"][1]), refused)
+    for run in range(8):
+        if refused[run]:
+            with pytest.raises(InfeasibleStart):
+                plan.alone(run).system_objects()
+        else:
+            report = plan.alone(run).simulation_object().run().reports["robots"]
+            assert report["worst_constraint"]["margin"] == found["least_margin"][1][run]
+
+
+def test_a_worker_keeps_nothing_of_an_earlier_batch(tmp_path):
+    for rho in (0.1, 1.0):
+        plan = make_plan("velocity-sync", ODE, sweeps=[Sweep("barrier.rho", [rho])], starts=2)
+        store = Store.create(tmp_path / "a", plan)
+        manifest = json.dumps(plan.manifest())
+        for chunk in range(plan.chunks):
+            cluster.run_chunk(str(store.folder), manifest, chunk)
+        expected = all_chunks(plan, 1)["final_error"][1]
+        np.testing.assert_array_equal(store.dataset()["final_error"], expected)
+        shutil.rmtree(store.folder)
+        with pytest.raises(InvalidInput, match="batch` wrote"):
+            cluster.run_chunk(str(store.folder), manifest, 0)
+
+
+def test_a_worker_with_other_versions_refuses(tmp_path):
+    store = small(tmp_path)
+    manifest = json.dumps(store.plan.manifest()).replace(mujoco.__version__, "3.16.0")
+    with pytest.raises(InvalidInput, match="versions or files differ"):
+        cluster.run_chunk(str(store.folder), manifest, 0)
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", "no JSON", '{"format": 99}'])
+def test_a_manifest_of_something_else_is_refused(text, tmp_path):
+    store = small(tmp_path)
+    (store.folder / "manifest.json").write_text(text)
+    with pytest.raises(InvalidInput, match=r"batch` wrote|its format is 99"):
+        gne_mj.open_batch(store.folder)
+
+
+def test_medians_count_runs_that_have_no_end():
+    """Three of five settle at 1, 2 and 3: the median is 3; of two of five there is none."""
+    for settled, median in (([1.0, 2.0, 3.0], 3.0), ([1.0, 2.0], np.nan)):
+        times = settled + [np.nan] * (5 - len(settled))
+        runs = xarray.Dataset(
+            {
+                "status": ("run", ["completed"] * 5),
+                "settling_time": ("run", times),
+                **{
+                    name: ("run", np.arange(5.0))
+                    for name in ("least_margin", "final_error", "peak_input")
+                },
+            },
+            attrs={"swept": []},
+        )
+        table = combinations(runs)
+        np.testing.assert_equal(table["settling_time_median"][0], median)
+        assert table["not_settled"][0] == 5 - len(settled)
+        assert table["final_error_median"][0] == 2.0
 
 
 # Processes
@@ -663,7 +845,7 @@ def test_a_batch_writes_tables_and_a_figure(tmp_path, capsys):
     assert (code, err) == (0, "")
     assert printed.splitlines()[0].split() == [
         "barrier.rho", "controller.mode", "runs", "left", "worst", "margin", "settling", "(s)",
-        "final", "error",
+        "not", "settled", "final", "error",
     ]  # fmt: skip
     assert len(printed.splitlines()) == 5 + 5
     assert {p.name for p in out.iterdir()} == {
@@ -721,6 +903,8 @@ def test_a_run_of_a_batch_is_run_alone(tmp_path, capsys):
         (["run", "--from", "{tmp}", "--index", 1], "a folder that `batch` wrote"),
         (["batch"], "SCENARIO: nothing is given"),
         (["batch", "--resume", "--out", "{tmp}/none"], "a folder that `batch` wrote"),
+        (["batch", "--resume", "--out", "{batch}", "--runs", 3], "SCENARIO: nothing is given"),
+        (["batch", "velocity-sync", "--cluster", "nonsense", "--out", "{tmp}/x"], "tcp://HOST"),
         (["batch-report", "{tmp}"], "a folder that `batch` wrote"),
         (["batch-report", "{batch}"], "it must hold at least one run"),
         (["batch-report", "{batch}", "--format", "jpg"], "choose from png, pdf, svg"),

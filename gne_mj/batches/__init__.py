@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from gne_mj.batches.cluster import connected
 from gne_mj.batches.execute import execute
-from gne_mj.batches.plan import Plan, make_plan
+from gne_mj.batches.plan import Plan, make_plan, parse_record
 from gne_mj.batches.progress import Progress
 from gne_mj.batches.store import Store
 from gne_mj.batches.sweep import Sweep, parse_sweep
@@ -23,6 +23,7 @@ __all__ = [
     "execute",
     "make_plan",
     "open_batch",
+    "parse_record",
     "parse_sweep",
     "run_batch",
 ]
@@ -33,39 +34,57 @@ def run_batch(
     sweep: Mapping[str, Sequence[Any]] | None = None,
     *,
     out: str | Path,
+    runs: int = 0,
     changes: Mapping[str, Any] | None = None,
-    resume: bool = False,
+    system: str | None = None,
+    record: str | int = "summaries",
+    seed: int = 0,
+    spread: float = 0.9,
+    chunk: int = 0,
     threads: int = 0,
+    resume: bool = False,
     cluster: str | None = None,
     progress: Callable[[Progress], None] | None = None,
-    **options: Any,
 ) -> "xarray.Dataset":
     """Run all combinations of swept values from random starts; returns the dataset, read lazily.
 
     >>> import gne_mj
-    >>> runs = gne_mj.run_batch("velocity-sync", {"barrier.rho": [0.01, 0.1, 1]}, starts=100,
-    ...                         out="results/rho")
-    >>> runs["least_margin"].groupby("barrier.rho").min().values
+    >>> sweep = {"barrier.rho": [0.01, 0.1, 1]}
+    >>> runs = gne_mj.run_batch("velocity-sync", sweep, runs=100, out="results/rho")
 
     Args:
         source, changes: see :func:`gne_mj.load_scenario`.
         sweep: dotted keys, each with its values.
         out: folder to write.
-        resume: go on with what an earlier call has begun there, if there is such a folder.
+        runs: random interior starts of each combination; 0 for the scenario's own start.
+        system: which; may be left out if there is only one.
+        record: "summaries", "all" samples too, or every so many-th of them.
+        seed: from which all starts' seeds follow.
+        spread: how far towards the boundary random starts lie, between 0 and 1.
+        chunk: runs that are stored together; chosen if 0.
         threads: native threads; 0 for one a processor.
+        resume: go on with what an earlier call has begun there, if there is such a folder.
         cluster: address of a Dask scheduler to run on.
         progress: called after each chunk.
-        options: system, starts, seed, spread, record, chunk; see :class:`Plan`.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
         StorageError: results could not be written; what was stored before is readable.
     """
-    sweeps = [Sweep(key, tuple(_plain(v) for v in values)) for key, values in (sweep or {}).items()]
-    plan = make_plan(source, changes, sweeps=sweeps, **options)
+    plan = make_plan(
+        source,
+        changes,
+        system=system,
+        sweeps=[Sweep(key, values) for key, values in (sweep or {}).items()],  # type: ignore[arg-type]
+        starts=runs,
+        seed=seed,
+        spread=spread,
+        record=parse_record(record),
+        chunk=chunk,
+    )
     folder = Path(out)
-    goes_on = resume and folder.exists()
     with connected(cluster) as client:
+        goes_on = resume and folder.exists()
         store = Store.resume(folder, plan) if goes_on else Store.create(folder, plan)
         execute(store, threads=threads, cluster=client, progress=progress)
     return store.dataset()
@@ -74,8 +93,3 @@ def run_batch(
 def open_batch(folder: str | Path) -> "xarray.Dataset":
     """The dataset of a batch's folder, read lazily; runs that are missing are not numbers."""
     return Store.open(Path(folder)).dataset()
-
-
-def _plain(value: Any) -> Any:
-    """A NumPy scalar as a number of Python's, which a manifest can hold."""
-    return value.item() if hasattr(value, "item") else value

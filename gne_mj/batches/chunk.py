@@ -10,14 +10,22 @@ from numpy.typing import NDArray
 
 from gne_mj.batches.plan import Combination, Plan
 from gne_mj.batches.structure import Structure, key_of
-from gne_mj.batches.summary import Variables, columns_of, join, refused_columns
+from gne_mj.batches.summary import (
+    Variables,
+    columns_of,
+    join,
+    rearranged,
+    refused_columns,
+    span_of,
+)
+from gne_mj.errors import InfeasibleStart
 from gne_mj.loops.base import ClosedLoop
-from gne_mj.loops.batch import Case, Span
+from gne_mj.loops.batch import Case
 from gne_mj.loops.faults import SEED
 from gne_mj.loops.layout import Setup
 from gne_mj.plain import raise_pending
 from gne_mj.scenario_tables.table import per_action
-from gne_mj.system import System
+from gne_mj.system import Clock, System
 
 _STRUCTURES, _COMBINATIONS = 16, 1024  # that are kept; a structure has a model, rows and threads
 
@@ -53,31 +61,43 @@ class Runner:
         Raises:
             UserCodeError: a function of the user's own failed.
         """
-        entries = list(self._entries(chunk))
-        parts: dict[int, Variables] = {}
         with _ONE_AT_A_TIME:
+            entries = list(self._entries(chunk))
+            parts: dict[int, Variables] = {}
             for key in dict.fromkeys(prepared.key for prepared, _ in entries):
                 mine = [entry for entry in entries if entry[0].key == key]
-                if key is None:
-                    for prepared, starts in mine:
-                        number = prepared.combination.number
-                        parts[number] = refused_columns(len(starts))
-                    continue
-                cases = [case for entry in mine for case in self._cases(*entry)]
-                clock = mine[0][0].combination.clock
-                span = Span(clock.steps(clock.duration), clock.steps(clock.sample_period))
-                outcome = self._structure(mine[0][0]).loop.run(cases, span, stopped)
-                raise_pending()
-                if outcome is None:
+                found = self._run_group(mine, stopped)
+                if found is None:
                     return None
-                done = 0
-                for prepared, starts in mine:
-                    own = outcome.part(slice(done, done + len(starts)))
-                    done += len(starts)
-                    parts[prepared.combination.number] = columns_of(
-                        prepared.combination, span, own, self.plan.record
-                    )
+                parts.update(found)
         return join([parts[number] for number in sorted(parts)])
+
+    def _run_group(
+        self, entries: list[tuple[_Prepared, list[int]]], stopped: Callable[[], bool]
+    ) -> dict[int, Variables] | None:
+        """The variables of combinations of one structure (or of none), by their numbers."""
+        first = entries[0][0]
+        cases = [list(self._cases(*entry)) for entry in entries]
+        able = [case for each in cases for case in each if case is not None]
+        outcome = None
+        span = span_of(first.combination)
+        if able:
+            outcome = self._structure(first).loop.run(able, span, stopped)
+            raise_pending()
+            if outcome is None:
+                return None
+        done, parts = 0, {}
+        for (prepared, _), own in zip(entries, cases, strict=True):
+            inside = np.array([case is not None for case in own])
+            columns = [refused_columns(int(np.sum(~inside)))]
+            if outcome is not None and np.any(inside):
+                runs = slice(done, done + int(np.sum(inside)))
+                done = runs.stop
+                part = outcome.part(runs)
+                columns.insert(0, columns_of(prepared.combination, span, part, self.plan.record))
+            order = np.argsort(np.argsort(~inside, kind="stable"), kind="stable")
+            parts[prepared.combination.number] = rearranged(join(columns), order)
+        return parts
 
     def _entries(self, chunk: int) -> Iterator[tuple[_Prepared, list[int]]]:
         """The combinations of a chunk, each with its starts in it."""
@@ -112,26 +132,36 @@ class Runner:
         self._structures.move_to_end(key)
         return self._structures[key]
 
-    def _cases(self, prepared: _Prepared, starts: list[int]) -> Iterator[Case]:
+    def _cases(self, prepared: _Prepared, starts: list[int]) -> Iterator[Case | None]:
+        """A case for each start; None where it, or the estimates given for it, are not inside."""
         plan, combination, setup = self.plan, prepared.combination, prepared.setup
         system = combination.system
-        assert system is not None
-        assert setup is not None
+        if system is None or setup is None:
+            yield from [None] * len(starts)
+            return
         structure = self._structure(prepared)
-        table = structure.table(system, setup)
+        shared = structure.table(system, setup)
+        initial = combination.scenario.systems[system.name].initial
         for start, y in zip(starts, plan.profiles(combination, starts), strict=True):
-            seed = int(plan.seeds[start]) if plan.starts else system.seed
+            seed = int(plan.seeds[start])
+            state, memory = system.state, system.memory
+            if plan.starts:
+                state, memory = _start(combination, y)
+            if initial.estimate is not None or initial.filtered is not None:
+                try:
+                    replace(system, state=state, memory=memory)
+                except InfeasibleStart:
+                    yield None
+                    continue
+            table = shared
             if system.faults and seed != system.seed:  # what is random in them
                 table = structure.table(system, _seeded(setup, seed))
-            state, memory = _start(combination, y)
             yield Case(
                 state=state,
                 memory=system.with_links(memory),
                 parameters=system.agents.parameters,
                 table=table,
-                loop=_Alone(replace(system, state=state, memory=memory, seed=seed), combination)
-                if table is None
-                else _unused,
+                loop=_Alone(system, state, memory, seed, combination.clock),
             )
 
 
@@ -140,14 +170,14 @@ class _Alone:
     """Makes the loop of one run."""
 
     system: System
-    combination: Combination
+    state: NDArray[np.float64]
+    memory: NDArray[np.float64]
+    seed: int
+    clock: Clock
 
     def __call__(self) -> ClosedLoop:
-        return self.system.closed_loop(self.combination.clock)
-
-
-def _unused() -> ClosedLoop:
-    raise NotImplementedError("native batches make no loops")
+        one = replace(self.system, state=self.state, memory=self.memory, seed=self.seed)
+        return one.closed_loop(self.clock)
 
 
 def _seeded(setup: Setup, seed: int) -> Setup:
@@ -165,8 +195,6 @@ def _start(
     system = combination.system
     assert system is not None
     initial = combination.scenario.systems[system.name].initial
-    if np.array_equal(y, system.start):
-        return system.state, system.memory
     sizes = system.game.sizes
     state = initial.model_copy(update={"action": None}).build(system.agents, sizes, lambda: y)
     filtered = initial.filtered

@@ -1,13 +1,15 @@
 """Chunks of a batch on the workers of an existing Dask scheduler, each writing its own."""
 
-import os
+import json
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gne_mj.batches.chunk import Runner
+from gne_mj.batches.plan import Plan
 from gne_mj.batches.progress import count_left
 from gne_mj.batches.store import Store
 from gne_mj.errors import InvalidInput
@@ -31,10 +33,15 @@ def connected(address: str | None) -> Iterator["Client | None"]:
         return
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError:
         raise InvalidInput(
             "--cluster", address, "it needs Dask: pip install 'gne-mj[cluster]'"
         ) from None
+    try:
+        get_address_host_port(address)
+    except (ValueError, TypeError):
+        raise InvalidInput("--cluster", address, "it must read tcp://HOST:PORT") from None
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -50,11 +57,12 @@ def on_cluster(
     """Run what is missing; the runs of each chunk, and how many left, as workers finish them."""
     from distributed import wait
 
-    manifest = store.plan.manifest()
+    folder, manifest = str(store.folder.resolve()), json.dumps(store.plan.manifest())
+    batch = uuid.uuid4().hex  # a key must not be another batch's
     futures = [
         client.submit(
-            run_chunk, str(store.folder.resolve()), manifest, chunk, pure=False, retries=RETRIES,
-            key=f"gne-mj-{store.folder.name}-{chunk}-{os.getpid()}",
+            run_chunk, folder, manifest, chunk, pure=False, retries=RETRIES,
+            key=f"gne-mj-{batch}-{chunk}",
         )
         for chunk in store.missing()
     ]  # fmt: skip
@@ -70,18 +78,18 @@ def on_cluster(
         client.cancel(list(waiting))
 
 
-def run_chunk(folder: str, manifest: dict[str, Any], chunk: int) -> tuple[int, int]:
+def run_chunk(folder: str, manifest: str, chunk: int) -> tuple[int, int]:
     """On a worker: run and store one chunk; its runs, and how many of them left.
 
     Raises:
         InvalidInput: the worker does not see the folder, or has other versions or files.
     """
     store = Store.open(Path(folder))
-    if store.plan.manifest() != manifest:
+    if json.dumps(store.plan.manifest()) != manifest:
         raise InvalidInput(
             "--cluster", folder, "a worker's versions or files differ from those here"
         )
-    variables = _runner(folder).run(chunk)
+    variables = _runner(manifest).run(chunk)
     assert variables is not None
     store.write(chunk, variables)
     statuses = variables["status"][1]
@@ -89,6 +97,6 @@ def run_chunk(folder: str, manifest: dict[str, Any], chunk: int) -> tuple[int, i
 
 
 @lru_cache(maxsize=1)
-def _runner(folder: str) -> Runner:
+def _runner(manifest: str) -> Runner:
     # one thread: it is the scheduler that says how much a worker does at once
-    return Runner(Store.open(Path(folder)).plan, 1)
+    return Runner(Plan.from_manifest(json.loads(manifest)), 1)

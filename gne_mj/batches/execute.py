@@ -8,6 +8,7 @@ from gne_mj.batches.chunk import Runner
 from gne_mj.batches.cluster import on_cluster
 from gne_mj.batches.progress import Progress, count_left
 from gne_mj.batches.store import Store
+from gne_mj.errors import InvalidInput
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -37,9 +38,12 @@ def execute(
         stopped: says whether to end early; asked several times a second.
 
     Raises:
+        InvalidInput: threads that are negative, or another process that runs this batch.
         StorageError: a chunk could not be written.
         UserCodeError: a function of the user's own failed.
     """
+    if threads < 0:
+        raise InvalidInput("--threads", threads, "it must not be negative")
     now = Progress.of(store)
 
     def tell(done: int, left: int) -> Progress:
@@ -53,7 +57,7 @@ def execute(
         if cluster is not None:
             for done, left in on_cluster(store, cluster, stopped):
                 now = tell(done, left)
-            return now
+            return Progress.of(store)
         runner = Runner(store.plan, threads or cores())
         for chunk in store.missing():
             variables = None if stopped() else runner.run(chunk, stopped)

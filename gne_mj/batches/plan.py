@@ -7,6 +7,7 @@ same noise, so that combinations are compared on equal terms.
 
 import hashlib
 import json
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from gne_mj.batches.sweep import Sweep
 from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
-from gne_mj.scenario import Scenario, load_scenario
+from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.scenario_tables import SystemTable
 from gne_mj.starts import interior_profile, random_starts
 from gne_mj.system import Clock, System
@@ -32,8 +33,10 @@ _NOT_SWEPT = {
     "recording.period": "all runs of a batch share their sample times",
     "description": "it changes nothing",
 }
+MOST_RUNS = 10_000_000
+_OPTIONS = {"starts": "--runs", "seed": "--seed", "record": "--record", "chunk": "--chunk"}
 _CHUNK_RUNS = 256
-_CHUNK_BYTES = 2**26
+_CHUNK_BYTES = 2**27  # of rows in memory
 _LEAST_CHUNKS = 16  # of a small batch, so that its progress is seen and little is lost
 
 
@@ -80,40 +83,46 @@ class Plan:
     chunk: int = 0
 
     def __post_init__(self) -> None:
-        for key, least in (("starts", 0), ("seed", 0), ("record", 0), ("chunk", 0)):
-            if getattr(self, key) < least:
-                option = "runs" if key == "starts" else key
-                raise InvalidInput(f"--{option}", getattr(self, key), "it must not be negative")
-        if not 0.0 < self.spread < 1.0:
-            raise InvalidInput("--spread", self.spread, "it must be between 0 and 1")
-        keys = [sweep.key for sweep in self.sweeps]
-        for at, key in enumerate(keys):
-            if key in keys[:at]:
-                raise InvalidInput("--sweep", key, "every key may be swept once only")
-            if key in _NOT_SWEPT:
-                raise InvalidInput("--sweep", key, f"it cannot be swept: {_NOT_SWEPT[key]}")
+        for key in ("starts", "seed", "record", "chunk"):
+            object.__setattr__(self, key, _whole(_OPTIONS[key], getattr(self, key)))
+        if self.seed > 2**53:
+            raise InvalidInput("--seed", self.seed, "it must not exceed 2^53")
+        if not isinstance(self.spread, int | float) or not 0.0 < self.spread < 1.0:
+            raise InvalidInput("--spread", self.spread, "it must lie between 0 and 1, without them")
+        self._check_sweeps()
+        if self.runs > MOST_RUNS:
+            raise InvalidInput("--runs", self.runs, f"a batch has {MOST_RUNS} runs at most")
         if not self.chunk:
             object.__setattr__(self, "chunk", self._fitting_chunk())
 
+    def _check_sweeps(self) -> None:
+        known: list[list[str]] = []
+        for sweep in self.sweeps:
+            parts = full_key(self.scenario, sweep.key, sweep.values[0])
+            reason = _NOT_SWEPT.get(".".join(parts))
+            if reason is not None:
+                raise InvalidInput("--sweep", sweep.key, f"it cannot be swept: {reason}")
+            for other in known:
+                shorter = min(len(parts), len(other))
+                if parts[:shorter] == other[:shorter]:
+                    raise InvalidInput(
+                        "--sweep", sweep.key, f"it is swept already, by {'.'.join(other)}"
+                    )
+            known.append(parts)
+
     def _fitting_chunk(self) -> int:
+        """So many that their rows, which are in memory meanwhile, fit into the budget."""
         runs = min(_CHUNK_RUNS, max(1, -(-self.runs // _LEAST_CHUNKS)))
-        if self.record:
-            system = self._first_system
-            m, agents = system.game.actions, system.game.agents
-            width = m * (system.agents.states + 2) + len(system.memory) * (agents + 1)
-            row = 8 * (width + system.game.constraints_count)
-            rows = self._clock.steps(self._clock.duration) // self._every + 2
-            runs = min(runs, max(1, _CHUNK_BYTES // (row * rows)))
-        return runs
+        system, clock = self._first_system, self._clock
+        width = system.agents.channels * (system.agents.states + 3) + len(system.loop_memory)
+        if self.record:  # variables made of them
+            width = 4 * width + 2 * system.game.constraints_count
+        rows = clock.steps(clock.duration) // clock.steps(clock.sample_period) + 2
+        return max(1, min(runs, _CHUNK_BYTES // (8 * width * rows)))
 
     @cached_property
     def _clock(self) -> Clock:
         return load_scenario(self.scenario).clock()
-
-    @property
-    def _every(self) -> int:
-        """Steps between samples."""
-        return self._clock.steps(self._clock.sample_period)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -147,7 +156,9 @@ class Plan:
 
     @cached_property
     def seeds(self) -> NDArray[np.int64]:
-        """Of each start."""
+        """Of each start; of the scenario's own start the scenario's."""
+        if not self.starts:
+            return np.array([self.scenario["simulation"]["seed"]])
         words = np.random.SeedSequence(self.seed).generate_state(self.each, np.uint64)
         return (words >> np.uint64(11)).astype(np.int64)
 
@@ -200,9 +211,11 @@ class Plan:
             if given is None
             else np.asarray(given, dtype=np.float64).ravel() + np.zeros(game.actions)
         )
-        return start_at(table, interior_profile(game, wanted), game.sizes).build(
-            self.name, simulation
-        )
+        # Estimates that are given belong to a run's own start, which they may not suit.
+        initial = table.initial.model_copy(update={"estimate": None, "filtered": None})
+        table = table.model_copy(update={"initial": initial})
+        profile = interior_profile(game, wanted)
+        return start_at(table, profile, game.sizes).build(self.name, simulation)
 
     @cached_property
     def _first_system(self) -> System:
@@ -306,6 +319,32 @@ def start_at(table: SystemTable, y: NDArray[np.float64], sizes: Sequence[int]) -
     action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
     initial = table.initial.model_copy(update={"action": action})
     return table.model_copy(update={"initial": initial})
+
+
+def parse_record(given: str | int) -> int:
+    """Every which sample is kept: 'summaries' for none, 'all', or a whole number.
+
+    Raises:
+        InvalidInput: it is none of these.
+    """
+    words = {"summaries": 0, "all": 1}
+    if isinstance(given, str) and given in words:
+        return words[given]
+    if isinstance(given, str) and given.isdecimal():
+        given = int(given)
+    if isinstance(given, int) and not isinstance(given, bool) and given > 0:
+        return given
+    raise InvalidInput("--record", given, "it must be 'summaries', 'all' or a whole number from 1")
+
+
+def _whole(option: str, given: Any) -> int:
+    try:
+        number = operator.index(given)
+    except TypeError:
+        number = -1
+    if number < 0 or isinstance(given, bool):
+        raise InvalidInput(option, given, "it must be a whole number, and not negative")
+    return number
 
 
 def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:

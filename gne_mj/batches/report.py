@@ -1,6 +1,7 @@
 """Tables and the figure of a batch's folder."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,12 +39,25 @@ def write_report(
     tables = {"combinations.csv": combinations(runs), "runs.csv": runs.to_dataframe()}
     paths = []
     for name, table in tables.items():
-        table.to_csv(target / name, index=name == "runs.csv")
+        with _whole(target / name) as path:
+            table.to_csv(path, index=name == "runs.csv")
         paths.append(target / name)
     for kind in formats:
+        with _whole(target / f"summary.{kind}") as path:
+            plots.save_batch(runs, path, kind)
         paths.append(target / f"summary.{kind}")
-        plots.save_batch(runs, paths[-1])
     return paths
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A file beside ``path`` that takes its place once it is written."""
+    beside = path.with_name(f".{path.name}.partial")
+    try:
+        yield beside
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def figures_of(store: Store) -> "xarray.Dataset":
@@ -57,7 +71,12 @@ def figures_of(store: Store) -> "xarray.Dataset":
 
 
 def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
-    """One row for each combination of swept values: how its runs ended, and their figures."""
+    """One row for each combination of swept values: how its runs ended, and their figures.
+
+    In medians a run that did not settle, or left, counts as slower, or farther, than any other;
+    where such runs are in the middle there is none. The greatest final error is of those that
+    stayed.
+    """
     import pandas
 
     keys = list(runs.attrs["swept"])
@@ -72,27 +91,42 @@ def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
             "left": int((~stayed).sum()),
             "converged": int((own["status"] == "converged").sum()),
         }
-        for name, ways in (
-            ("least_margin", ("min", "median")),
-            ("settling_time", ("median", "max")),
-            ("final_error", ("median", "max")),
-            ("peak_input", ("max",)),
+        # A run that never settled took longer than any that did, and one that left has no end.
+        settling = own["settling_time"].fillna(np.inf)
+        error = own["final_error"].fillna(np.inf)
+        for name, value in (
+            ("least_margin_min", own["least_margin"].min()),
+            ("least_margin_median", own["least_margin"].median()),
+            ("settling_time_median", _middle(settling)),
+            ("settling_time_max", settling.max()),
+            ("not_settled", int(np.isinf(settling).sum())),
+            ("final_error_median", _middle(error)),
+            ("final_error_max", own["final_error"].max()),
+            ("peak_input_max", own["peak_input"].max()),
         ):
-            for way in ways:
-                row[f"{name}_{way}"] = getattr(own[name], way)() if name in own else np.nan
-        row["not_settled"] = int(own["settling_time"].isna().sum()) if len(own) else 0
+            row[name] = np.nan if np.isinf(value) else value
         rows.append(row)
     return pandas.DataFrame(rows)
 
 
+def _middle(values: "pandas.Series[float]") -> float:
+    """The median, of an even number of runs the lower one."""
+    return float(np.quantile(values, 0.5, method="inverted_cdf"))
+
+
 def summary(table: "pandas.DataFrame", keys: list[str], rows: int = 24) -> Iterator[str]:
-    """The table of combinations in words, in lines; no more than so many."""
+    """The table of combinations in words, in lines; no more than so many.
+
+    Settling times are medians over all runs ("-" where half of them or more did not settle); worst
+    margins and final errors are the worst, of runs that have one.
+    """
     names = {
         **{key: key for key in keys},
         "runs": "runs",
         "left": "left",
         "least_margin_min": "worst margin",
         "settling_time_median": "settling (s)",
+        "not_settled": "not settled",
         "final_error_max": "final error",
     }
     shown = table.head(rows)

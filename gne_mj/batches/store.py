@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.batches.plan import Combination, Plan
-from gne_mj.batches.summary import Variables, columns_of, join, kept, times
+from gne_mj.batches.plan import FORMAT, Combination, Plan
+from gne_mj.batches.summary import Variables, columns_of, join, kept, span_of, times
 from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.batch import Outcome, Span
+from gne_mj.loops.batch import Outcome
 from gne_mj.loops.recorder import Recorder
 from gne_mj.trajectory import coordinates_of
 
@@ -49,6 +49,7 @@ class Store:
 
         Raises:
             InvalidInput: the folder exists, or combinations have no common layout.
+            StorageError: it cannot be written, as on a full disk.
         """
         if folder.exists():
             raise InvalidInput(
@@ -69,6 +70,9 @@ class Store:
             _create_arrays(scratch / RUNS, plan)
             scratch.chmod(0o755)
             scratch.rename(folder)
+        except OSError as error:
+            shutil.rmtree(scratch, ignore_errors=True)
+            raise StorageError(f"{folder}: {error.strerror or error}; nothing is stored") from None
         except BaseException:
             shutil.rmtree(scratch, ignore_errors=True)
             raise
@@ -126,12 +130,30 @@ class Store:
                     "--out", str(self.folder), "another process is running this batch right now"
                 ) from None
             self._tidy()
-            yield
-            self._tidy()
+            try:
+                yield
+            finally:
+                self._tidy()
 
     def _tidy(self) -> None:
-        for leftover in (self.folder / RUNS).glob("*/*.partial"):
+        for leftover in (self.folder / RUNS).rglob("*.partial"):
             leftover.unlink(missing_ok=True)
+
+    def check_files(self) -> list[str]:
+        """Look whether the user's own files are as they were; returns versions that are not.
+
+        Raises:
+            InvalidInput: a file has changed, so that no run could be repeated.
+        """
+        before, now = _manifest(self.folder), self.plan.manifest()
+        for name, _, _ in _differences(before["files"], now["files"]):
+            raise InvalidInput(
+                "files", name, f"it is not what it was when the batch in {self.folder} was run"
+            )
+        return [
+            f"{name} was {was}, is {value}"
+            for name, was, value in _differences(before["versions"], now["versions"])
+        ]
 
     def statuses(self) -> NDArray[np.str_]:
         """(runs,) how each run ended; empty if it has not been run."""
@@ -186,10 +208,13 @@ def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        form = found["format"]
+    except (OSError, ValueError, KeyError, TypeError):
         raise InvalidInput(
             "DIR", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
         ) from None
+    if form != FORMAT:
+        raise InvalidInput("DIR", str(folder), f"its format is {form}, not {FORMAT} as here")
     return found
 
 
@@ -233,7 +258,7 @@ def _create_arrays(path: Path, plan: Plan) -> None:
 
     system = first.system
     assert system is not None
-    span = _span(first)
+    span = span_of(first)
     coordinates: dict[str, Any] = {
         "run": ("run", np.arange(plan.runs), {"long_name": "number of the run"}),
         "start": ("run", np.arange(plan.runs) % plan.each, {"long_name": "number of the start"}),
@@ -291,6 +316,7 @@ def _schema(plan: Plan) -> tuple[Combination, Variables]:
         _check_layout(first, combination)
         kind = (
             system.law.information, bool(system.faults), system.schedule is None, system.mode,
+            system.agents.kind, tuple(each.name for each in system.game.quantities),
             len(system.memory), bool(np.any(system.game.margins)),
         )  # fmt: skip
         if kind not in known:
@@ -299,6 +325,15 @@ def _schema(plan: Plan) -> tuple[Combination, Variables]:
         raise InvalidInput(
             "initial.action", "given", "it is strictly inside in no combination of the sweep"
         )
+    shapes: dict[str, Any] = {}
+    for variables in known.values():
+        for name, (dimensions, like, _) in variables.items():
+            if shapes.setdefault(name, (dimensions, like.shape)) != (dimensions, like.shape):
+                raise InvalidInput(
+                    "--sweep",
+                    ", ".join(sweep.key for sweep in plan.sweeps),
+                    f"'{name}' must have the same shape in all combinations",
+                )
     return first, join(list(known.values()))
 
 
@@ -306,23 +341,22 @@ def _check_layout(first: Combination, other: Combination) -> None:
     one, two = first.system, other.system
     assert one is not None
     assert two is not None
-    same = one.game.sizes == two.game.sizes
-    if not (same and one.game.constraint_names == two.game.constraint_names):
-        raise InvalidInput(
-            "--sweep",
-            ", ".join(other.changes),
-            "the agents and constraints must be the same ones in all combinations",
-        )
-
-
-def _span(combination: Combination) -> Span:
-    clock = combination.clock
-    return Span(clock.steps(clock.duration), clock.steps(clock.sample_period))
+    for what, here, there in (
+        ("agents", one.game.sizes, two.game.sizes),
+        ("constraints", one.game.constraint_names, two.game.constraint_names),
+        ("duration", first.clock.duration, other.clock.duration),
+        ("recording period", first.clock.sample_period, other.clock.sample_period),
+        ("seed", first.scenario.simulation.seed, other.scenario.simulation.seed),
+    ):
+        if here != there:
+            raise InvalidInput(
+                "--sweep", ", ".join(other.changes), f"all combinations must have the same {what}"
+            )
 
 
 def _one_run(combination: Combination, record: int) -> Variables:
     """What one run of a combination would have, nothing of it being a number."""
-    system, span = combination.system, _span(combination)
+    system, span = combination.system, span_of(combination)
     assert system is not None
     m = system.game.actions
     rows = Recorder(

@@ -52,8 +52,9 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
     peak, peak_time, square, energy = np.moveaxis(
         monitors[:, at : at + 4 * m].reshape(runs, 4, m), 1, 0
     )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rms = np.sqrt(square / monitors[:, watch.TIME, None])
+    seen = monitors[:, watch.STARTED] > 0
+    elapsed = monitors[:, watch.TIME, None]
+    rms = np.sqrt(np.divide(square, elapsed, out=np.zeros_like(square), where=elapsed > 0))
     known = left & (monitors[:, watch.EXIT] != watch.DIVERGED)
     axis = axis_of(system)
     unit = {"units": game.action_unit}
@@ -66,11 +67,15 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         "status": (("run",), status.astype(STATUS), {"long_name": "how the run ended"}),
         "least_margin": (
             ("run",),
-            -worst[rows, tightest],
+            where(seen, -worst[rows, tightest]),
             {"long_name": "least -g over constraints and integration steps"},
         ),
-        "least_margin_time": (("run",), when[rows, tightest], second),
-        "least_margin_constraint": (("run",), 1.0 + tightest, {"long_name": "numbered from 1"}),
+        "least_margin_time": (("run",), where(seen, when[rows, tightest]), second),
+        "least_margin_constraint": (
+            ("run",),
+            where(seen, 1.0 + tightest),
+            {"long_name": "numbered from 1"},
+        ),
         "margin": (("run", "constraint"), -worst, {"long_name": "least -g of each constraint"}),
         "settling_time": (
             ("run",),
@@ -142,6 +147,12 @@ def refused_columns(runs: int) -> Variables:
     return {"status": (("run",), np.full(runs, "infeasible_start", dtype=STATUS), {})}
 
 
+def span_of(combination: Combination) -> Span:
+    """How long a combination's runs are, and when they are sampled."""
+    clock = combination.clock
+    return Span(clock.steps(clock.duration), clock.steps(clock.sample_period))
+
+
 def times(combination: Combination, span: Span) -> NDArray[np.float64]:
     """(rows,) sample times in s."""
     steps = np.append(span.every * np.arange(span.rows - 1, dtype=np.float64), span.steps)
@@ -151,6 +162,14 @@ def times(combination: Combination, span: Span) -> NDArray[np.float64]:
 def kept(span: Span, record: int) -> NDArray[np.int64]:
     """Which rows are recorded: every so many, and the last."""
     return np.unique(np.append(np.arange(0, span.rows, record), span.rows - 1))
+
+
+def rearranged(variables: Variables, order: NDArray[np.int64]) -> Variables:
+    """The same runs in another order."""
+    return {
+        name: (dimensions, values[order], attributes)
+        for name, (dimensions, values, attributes) in variables.items()
+    }
 
 
 def join(parts: Sequence[Variables]) -> Variables:

@@ -1,7 +1,9 @@
 """What a sweep varies: a key of the scenario and the values that it takes."""
 
+import json
 import re
 import tomllib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,27 +16,42 @@ _NUMBER = r"[-+0-9.eE_]+"
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):([0-9]+)(log)?")
 
 
+MOST = 100_000  # values of one key
+
+
 @dataclass(frozen=True)
 class Sweep:
     """One swept key.
 
     Args:
         key: dotted, as in :func:`gne_mj.scenario.load_scenario`.
-        values: numbers, words or lists; all different.
+        values: numbers, words, lists or tables, as TOML has them; all different. NumPy's numbers
+            and arrays become Python's.
 
     Raises:
-        InvalidInput: no values, or one of them twice.
+        InvalidInput: no values, too many, one of them twice, or one that no scenario can hold.
     """
 
     key: str
     values: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        if not self.values:
-            raise InvalidInput(f"--sweep {self.key}", "nothing", "it needs at least one value")
-        for at, value in enumerate(self.values):
-            if value in self.values[:at]:
-                raise InvalidInput(f"--sweep {self.key}", value, "every value may occur once only")
+        option = f"--sweep {self.key}"
+        given: Any = self.values
+        if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+            raise InvalidInput(option, given, "its values must be a list")
+        values = tuple(_plain(option, value) for value in given)
+        if not values:
+            raise InvalidInput(option, "nothing", "it needs at least one value")
+        if len(values) > MOST:
+            raise InvalidInput(option, f"{len(values)} values", f"it may have {MOST} at most")
+        seen = set()
+        for value in values:
+            text = json.dumps(value, sort_keys=True)
+            if text in seen:
+                raise InvalidInput(option, value, "every value may occur once only")
+            seen.add(text)
+        object.__setattr__(self, "values", values)
 
     @property
     def labels(self) -> list[Any]:
@@ -62,6 +79,21 @@ def parse_sweep(text: str) -> Sweep:
         return Sweep(key, tuple(parse_value(part.strip()) for part in given.split(",")))
 
 
+def _plain(option: str, value: Any) -> Any:
+    """A value as JSON has it."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(option, each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(option, each) for key, each in value.items()}
+    if isinstance(value, float) and not np.isfinite(value):
+        raise InvalidInput(option, value, "it must be finite")
+    if not isinstance(value, bool | int | float | str):
+        raise InvalidInput(option, str(value), "it must be a number, a word, a list or a table")
+    return value
+
+
 def _range(
     key: str, given: str, start: str, end: str, count: str, log: str | None
 ) -> tuple[Any, ...]:
@@ -71,6 +103,10 @@ def _range(
         raise InvalidInput(f"--sweep {key}", given, "FROM and TO must be numbers") from None
     if log and not min(ends) > 0:
         raise InvalidInput(f"--sweep {key}", given, "a logarithmic range must be positive")
+    if not all(np.isfinite(ends)):
+        raise InvalidInput(f"--sweep {key}", given, "FROM and TO must be finite")
+    if int(count) > MOST:
+        raise InvalidInput(f"--sweep {key}", given, f"it may have {MOST} values at most")
     if int(count) < 2 and ends[0] != ends[1]:
         raise InvalidInput(f"--sweep {key}", given, "a range has at least two values")
     spaced = np.geomspace(*ends, int(count)) if log else np.linspace(*ends, int(count))

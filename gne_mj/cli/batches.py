@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 def batch(
     scenario: Annotated[
         str | None,
-        typer.Argument(help="As for `run`; with --resume it may be left out."),
+        typer.Argument(
+            help="A shipped scenario or a .toml file; with --resume it may be left out."
+        ),
     ] = None,
     sweep: Annotated[
         list[str] | None,
@@ -53,12 +55,15 @@ def batch(
     ] = "summaries",
     seed: Annotated[int, typer.Option("--seed", help="From which all starts' seeds follow.")] = 0,
     spread: Annotated[
-        float, typer.Option("--spread", help="How far towards the boundary starts lie, 0 to 1.")
+        float,
+        typer.Option("--spread", help="How far towards the boundary starts lie, between 0 and 1."),
     ] = 0.9,
     chunk: Annotated[
         int, typer.Option("--chunk", help="Runs that are stored together; 0: chosen.")
     ] = 0,
-    threads: Annotated[int, typer.Option("--threads", help="0: one a processor.")] = 0,
+    threads: Annotated[
+        int, typer.Option("--threads", help="Native threads; 0 for one a processor.")
+    ] = 0,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what is in DIR already.")
     ] = False,
@@ -78,16 +83,20 @@ def batch(
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
     that was stopped or killed goes on with --resume, and ends as if it had not been.
     """
-    from gne_mj.batches import Store, connected, execute, make_plan, parse_sweep
+    from gne_mj.batches import Store, connected, execute, make_plan, parse_record, parse_sweep
+    from gne_mj.batches.report import write_report
     from gne_mj.errors import InvalidInput
     from gne_mj.simulation import interruption
 
-    if threads < 0:
-        raise InvalidInput("--threads", threads, "it must not be negative")
+    changed = bool(sweep or set_ or system or runs or seed or chunk)
+    if scenario is None and (changed or record != "summaries" or spread != 0.9):
+        raise InvalidInput(
+            "SCENARIO", None, "a scenario must be named, unless --resume --out DIR is all there is"
+        )
     with connected(cluster) as client, interruption() as stop:
         if scenario is None:
             if not resume:
-                raise InvalidInput("SCENARIO", None, "a scenario must be named")
+                raise InvalidInput("SCENARIO", None, "a scenario must be named, or --resume")
             store = Store.continued(out)
         else:
             plan = make_plan(
@@ -98,7 +107,7 @@ def batch(
                 starts=runs,
                 seed=seed,
                 spread=spread,
-                record=_record(record),
+                record=parse_record(record),
                 chunk=chunk,
             )
             goes_on = resume and out.exists()
@@ -109,7 +118,9 @@ def batch(
             )
         done = now.done == now.total
         if now.done:
-            _tell(store, now, as_json)
+            _print(store, now, write_report(store), as_json)
+        elif as_json:
+            print(json.dumps({"runs": now.total, "done": 0, "statuses": {}, "combinations": []}))
     if not done and not as_json:
         print(
             f"\nstopped: {now.done} of {now.total} runs are stored; go on with"
@@ -137,24 +148,6 @@ def batch_report(
     kinds = formats(format_)
     store = Store.open(folder)
     _print(store, Progress.of(store), write_report(store, out, kinds), as_json)
-
-
-def _record(text: str) -> int:
-    from gne_mj.errors import InvalidInput
-
-    words = {"summaries": 0, "all": 1}
-    if text in words:
-        return words[text]
-    if text.isdecimal() and int(text) > 0:
-        return int(text)
-    raise InvalidInput("--record", text, "it must be 'summaries', 'all' or a whole number from 1")
-
-
-def _tell(store: "Store", now: "Progress", as_json: bool) -> None:
-    """Write the report beside the runs, and print its table."""
-    from gne_mj.batches.report import write_report
-
-    _print(store, now, write_report(store), as_json)
 
 
 def _print(store: "Store", now: "Progress", paths: list[Path], as_json: bool) -> None:

@@ -1,6 +1,7 @@
 """Commands that run scenarios, draw stored runs and list what is shipped."""
 
 import json
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -136,9 +137,14 @@ def _source(
         raise InvalidInput("--index", index, "it must say which run of the batch")
     from gne_mj.batches import Store
 
-    tables: dict[str, Any] = json.loads(
-        Store.open(folder).plan.alone(index).model_dump_json(exclude_none=True)
-    )
+    store = Store.open(folder)
+    for difference in store.check_files():
+        print(
+            f"gne-mj: warning: {difference} since the batch was run, so that the last bits may"
+            " differ",
+            file=sys.stderr,
+        )
+    tables: dict[str, Any] = json.loads(store.plan.alone(index).model_dump_json(exclude_none=True))
     return tables
 
 

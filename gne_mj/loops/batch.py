@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from gne_mj.loops.base import ClosedLoop, Samples
 from gne_mj.table import Table
 
+SLICE = 50  # rows of a run alone between looks at the user's wishes
+
 
 @dataclass(frozen=True)
 class Case:
@@ -98,10 +100,11 @@ class EachLoop(BatchLoop):
         whole, rest = divmod(span.steps, span.every)
 
         def one(case: Case) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]] | None:
-            if stopped():
-                return None
-            loop = case.loop()
-            parts = [loop.advance(whole, span.every)]
+            loop, parts = case.loop(), []
+            for first in range(0, whole, SLICE):
+                if stopped():
+                    return None
+                parts.append(loop.advance(min(SLICE, whole - first), span.every))
             if rest:
                 parts.append(loop.advance(1, rest))
             done = sum(len(part.input) for part in parts)

@@ -9,27 +9,19 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, workers
 from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, MONITOR, RECORDER, STATES, STEP
 from gne_mj.loops.ode import build, room_length, scratch_width
-from gne_mj.loops.recorder import FIRST, HEADER, Recorder
-from gne_mj.native import call_loop, compiled, copy
+from gne_mj.loops.recorder import FIRST, Recorder
+from gne_mj.native import call_loop, compiled
 from gne_mj.plants.agents import Agents
-from gne_mj.table import integers_at
 
 PIECE = 8  # runs that a thread takes at a time
+STRIDE = 20_000  # steps of each of them between looks at the user's wishes
 
 
 @compiled
-def _run_each(
-    advance, tables, blocks, starts, monitors, room, address, state_at, monitor_at, steps, last
-):  # fmt: skip
-    """Run so many runs one after the other in the one room at ``address``."""
+def _advance_each(advance, tables, rooms, steps):
+    """Move every run on, one after the other; addresses of tables and rooms."""
     for run in range(len(tables)):
-        room[:] = 0.0
-        room[RECORDER] = blocks[run]
-        copy(starts[run], room[state_at : state_at + starts.shape[1]])
-        call_loop(advance, tables[run], address, steps)
-        integers_at(blocks[run], HEADER)[FIRST] = last
-        call_loop(advance, tables[run], address, 0)
-        copy(room[monitor_at : monitor_at + monitors.shape[1]], monitors[run])
+        call_loop(advance, tables[run], rooms[run], steps)
 
 
 class OdeBatch(BatchLoop):
@@ -70,14 +62,19 @@ class OdeBatch(BatchLoop):
         state_at = length - starts.shape[1] - 5 * scratch_width(sizes)
 
         def piece(first: int) -> bool:
-            if stopped():
-                return False
-            room = np.zeros(length)
             part = slice(first, first + PIECE)
-            _run_each(
-                self._advance.address, addresses[part], recorder.addresses[part], starts[part],
-                monitors[part], room, room.ctypes.data, state_at, MONITOR, span.steps, span.last,
-            )  # fmt: skip
+            rooms = np.zeros((len(addresses[part]), length))
+            rooms[:, RECORDER] = recorder.addresses[part]
+            rooms[:, state_at : state_at + starts.shape[1]] = starts[part]
+            at = rooms.ctypes.data + 8 * length * np.arange(len(rooms))
+            for done in range(0, span.steps, STRIDE):
+                if stopped():
+                    return False
+                steps = min(STRIDE, span.steps - done)
+                _advance_each(self._advance.address, addresses[part], at, steps)
+            recorder.blocks[part, FIRST] = span.last
+            _advance_each(self._advance.address, addresses[part], at, 0)
+            monitors[part] = rooms[:, MONITOR : MONITOR + monitors.shape[1]]
             return True
 
         with workers(self._threads) as pool:

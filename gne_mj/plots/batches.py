@@ -34,43 +34,65 @@ _PANELS = (
 )
 
 
-def save_batch(runs: "xarray.Dataset", file: Path) -> None:
+def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
     """Draw a batch's summary: a panel for each figure, and one for the share of runs that left.
 
     Over the swept key with most numbers runs the horizontal axis; up to five combinations of the
     others get a line each, and more of them are put together. Lines are medians, bands hold 90% of
-    the runs, small marks are the worst run. Without swept numbers there are histograms.
+    the runs, dots are the worst run. Runs that did not settle, or left, count as slower, or
+    farther, than all others, so that a line ends where they are in the middle. Without swept
+    numbers the combinations stand side by side; without any there are histograms.
+
+    Args:
+        runs: figures of the runs, one each.
+        file: to write.
+        kind: of file: png, pdf or svg.
     """
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    runs = runs[[*(panel.name for panel in _PANELS), "status"]].load()
-    runs = runs.isel(run=np.flatnonzero(runs["status"].notnull().to_numpy()))
     key = _horizontal(runs)
+    lines = _groups(runs, key)
     left = ~np.isin(runs["status"].to_numpy(), ["converged", "completed"])
     panels = len(_PANELS) + bool(left.any())
     with plt.rc_context(STYLE):
         figure, grid = plt.subplots(
-            1, panels, figsize=(2.9 * panels, 2.9), layout="constrained", squeeze=False
-        )
-        lines = _groups(runs, key)
+            1, panels, figsize=(2.9 * panels, 2.9), layout="constrained", squeeze=False,
+            sharex=key is not None,
+        )  # fmt: skip
         for axes, panel in zip(grid[0], _PANELS, strict=False):
             unit = runs[panel.name].attrs.get("units", "")
             label = f"{panel.title} ({unit})" if unit else panel.title
-            if key is None:
-                _histogram(axes, runs[panel.name].to_numpy(), label)
-            else:
+            if key is not None:
                 _over(axes, runs, key, panel, lines)
-                axes.set_ylabel(label)
+            elif len(lines) > 1:
+                _beside(axes, runs[panel.name].to_numpy(), panel, lines)
+            else:
+                _histogram(axes, runs[panel.name].to_numpy(), label)
+                continue
+            axes.set_ylabel(label)
         if left.any():
             _share(grid[0, -1], runs, key, left, lines)
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        if len(labels) > 1:
-            figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5))
-        figure.savefig(file, dpi=200)
+        if key is not None:
+            for axes in grid[0]:
+                axes.set_xlabel(key)
+                _mark(axes, runs[key].to_numpy())
+            handles, labels = grid[0, 0].get_legend_handles_labels()
+            if len(labels) > 1:
+                figure.legend(
+                    handles, labels, loc="outside lower center", ncols=min(len(labels), 5)
+                )
+            elif _others(runs, key):
+                figure.supxlabel(f"all values of {', '.join(_others(runs, key))}", fontsize=7.5)
+        figure.savefig(file, dpi=200, format=kind)
     plt.close(figure)
+
+
+def _others(runs: "xarray.Dataset", key: str | None) -> list[str]:
+    """Swept keys but this one."""
+    return [other for other in runs.attrs["swept"] if other != key]
 
 
 def _horizontal(runs: "xarray.Dataset") -> str | None:
@@ -87,7 +109,7 @@ def _horizontal(runs: "xarray.Dataset") -> str | None:
 def _groups(runs: "xarray.Dataset", key: str | None) -> list[tuple[str, NDArray[np.bool_]]]:
     """The lines: what each is of, and which runs are its."""
     everyone = np.ones(runs.sizes["run"], dtype=bool)
-    others = [other for other in runs.attrs["swept"] if other != key]
+    others = _others(runs, key)
     values = list(zip(*(runs[other].to_numpy().tolist() for other in others), strict=True))
     distinct = list(dict.fromkeys(values))
     if not others or len(distinct) > LINES:
@@ -106,6 +128,18 @@ def _word(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def _spread(values: NDArray[np.float64], panel: _Figure) -> tuple[float, float, float, float]:
+    """5%, 50% and 95% of the runs, and the worst; not a number where a run has no figure."""
+    if len(values) == 0:
+        return np.nan, np.nan, np.nan, np.nan
+    known = np.where(np.isnan(values), -np.inf if panel.worst == "min" else np.inf, values)
+    low, middle, high = np.quantile(known, [0.05, 0.5, 0.95], method="inverted_cdf")
+    worst = known.min() if panel.worst == "min" else known.max()
+    low, middle, high, worst = (float(v) if np.isfinite(v) else np.nan
+                                for v in (low, middle, high, worst))  # fmt: skip
+    return low, middle, high, worst
+
+
 def _over(
     axes: "Axes",
     runs: "xarray.Dataset",
@@ -114,32 +148,75 @@ def _over(
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
     swept, values = runs[key].to_numpy(), runs[panel.name].to_numpy()
-    finite = values[np.isfinite(values)]
-    axes.set_xlabel(key)
-    if len(finite) == 0:
-        _nothing(axes)
-        return
     for number, (label, mine) in enumerate(lines):
         xs = np.unique(swept[mine])
-        table = np.full((len(xs), 4), np.nan)
-        for row, x in enumerate(xs):
-            found = values[mine & (swept == x)]
-            found = found[np.isfinite(found)]
-            if len(found):
-                worst = found.min() if panel.worst == "min" else found.max()
-                table[row] = *np.quantile(found, [0.05, 0.5, 0.95]), worst
+        table = np.array([_spread(values[mine & (swept == x)], panel) for x in xs])
+        low, middle, high, worst = table.T
         style = line_style(number)
-        axes.plot(xs, table[:, 1], label=label or None, **style)
-        axes.fill_between(
-            xs, table[:, 0], table[:, 2], color=style["color"], alpha=0.12, linewidth=0
-        )
-        axes.plot(xs, table[:, 3], ".", color=style["color"], markersize=3)
+        axes.plot(xs, middle, label=label or None, **style)
+        top = _top(low, high, values)
+        axes.fill_between(xs, low, top, color=style["color"], alpha=0.12, linewidth=0)
+        axes.plot(xs, worst, ".", color=style["color"], markersize=3)
+    _scale(axes, values, panel)
+
+
+def _top(low: Any, high: Any, values: NDArray[np.float64]) -> Any:
+    """Where a band ends: at the highest of all figures where runs at its end have none."""
+    return np.where(np.isnan(high) & ~np.isnan(low), np.nanmax(values, initial=0.0), high)
+
+
+def _beside(
+    axes: "Axes",
+    values: NDArray[np.float64],
+    panel: _Figure,
+    lines: list[tuple[str, NDArray[np.bool_]]],
+) -> None:
+    """One bar for each combination, where there are words in place of numbers."""
+    for number, (_, mine) in enumerate(lines):
+        low, middle, high, worst = _spread(values[mine], panel)
+        colour, top = line_style(number)["color"], _top(low, high, values)
+        axes.plot([number, number], [low, top], color=colour, linewidth=6, alpha=0.3)
+        axes.plot(number, middle, "_", color=colour, markersize=14, markeredgewidth=2)
+        axes.plot(number, worst, ".", color=colour, markersize=5)
+    _name(axes, lines)
+    _scale(axes, values, panel)
+
+
+def _name(axes: "Axes", lines: list[tuple[str, NDArray[np.bool_]]]) -> None:
+    """The combinations along the horizontal axis."""
+    words = [label.replace(", ", "\n").replace(" = ", "\n") for label, _ in lines]
+    axes.set_xticks(range(len(lines)), words, fontsize=7)
+    axes.set_xlim(-0.6, len(lines) - 0.4)
+
+
+def _scale(axes: "Axes", values: NDArray[np.float64], panel: _Figure) -> None:
+    finite = values[np.isfinite(values)]
+    if len(finite) == 0:
+        axes.text(0.5, 0.5, "no run has one", ha="center", transform=axes.transAxes)
+        axes.set_yticks([])
+        return
     if panel.worst == "min" and finite.min() < 0.0:  # beyond the bound
         axes.axhline(0.0, color=_RED, linewidth=0.9, linestyle=(0, (4, 3)))
+    if panel.log and _is_log(finite):
+        from matplotlib.ticker import NullFormatter
+
+        axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _mark(axes: "Axes", swept: NDArray[np.float64]) -> None:
+    """The horizontal axis over swept numbers."""
+    from matplotlib.ticker import NullFormatter
+
+    xs = np.unique(swept)
     if _is_log(swept):
         axes.set_xscale("log")
-    if panel.log and _is_log(finite):
-        axes.set_yscale("log")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        ratio = (xs[-1] / xs[0]) ** 0.03
+        axes.set_xlim(xs[0] / ratio, xs[-1] * ratio)
+    else:
+        margin = 0.03 * (xs[-1] - xs[0])
+        axes.set_xlim(xs[0] - margin, xs[-1] + margin)
 
 
 def _share(
@@ -150,19 +227,17 @@ def _share(
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
     axes.set_ylabel("share of runs that left the set")
-    axes.set_ylim(0.0, 1.0)
+    axes.set_ylim(-0.03, 1.03)
     if key is None:
-        names = [label or "all" for label, _ in lines]
-        axes.bar(names, [left[mine].mean() for _, mine in lines], color=_RED, width=0.5)
+        for number, (_, mine) in enumerate(lines):
+            axes.bar(number, left[mine].mean(), color=line_style(number)["color"], width=0.5)
+        _name(axes, lines if len(lines) > 1 else [("all", left)])
         return
     swept = runs[key].to_numpy()
     for number, (_, mine) in enumerate(lines):
         xs = np.unique(swept[mine])
         shares = [left[mine & (swept == x)].mean() for x in xs]
         axes.plot(xs, shares, marker=".", **line_style(number))
-    if _is_log(swept):
-        axes.set_xscale("log")
-    axes.set_xlabel(key)
 
 
 def _histogram(axes: "Axes", values: NDArray[np.float64], label: str) -> None:
@@ -170,14 +245,9 @@ def _histogram(axes: "Axes", values: NDArray[np.float64], label: str) -> None:
     if len(values):
         axes.hist(values, bins=min(40, max(5, len(values) // 5)), color=line_style(0)["color"])
     else:
-        _nothing(axes)
+        axes.text(0.5, 0.5, "no run has one", ha="center", transform=axes.transAxes)
     axes.set_xlabel(label)
     axes.set_ylabel("runs")
-
-
-def _nothing(axes: "Axes") -> None:
-    axes.text(0.5, 0.5, "no run has one", ha="center", transform=axes.transAxes)
-    axes.set(xticks=[], yticks=[])
 
 
 def _is_log(values: NDArray[np.float64]) -> bool:
