@@ -507,8 +507,13 @@ class System:
             ),
         )  # fmt: skip
 
-    def mujoco_plant(self, clock: Clock) -> "MujocoPlant | MjcfPlant":
-        """The fleet, reset to the start, with room for this system's loop."""
+    def mujoco_plant(self, clock: Clock, *, decorated: bool = True) -> "MujocoPlant | MjcfPlant":
+        """The fleet, reset to the start, with room for this system's loop.
+
+        Args:
+            clock: how to step.
+            decorated: keep what is for the eye only; MJCF robots keep all in any case.
+        """
         from gne_mj.loops.mujoco import room
         from gne_mj.plants.mjcf_fleet import MjcfPlant
         from gne_mj.plants.mujoco import MujocoPlant
@@ -519,8 +524,9 @@ class System:
         timestep = clock.timestep
         if not isinstance(self.agents, MjcfRobots):
             fleet = MujocoPlant(
-                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
-            )
+                self.agents, timestep, self.integrator, userdata=userdata, memory=memory,
+                decorated=decorated,
+            )  # fmt: skip
             fleet.reset(self.state)
             return fleet
         try:

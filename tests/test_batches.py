@@ -193,7 +193,8 @@ def test_robots_of_every_row_are_those_that_composing_anew_would_make():
     for run in range(0, plan.runs, 5):
         scenario = plan.alone(run)
         numbers = scenario.system_objects()[0].agents.parameters
-        model = compile_model(compose(numbers), timestep=0.01, integrator="RK4")
+        lane = compose(numbers, decorated=False)
+        model = compile_model(lane, timestep=0.01, integrator="RK4")
         found = batch.get_model(run)
         for field in (
             "body_mass", "body_subtreemass", "body_inertia", "dof_M0", "tendon_stiffness",

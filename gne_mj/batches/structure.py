@@ -46,7 +46,7 @@ class Structure:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco_batch import MujocoBatch
 
-            self._plant = system.mujoco_plant(clock)
+            self._plant = system.mujoco_plant(clock, decorated=False)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
             alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
             self.loop = MujocoBatch(self._plant, *kernels, faulty, 1 if alone else threads, room)
