@@ -6,16 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import verdicts
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
 from gne_mj.theory import Theorem
+from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
 
-SUCCESSES = ("converged", "completed")
-SETTLED = 0.02  # of the initial distance
-TAIL = 0.05  # of the run, over which "converged" must hold
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
 
@@ -94,6 +93,7 @@ def certify_run(
         interrupted: the user stopped it.
     """
     distance = np.max(np.abs(action - system.equilibrium.action), axis=1)
+    (settled,) = verdicts.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
     if between and monitor[watch.EXIT] == watch.INSIDE:
@@ -108,7 +108,7 @@ def certify_run(
         worst_gap=_worst_gap(system, monitor),
         equilibrium=_equilibrium(system, action[-1]),
         epsilon=_epsilon(system, system.equilibrium),
-        settling_time=_settling_time(time, distance),
+        settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor),
         actuators=_actuators(system, monitor),
         exit=_exit_report(system, monitor),
@@ -133,11 +133,12 @@ def _status(
     end = float(time[-1])
     if interrupted:
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
-    late = distance[time >= end - TAIL * duration - 1e-9]
-    if np.max(late) <= tolerance:
+    (tail,) = verdicts.tail_distance(time, distance[None], duration)
+    (word,) = verdicts.status(monitor[None], np.array([tail]), tolerance)
+    if word == "converged":
         return (
             "converged",
-            f"within {np.max(late):.2g} of the penalised equilibrium over the last"
+            f"within {tail:.2g} of the penalised equilibrium over the last"
             f" {TAIL * duration:g} s (tolerance {tolerance:g})",
         )
     return (
@@ -155,26 +156,26 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     value = float(monitor[watch.EXIT_VALUE])
     code = int(monitor[watch.EXIT])
     if code == watch.DIVERGED:
-        return "diverged", f"an output or input is no longer a usable number ({value:g}) {at}"
+        return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
     constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
     if monitor[watch.EXIT_BETWEEN] > 0:
         at += ", between two control instants"
     if code == watch.LEFT_SET:
         return (
-            "left_feasible_set",
+            EXITS[code],
             f"constraint '{constraint}' was violated {at}: g = {value:.6g}, not negative",
         )
     agent = int(monitor[watch.EXIT_AGENT]) + 1
     if agent == 0:
         tightened = np.any(game.margins)
         return (
-            "estimate_left_feasible_set",
+            EXITS[code],
             f"the measured profile violated constraint '{constraint}'"
             f"{', tightened,' if tightened else ''} {at}: g{' + t' if tightened else ''} ="
             f" {value:.6g}, not negative, so the law has no action there",
         )
     return (
-        "estimate_left_feasible_set",
+        EXITS[code],
         f"agent {agent}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g}, not"
         " negative, so its law has no action there (a smaller epsilon or gain keeps estimates"
         " closer to the actions)",
@@ -229,16 +230,8 @@ def _worst(
     system: System, monitor: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each constraint's greatest value and when, that at an exit included."""
-    p = system.game.constraints_count
-    at = int(watch.worst_at(p))
-    worst, when = monitor[at : at + p].copy(), monitor[at + p : at + 2 * p].copy()
-    if monitor[watch.STARTED] == 0.0:
-        worst[:] = -np.inf
-    if monitor[watch.EXIT] == watch.LEFT_SET:
-        index = int(monitor[watch.EXIT_CONSTRAINT])
-        if monitor[watch.EXIT_VALUE] > worst[index]:
-            worst[index], when[index] = monitor[watch.EXIT_VALUE], monitor[watch.EXIT_TIME]
-    return worst, when
+    worst, when = verdicts.worst_constraints(monitor[None], system.game.constraints_count)
+    return worst[0], when[0]
 
 
 def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
@@ -309,15 +302,6 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def _settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> float | None:
-    outside = np.flatnonzero(~(distance <= SETTLED * distance[0]))
-    if len(outside) == 0:
-        return float(time[0])
-    if outside[-1] == len(time) - 1:
-        return None
-    return float(time[outside[-1] + 1])
-
-
 def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
     unhindered = bool(monitor[watch.STARTED]) and not monitor[watch.SATURATED]
@@ -349,9 +333,7 @@ def _limit_then(system: System, channel: int, time: float) -> float:
 
 def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     m, p = system.game.actions, system.game.constraints_count
-    at = int(watch.inputs_at(p))
-    peak, when, square, energy = monitor[at : at + 4 * m].reshape(4, m)
-    duration = float(monitor[watch.TIME])
+    peak, when, rms, energy = (each[0] for each in verdicts.inputs(monitor[None], p, m))
     agent = system.game.agent_of_action
     largest = int(np.argmax(peak))
     limits = system.agents.input_limit
@@ -360,7 +342,7 @@ def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "peak_agent": int(agent[largest]) + 1,
         "peak_time": float(when[largest]),
         "peaks": peak.tolist(),
-        "rms": np.sqrt(square / duration).tolist() if duration > 0 else [0.0] * m,
+        "rms": rms.tolist(),
         "energy": energy.tolist(),
         "limits": None if np.all(np.isinf(limits)) else limits.tolist(),
         "saturated": None,

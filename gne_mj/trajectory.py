@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.certificate import SUCCESSES, Certificate
+from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
+from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray

@@ -497,7 +497,7 @@ def test_starts_of_ones_own():
     [
         (("osnr",), {}, "systems.channels.plant.engine: got 'ode', but"),
         (("disturbed",), {}, "systems.robots.faults: got '4 faults', but"),
-        (("paper",), {}, "system: nothing is given, but choose from robots, channels"),
+        (("paper",), {}, "system: nothing is given, but name one of robots, channels"),
         (("velocity-sync", None, "robot"), {}, "got 'robot', but did you mean 'robots'?"),
         (("velocity-sync",), {"information": "parital"}, "did you mean 'partial'?"),
         (("velocity-sync",), {"information": "partial"}, "graph: nothing is given, but"),

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.sweep import Sweep
-from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
+from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.scenario_tables import SystemTable
 from gne_mj.starts import interior_profile, random_starts
@@ -302,12 +302,7 @@ def make_plan(
         InvalidInput: names the key, the value and what would be right.
     """
     scenario = load_scenario(source, changes)
-    names = list(scenario.systems)
-    if system is None and len(names) > 1:
-        raise InvalidInput("--system", None, f"name one of {', '.join(names)}")
-    name = system or names[0]
-    if name not in names:
-        raise InvalidInput("--system", system, nearest(name, names))
+    name = scenario.name_of(system)
     one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
     tables = json.loads(one.model_dump_json(exclude_none=True))
     return Plan(scenario=tables, sweeps=tuple(sweeps), **options)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.store import Store
+from gne_mj.verdicts import SUCCESSES
 
 
 @dataclass(frozen=True)
@@ -31,4 +32,4 @@ class Progress:
 
 def count_left(statuses: NDArray[np.str_]) -> int:
     """How many of these runs did not stay inside to the end; those not run yet do not count."""
-    return int(np.sum(~np.isin(statuses, ["", "converged", "completed"])))
+    return int(np.sum(~np.isin(statuses, ["", *SUCCESSES])))

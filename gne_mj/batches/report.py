@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,18 +11,32 @@ import numpy as np
 from gne_mj import plots
 from gne_mj.batches.store import Store
 from gne_mj.errors import InvalidInput
+from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-STAYED = ("converged", "completed")
+
+@dataclass(frozen=True)
+class Report:
+    """What was written of a batch.
+
+    Attributes:
+        runs: what is one number (or word) a run, of the runs that are stored.
+        table: one row for each combination, see :func:`combinations`.
+        paths: of the files.
+    """
+
+    runs: "xarray.Dataset"
+    table: "pandas.DataFrame"
+    paths: tuple[Path, ...]
 
 
 def write_report(
     store: Store, folder: Path | None = None, formats: tuple[str, ...] = ("png",)
-) -> list[Path]:
-    """Write ``combinations.csv``, ``runs.csv`` and the figure ``summary``; returns their paths.
+) -> Report:
+    """Write ``combinations.csv``, ``runs.csv`` and the figure ``summary``.
 
     Args:
         store: of the batch, complete or not.
@@ -36,17 +51,16 @@ def write_report(
     if runs.sizes["run"] == 0:
         raise InvalidInput("DIR", str(store.folder), "it must hold at least one run")
     target.mkdir(parents=True, exist_ok=True)
-    tables = {"combinations.csv": combinations(runs), "runs.csv": runs.to_dataframe()}
-    paths = []
-    for name, table in tables.items():
+    table, paths = combinations(runs), []
+    for name, rows in (("combinations.csv", table), ("runs.csv", runs.to_dataframe())):
         with _whole(target / name) as path:
-            table.to_csv(path, index=name == "runs.csv")
+            rows.to_csv(path, index=name == "runs.csv")
         paths.append(target / name)
     for kind in formats:
         with _whole(target / f"summary.{kind}") as path:
             plots.save_batch(runs, path, kind)
         paths.append(target / f"summary.{kind}")
-    return paths
+    return Report(runs, table, tuple(paths))
 
 
 @contextmanager
@@ -85,7 +99,7 @@ def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
     rows = []
     for values, own in groups:
         row: dict[str, Any] = dict(zip(keys, values, strict=True))
-        stayed = own["status"].isin(STAYED)
+        stayed = own["status"].isin(SUCCESSES)
         row |= {
             "runs": len(own),
             "left": int((~stayed).sum()),

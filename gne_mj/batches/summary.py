@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import verdicts
 from gne_mj.batches.plan import Combination
-from gne_mj.certificate import SETTLED, TAIL
+from gne_mj.errors import InfeasibleStart
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Outcome, Span
@@ -15,13 +16,6 @@ from gne_mj.trajectory import axis_of, variables_of
 
 # name -> (dimensions, values, attributes); the first dimension is always "run"
 Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]
-
-STATUS = "<U28"  # long enough for the longest status
-_EXITS = {
-    watch.LEFT_SET: "left_feasible_set",
-    watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
-    watch.DIVERGED: "diverged",
-}
 
 
 def columns_of(combination: Combination, span: Span, outcome: Outcome, record: int) -> Variables:
@@ -41,20 +35,13 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
     y = samples.state[:, :, :, system.agents.kind.OUTPUT]
     distance = np.max(np.abs(y - system.equilibrium.action), axis=2)
     left = monitors[:, watch.EXIT] != watch.INSIDE
-    late = np.max(distance[:, time >= time[-1] - TAIL * clock.duration - 1e-9], axis=1)
-    status = np.where(late <= combination.scenario.simulation.tolerance, "converged", "completed")
-    for code, name in _EXITS.items():
-        status = np.where(monitors[:, watch.EXIT] == code, name, status)
-    worst, when = _worst(monitors, p)
+    tail = verdicts.tail_distance(time, distance, clock.duration)
+    status = verdicts.status(monitors, tail, combination.scenario.simulation.tolerance)
+    worst, when = verdicts.worst_constraints(monitors, p)
     tightest = np.argmax(worst, axis=1)
     rows = np.arange(runs)
-    at = int(watch.inputs_at(p))
-    peak, peak_time, square, energy = np.moveaxis(
-        monitors[:, at : at + 4 * m].reshape(runs, 4, m), 1, 0
-    )
+    inputs = verdicts.inputs(monitors, p, m)
     seen = monitors[:, watch.STARTED] > 0
-    elapsed = monitors[:, watch.TIME, None]
-    rms = np.sqrt(np.divide(square, elapsed, out=np.zeros_like(square), where=elapsed > 0))
     known = left & (monitors[:, watch.EXIT] != watch.DIVERGED)
     axis = axis_of(system)
     unit = {"units": game.action_unit}
@@ -64,7 +51,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         return np.where(condition, values, np.nan)
 
     found: Variables = {
-        "status": (("run",), status.astype(STATUS), {"long_name": "how the run ended"}),
+        "status": (("run",), status, {"long_name": "how the run ended"}),
         "least_margin": (
             ("run",),
             where(seen, -worst[rows, tightest]),
@@ -79,7 +66,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         "margin": (("run", "constraint"), -worst, {"long_name": "least -g of each constraint"}),
         "settling_time": (
             ("run",),
-            _settling(time, distance),
+            verdicts.settling_time(time, distance),
             {"long_name": "until max |y - y*| stays within 2% of its start", **second},
         ),
         "final_error": (
@@ -105,10 +92,18 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
             where(left, 1.0 - monitors[:, watch.EXIT_BETWEEN]),
             {"long_name": "1: seen at a control instant, 0: between two"},
         ),
-        "peak_input": (("run",), np.max(peak, axis=1), {"units": system.agents.kind.INPUT_UNIT}),
-        "peak_input_time": (("run",), peak_time[rows, np.argmax(peak, axis=1)], second),
-        "rms_input": (("run", axis), rms, {"units": system.agents.kind.INPUT_UNIT}),
-        "energy": (("run", axis), energy, {"long_name": "integral of u y"}),
+        "peak_input": (
+            ("run",),
+            np.max(inputs.peak, axis=1),
+            {"units": system.agents.kind.INPUT_UNIT},
+        ),
+        "peak_input_time": (
+            ("run",),
+            inputs.peak_time[rows, np.argmax(inputs.peak, axis=1)],
+            second,
+        ),
+        "rms_input": (("run", axis), inputs.rms, {"units": system.agents.kind.INPUT_UNIT}),
+        "energy": (("run", axis), inputs.energy, {"long_name": "integral of u y"}),
         "saturated_time": (
             ("run",),
             where(monitors[:, watch.SATURATED] > 0, monitors[:, watch.SATURATED_TIME]),
@@ -144,7 +139,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
 
 def refused_columns(runs: int) -> Variables:
     """Of runs that cannot begin, since their start is not inside."""
-    return {"status": (("run",), np.full(runs, "infeasible_start", dtype=STATUS), {})}
+    return {"status": (("run",), np.full(runs, InfeasibleStart.status, dtype=verdicts.STATUS), {})}
 
 
 def span_of(combination: Combination) -> Span:
@@ -186,26 +181,6 @@ def join(parts: Sequence[Variables]) -> Variables:
         ]
         joined[name] = (dimensions, np.concatenate(pieces), attributes)
     return joined
-
-
-def _worst(monitors: NDArray[np.float64], p: int) -> tuple[NDArray[np.float64], ...]:
-    """Each constraint's greatest value and when, (runs, p), that at an exit included."""
-    at = int(watch.worst_at(p))
-    worst, when = monitors[:, at : at + p].copy(), monitors[:, at + p : at + 2 * p].copy()
-    worst[monitors[:, watch.STARTED] == 0.0] = -np.inf
-    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET):
-        index, value = int(monitors[run, watch.EXIT_CONSTRAINT]), monitors[run, watch.EXIT_VALUE]
-        if value > worst[run, index]:
-            worst[run, index], when[run, index] = value, monitors[run, watch.EXIT_TIME]
-    return worst, when
-
-
-def _settling(time: NDArray[np.float64], distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(runs,) as in a certificate; not a number where a run has not settled."""
-    outside = ~(distance <= SETTLED * distance[:, :1])
-    last = outside.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
-    last = np.where(outside.any(axis=1), last, -1)
-    return np.append(time, np.nan)[last + 1]
 
 
 def _recorded(

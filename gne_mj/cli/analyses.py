@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, settings
+from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
 from gne_mj.cli.output import PREPARING, progress, results, working
 from gne_mj.cli.runs import load
 
@@ -143,15 +143,12 @@ def passivity(
     Trials last as long as the scenario, and use its step and half of it; input limits and the law
     do not matter here. That no violation is found is no proof.
     """
-    from gne_mj.errors import InvalidInput, nearest
     from gne_mj.passivity import examine, plants_of
     from gne_mj.scenario import load_scenario
 
     loaded = load_scenario(scenario, settings(set_))
-    if system is not None and system not in loaded.systems:
-        raise InvalidInput("--system", system, nearest(system, loaded.systems))
     reports = {}
-    for name in loaded.systems if system is None else (system,):
+    for name in loaded.systems if system is None else (loaded.name_of(system),):
         with working(as_json, PREPARING):
             built = loaded.systems[name].build(name, loaded.simulation)
             reports[name] = examine(
@@ -174,9 +171,7 @@ def passivity(
 def map_(
     scenario: SCENARIO,
     set_: SET = None,
-    system: Annotated[
-        str | None, typer.Option("--system", metavar="NAME", help="Which; needed if several.")
-    ] = None,
+    system: SYSTEM = None,
     periods: Annotated[
         str, typer.Option("--periods", metavar="FROM:TO:COUNT", help="Control periods in s.")
     ] = "0.001:1:7",

@@ -21,6 +21,16 @@ OUT = Annotated[
 ]
 
 
+SYSTEM = Annotated[
+    str | None, typer.Option("--system", metavar="NAME", help="Which; needed if there are several.")
+]
+WHERE = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Where to; beside what is read if left out."),
+]
+FORMAT = Annotated[
+    list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
+]
 JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
 
 

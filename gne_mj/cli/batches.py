@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import JSON, SET, settings
+from gne_mj.cli.arguments import FORMAT, JSON, SET, SYSTEM, WHERE, formats, settings
 from gne_mj.cli.output import on_terminal
 
 if TYPE_CHECKING:
     from gne_mj.batches import Progress, Store
+    from gne_mj.batches.report import Report
 
 
 @app.command()
@@ -43,9 +44,7 @@ def batch(
         "results/batch"
     ),
     set_: SET = None,
-    system: Annotated[
-        str | None, typer.Option("--system", metavar="NAME", help="Which; needed if several.")
-    ] = None,
+    system: SYSTEM = None,
     record: Annotated[
         str,
         typer.Option(
@@ -132,42 +131,35 @@ def batch(
 @app.command(name="batch-report")
 def batch_report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `batch` wrote.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Where to; DIR if left out.")
-    ] = None,
-    format_: Annotated[
-        list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
-    ] = None,
+    out: WHERE = None,
+    format_: FORMAT = None,
     as_json: JSON = False,
 ) -> None:
     """Write a batch's tables (CSV) and its figure, whether it is complete or not."""
     from gne_mj.batches import Progress, Store
     from gne_mj.batches.report import write_report
-    from gne_mj.cli.arguments import formats
 
     kinds = formats(format_)
     store = Store.open(folder)
     _print(store, Progress.of(store), write_report(store, out, kinds), as_json)
 
 
-def _print(store: "Store", now: "Progress", paths: list[Path], as_json: bool) -> None:
-    from gne_mj.batches.report import combinations, figures_of, summary
+def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> None:
+    from gne_mj.batches.report import summary
 
-    runs = figures_of(store)
-    table = combinations(runs)
     if as_json:
-        statuses = runs["status"].to_series().value_counts()
-        report: dict[str, Any] = {
+        statuses = report.runs["status"].to_series().value_counts()
+        words: dict[str, Any] = {
             "runs": now.total,
             "done": now.done,
             "statuses": {str(name): int(count) for name, count in statuses.items()},
-            "combinations": json.loads(table.to_json(orient="records")),
+            "combinations": json.loads(report.table.to_json(orient="records")),
         }
-        print(json.dumps(report, indent=2))
+        print(json.dumps(words, indent=2))
         return
-    print("\n".join(summary(table, list(runs.attrs["swept"]))))
+    print("\n".join(summary(report.table, list(report.runs.attrs["swept"]))))
     print(f"\nruns        {store.folder / 'runs.zarr'}")
-    for path in paths:
+    for path in report.paths:
         print(f"{'figure' if path.stem == 'summary' else 'table':11} {path}")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import JSON, OUT, SET, formats, settings
+from gne_mj.cli.arguments import FORMAT, JSON, OUT, SET, WHERE, formats, settings
 from gne_mj.cli.output import PREPARING, progress, results, tell, working
 
 if TYPE_CHECKING:
@@ -69,12 +69,8 @@ def plot(
     run_folder: Annotated[
         Path, typer.Argument(metavar="RUN", help="Folder that `run --out` or `paper` wrote.")
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Where to; RUN if left out.")
-    ] = None,
-    format_: Annotated[
-        list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
-    ] = None,
+    out: WHERE = None,
+    format_: FORMAT = None,
 ) -> None:
     """Draw the figures of a stored run."""
     from gne_mj import plots

@@ -42,12 +42,7 @@ def load_environment(
     >>> timestep = environment.step(np.zeros(environment.action_spec().shape))
     """
     loaded = load_scenario(scenario, changes)
-    names = list(loaded.systems)
-    if system is None and len(names) > 1:
-        raise InvalidInput("system", None, nearest("", names))
-    name = names[0] if system is None else system
-    if name not in names:
-        raise InvalidInput("system", name, nearest(name, names))
+    name = loaded.name_of(system, "system")
     built = loaded.systems[name].build(name, loaded.simulation)
     return environment_of(built, loaded.clock(), **options)
 

@@ -15,7 +15,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
+from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, STATES, STEP
+from gne_mj.loops.recorder import Recorder
 from gne_mj.table import Table
 
 SLICE = 50  # rows of a run alone between looks at the user's wishes
@@ -79,6 +82,23 @@ class Outcome:
         """Of some runs only."""
         columns = (getattr(self.samples, each.name)[runs] for each in fields(Samples))
         return Outcome(Samples(*columns), self.monitors[runs])
+
+
+def begin(
+    cases: Sequence[Case], span: Span, faulty: bool
+) -> tuple[list[Table], NDArray[np.int64], Recorder, NDArray[np.float64]]:
+    """What a native batch begins with: tables, the sizes that all share, room for rows, monitors.
+
+    Args:
+        cases: all with a table.
+        span: of the runs.
+        faulty: whether runs record what was seen and what acted.
+    """
+    tables = [case.table for case in cases if case.table is not None]
+    sizes = tables[0].arrays[STEP]
+    m, p, states, memory = (sizes[i] for i in (ACTIONS, CONSTRAINTS, STATES, MEMORY))
+    recorder = Recorder(len(cases), span.rows, (m, states), memory, faulty, every=span.every)
+    return tables, sizes, recorder, np.zeros((len(cases), watch.length(m, p)))
 
 
 class BatchLoop(ABC):

@@ -264,7 +264,7 @@ class MujocoLoop(ClosedLoop):
         self._faulty = faults is not faultless
         data, sizes = plant.data, self._table.arrays[STEP]
         self._start = int(plant.table_arrays[SIZES][ROOM])
-        self._memory = begin(data, self._start, self._table, setup.clock.mode, memory)
+        self._memory = put_start(data, self._start, self._table, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._act = self._memory if moved else self._memory[:0]  # moved by the integrator
         self._before = np.zeros(plant.model.nq + plant.model.nv + len(self._act))
@@ -329,7 +329,7 @@ class MujocoLoop(ClosedLoop):
         return recorder
 
 
-def begin(
+def put_start(
     data: mujoco.MjData, start: int, table: Table, mode: int, memory: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Make mjData the start of a run, its room at ``start`` of userdata; returns the memory."""

@@ -10,13 +10,14 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span
-from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, MODE, MONITOR, RECORDER, STATES, STEP
-from gne_mj.loops.mujoco import begin, build
+from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin
+from gne_mj.loops.layout import MEMORY, MODE, MONITOR, RECORDER, STEP
+from gne_mj.loops.mujoco import build, put_start
 from gne_mj.loops.ode import CONTINUOUS
-from gne_mj.loops.recorder import FIRST, Recorder
+from gne_mj.loops.recorder import FIRST
 from gne_mj.plants.mujoco import ROOM, SIZES
 from gne_mj.plants.native_mujoco import callbacks, offsets
+from gne_mj.table import Table
 
 if TYPE_CHECKING:
     from gne_mj.plants.mjcf_fleet import MjcfPlant
@@ -60,19 +61,14 @@ class MujocoBatch(BatchLoop):
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
-        tables = [case.table for case in cases if case.table is not None]
-        sizes = tables[0].arrays[STEP]
-        m, p, states, memory = (sizes[i] for i in (ACTIONS, CONSTRAINTS, STATES, MEMORY))
-        recorder = Recorder(
-            len(cases), span.rows, (m, states), memory, self._faulty, every=span.every
-        )
+        tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
         self._begin(cases, tables, recorder.addresses)
-        monitors = self._userdata[: len(cases), self._start + MONITOR :]
-        monitors = monitors[:, : watch.length(m, p)]
-        remember = self._remember if sizes[MODE] == CONTINUOUS and memory else None
+        first = self._start + MONITOR
+        now = self._userdata[: len(cases), first : first + monitors.shape[1]]
+        remember = self._remember if sizes[MODE] == CONTINUOUS and sizes[MEMORY] else None
         done = 0
         while done < span.steps:
-            inside = np.flatnonzero(monitors[:, watch.EXIT] == watch.INSIDE)
+            inside = np.flatnonzero(now[:, watch.EXIT] == watch.INSIDE)
             if len(inside) == 0:
                 break
             if stopped():
@@ -82,21 +78,19 @@ class MujocoBatch(BatchLoop):
                 self._batch.step(ids=inside, nstep=stride)
             done += stride
         recorder.blocks[:, FIRST] = span.last
-        for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.INSIDE):
+        for run in np.flatnonzero(now[:, watch.EXIT] == watch.INSIDE):
             self._observe(int(run))
-        return Outcome(recorder.all(), monitors.copy())
+        return Outcome(recorder.all(), now.copy())
 
     def _begin(
-        self, cases: Sequence[Case], tables: Sequence[object], blocks: NDArray[np.int64]
+        self, cases: Sequence[Case], tables: Sequence[Table], blocks: NDArray[np.int64]
     ) -> None:
         """Put every case's start into its row."""
         plant = self._plant
         self._set_models(cases)
-        for run, case in enumerate(cases):
+        for run, (case, table) in enumerate(zip(cases, tables, strict=True)):
             plant.reset(case.state)
-            table = case.table
-            assert table is not None
-            begin(plant.data, self._start, table, int(table.arrays[STEP][MODE]), case.memory)
+            put_start(plant.data, self._start, table, int(table.arrays[STEP][MODE]), case.memory)
             plant.data.userdata[self._start + RECORDER] = blocks[run]
             mujoco.mj_getState(plant.model, plant.data, self._batch.state[run], WHOLE)
 

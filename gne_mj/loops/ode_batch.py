@@ -5,11 +5,10 @@ from types import ModuleType
 
 import numpy as np
 
-from gne_mj.loops import monitor as watch
-from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, workers
-from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, MONITOR, RECORDER, STATES, STEP
+from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
+from gne_mj.loops.layout import MONITOR, RECORDER
 from gne_mj.loops.ode import build, room_length, scratch_width
-from gne_mj.loops.recorder import FIRST, Recorder
+from gne_mj.loops.recorder import FIRST
 from gne_mj.native import call_loop, compiled
 from gne_mj.plants.agents import Agents
 
@@ -49,15 +48,9 @@ class OdeBatch(BatchLoop):
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
-        tables = [case.table for case in cases if case.table is not None]
-        sizes = tables[0].arrays[STEP]
-        m, p, states, memory = (sizes[i] for i in (ACTIONS, CONSTRAINTS, STATES, MEMORY))
-        recorder = Recorder(
-            len(cases), span.rows, (m, states), memory, self._faulty, every=span.every
-        )
+        tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
         addresses = np.array([table.address for table in tables], dtype=np.int64)
         starts = np.stack([np.concatenate([c.state.ravel(), c.memory]) for c in cases])
-        monitors = np.zeros((len(cases), watch.length(m, p)))
         length = room_length(sizes)
         state_at = length - starts.shape[1] - 5 * scratch_width(sizes)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.plots.style import STYLE, line_style
+from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray
@@ -55,7 +56,7 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
 
     key = _horizontal(runs)
     lines = _groups(runs, key)
-    left = ~np.isin(runs["status"].to_numpy(), ["converged", "completed"])
+    left = ~np.isin(runs["status"].to_numpy(), SUCCESSES)
     panels = len(_PANELS) + bool(left.any())
     with plt.rc_context(STYLE):
         figure, grid = plt.subplots(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style
 from gne_mj.trajectory import Trajectory
+from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray
@@ -73,7 +74,7 @@ def _figure(data: "xarray.Dataset", panels: int, width: float) -> tuple["Figure"
     axes: list[Axes] = list(grid[:, 0])
     axes[-1].set_xlabel("time (s)")
     axes[-1].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
-    if data.attrs["status"] not in ("converged", "completed"):
+    if data.attrs["status"] not in SUCCESSES:
         axes[0].set_title(data.attrs["status"].replace("_", " "), color="#B00020", fontsize=9)
         for panel in axes:
             panel.axvline(time[-1], color="#B00020", linewidth=1.0)

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, nearest
 from gne_mj.margins import with_margin
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
@@ -238,6 +238,23 @@ class Scenario(Table):
                     "name", "a system's name has letters, digits, '-' and '_' only"
                 )
         return self
+
+    def name_of(self, given: str | None, key: str = "--system") -> str:
+        """The system of this name, or the only one if none is given.
+
+        Args:
+            given: a name, or None.
+            key: what a message calls it.
+
+        Raises:
+            InvalidInput: there is no such system, or several and none is named.
+        """
+        if given is None and len(self.systems) > 1:
+            raise InvalidInput(key, None, f"name one of {', '.join(self.systems)}")
+        name = given or next(iter(self.systems))
+        if name not in self.systems:
+            raise InvalidInput(key, name, nearest(name, self.systems))
+        return name
 
     def clock(self) -> Clock:
         """The shared clock."""

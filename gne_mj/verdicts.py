@@ -1,0 +1,99 @@
+"""How runs are judged by what their monitors and samples say; one rule for one run and for many.
+
+Arrays have a row for each run. A single run's certificate is made by the same rules as a batch's
+figures.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.loops import monitor as watch
+
+SUCCESSES = ("converged", "completed")
+EXITS = {
+    watch.LEFT_SET: "left_feasible_set",
+    watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
+    watch.DIVERGED: "diverged",
+}
+STATUS = "<U28"  # dtype that holds every status, infeasible_start too
+SETTLED = 0.02  # of the initial distance
+TAIL = 0.05  # of the run, over which "converged" must hold
+
+
+class Inputs(NamedTuple):
+    """What actuators had to deliver, each (runs, m), in the input's unit."""
+
+    peak: NDArray[np.float64]  # of what the law asked for
+    peak_time: NDArray[np.float64]  # s
+    rms: NDArray[np.float64]
+    energy: NDArray[np.float64]  # integral of u y
+
+
+def status(
+    monitors: NDArray[np.float64], tail: NDArray[np.float64], tolerance: float
+) -> NDArray[np.str_]:
+    """(runs,) how each run ended, having run its time or left.
+
+    Args:
+        monitors: (runs, :func:`gne_mj.loops.monitor.length`).
+        tail: (runs,) greatest distance over the last part, see :func:`tail_distance`.
+        tolerance: of ``converged``.
+    """
+    found = np.where(tail <= tolerance, "converged", "completed").astype(STATUS)
+    for code, name in EXITS.items():
+        found[monitors[:, watch.EXIT] == code] = name
+    return found
+
+
+def tail_distance(
+    time: NDArray[np.float64], distance: NDArray[np.float64], duration: float
+) -> NDArray[np.float64]:
+    """(runs,) greatest distance over the last part of the run.
+
+    Args:
+        time: (samples,) in s.
+        distance: (runs, samples) max |y - y*|.
+        duration: how long the run was meant to last, in s.
+    """
+    greatest: NDArray[np.float64] = np.max(
+        distance[:, time >= time[-1] - TAIL * duration - 1e-9], axis=1
+    )
+    return greatest
+
+
+def settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(runs,) first sample time in s after which the distance (runs, samples) stays within 2% of
+    its start; not a number where a run has not settled."""
+    outside = ~(distance <= SETTLED * distance[:, :1])
+    last = outside.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
+    last = np.where(outside.any(axis=1), last, -1)
+    return np.append(time, np.nan)[last + 1]
+
+
+def worst_constraints(
+    monitors: NDArray[np.float64], p: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Each constraint's greatest g and when in s, both (runs, p), that at an exit included.
+
+    Of a run in which nothing was observed it is minus infinity.
+    """
+    at = int(watch.worst_at(p))
+    worst, when = monitors[:, at : at + p].copy(), monitors[:, at + p : at + 2 * p].copy()
+    worst[monitors[:, watch.STARTED] == 0.0] = -np.inf
+    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET):
+        index, value = int(monitors[run, watch.EXIT_CONSTRAINT]), monitors[run, watch.EXIT_VALUE]
+        if value > worst[run, index]:
+            worst[run, index], when[run, index] = value, monitors[run, watch.EXIT_TIME]
+    return worst, when
+
+
+def inputs(monitors: NDArray[np.float64], p: int, m: int) -> Inputs:
+    """What actuators had to deliver, of runs with p constraints and m actions."""
+    at = int(watch.inputs_at(p))
+    parts = monitors[:, at : at + 4 * m].reshape(len(monitors), 4, m)
+    peak, peak_time, square, energy = np.moveaxis(parts, 1, 0)
+    elapsed = monitors[:, watch.TIME, None]
+    rms = np.sqrt(np.divide(square, elapsed, out=np.zeros_like(square), where=elapsed > 0))
+    return Inputs(peak, peak_time, rms, energy)
