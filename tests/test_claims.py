@@ -23,6 +23,7 @@ from gne_mj.controllers import FullInformation, FullyDistributed, PartialInforma
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
+from gne_mj.system.steps import largest_step
 
 
 def required_coupling(game, graph):
@@ -146,7 +147,7 @@ def test_all_laws_of_drawn_games_end_at_one_equilibrium(count, seed):
     ):
         system = System("line", game, integrators(count), law, 0.1, y[:, None])
         # c sets the pace: an agent is held by what its neighbours still take it to be
-        h = min(0.01, 0.5 * system.largest_step())
+        h = min(0.01, 0.5 * largest_step(system))
         steps = round(400.0 / h)
         states, _, _, loop = run_loop(system, h, steps, every=steps)
         assert loop.monitor[watch.EXIT] == watch.INSIDE
@@ -192,7 +193,7 @@ def test_robots_under_all_laws_end_at_the_same_equilibrium():
         (FullyDistributed(graph, 0.01, 0.2), 800.0),
     ):
         system, _ = robots_of(law, 0.002)
-        h = min(0.005, 0.5 * system.largest_step())
+        h = min(0.005, 0.5 * largest_step(system))
         steps = round(duration / h)
         states, _, _, loop = run_loop(system, h, steps, every=steps)
         assert loop.monitor[watch.EXIT] == watch.INSIDE

@@ -21,7 +21,8 @@ from gne_mj.loops import monitor as watch
 from gne_mj.scenario_tables import Scenario
 from gne_mj.scenario_tables.scenario import SimulationTable
 from gne_mj.simulation import Simulation
-from gne_mj.system import STABLE, System
+from gne_mj.system import System
+from gne_mj.system.steps import STABLE, largest_step
 
 START = V0 + np.array([-1.0, 0.5, 1.0, -0.5, 0.3])
 SHIFT = 20.0
@@ -236,7 +237,7 @@ def line_of_integrators(law, count, mode="continuous", integrator="rk4", engine=
 def growth(system, h, steps=1000):
     """Of the estimates' errors over so many steps, whatever the product thinks of the step."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(System, "_check_step", lambda self, clock: None)
+        patch.setattr(steps, "check_step", lambda system, clock: None)
         _, _, memory, _ = run_loop(system, h, steps, every=steps)
     count = system.game.agents
     others = ~np.eye(count, dtype=bool)
@@ -254,7 +255,7 @@ def test_the_largest_step_is_stable_and_a_tenth_more_is_not(kind, graph, integra
     else:
         law, rate = FullyDistributed(network, 0.01, 0.1), 1 / 0.01
     system = line_of_integrators(law, 6, integrator=integrator)
-    largest = system.largest_step()
+    largest = largest_step(system)
     values = np.linalg.eigvalsh(reference.laplacian(6, network.edges))
     assert largest == pytest.approx(STABLE[integrator] / (rate * values[-1]), rel=1e-12)
     assert growth(system, largest) < 1.0
@@ -280,14 +281,14 @@ def test_a_step_outside_is_refused_and_the_named_one_is_accepted(count, kind, en
     )
     system = line_of_integrators(law, count, engine=engine)
     with pytest.raises(InvalidInput, match="mode 'sampled'") as caught:
-        system.closed_loop(clock_of(1.01 * system.largest_step()))
+        system.closed_loop(clock_of(1.01 * largest_step(system)))
     message = str(caught.value)
     assert message.startswith("simulation.timestep")
     assert ("rosenbrock" in message) == (kind == "distributed" and engine == "ode")
     named = float(message.split("steps of at most ")[1].split(" s;")[0])
     system.closed_loop(clock_of(named))
-    assert named == pytest.approx(system.largest_step(), rel=1e-2)
-    assert line_of_integrators(law, count, "sampled", engine=engine).largest_step() == np.inf
+    assert named == pytest.approx(largest_step(system), rel=1e-2)
+    assert largest_step(line_of_integrators(law, count, "sampled", engine=engine)) == np.inf
 
 
 def test_light_agents_limit_the_step_as_light_estimates_do():
@@ -298,7 +299,7 @@ def test_light_agents_limit_the_step_as_light_estimates_do():
         2000.0 * laplacian
     )  # agent 1 and estimates of it
     fastest = np.max(np.linalg.eigvals(column).real)
-    largest = line_of_integrators(law, 5).largest_step()
+    largest = largest_step(line_of_integrators(law, 5))
     assert largest <= 2.785 / fastest
     assert largest > 0.5 * 2.785 / fastest
 

@@ -8,6 +8,7 @@ import numpy as np
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
 from gne_mj.system import Clock, System
+from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
 from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.held import Held
@@ -95,7 +96,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "linear": _at_both(system, linear_period),
             "control_period": None if system.mode == "continuous" else clock.control_period,
             "timestep": clock.timestep,
-            "largest_timestep_for_estimates": system.largest_step(),
+            "largest_timestep_for_estimates": largest_step(system),
         },
         held=None
         if held is None

@@ -1,0 +1,174 @@
+"""Whether the parts of a system fit together, and its start lies inside.
+
+Each function raises InvalidInput or InfeasibleStart, naming key, value and what would be right.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.faults import Bias, Noise, SensorDelay, for_native, sensor_delay, strikes_messages
+from gne_mj.plants import flexible_robot
+from gne_mj.plants.mjcf_robot import MjcfRobots
+
+if TYPE_CHECKING:
+    from gne_mj.system.system import System
+
+# The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
+ROSENBROCK_AGENTS = 200
+
+
+def check_parts(system: "System") -> None:
+    """Refuse parts whose shapes or kinds do not go together."""
+    m = system.game.actions
+    if system.agents.channels != m:
+        raise InvalidInput(
+            f"systems.{system.name}.agents.count",
+            system.agents.channels,
+            f"the {system.game.name} game has {m} actions",
+        )
+    if system.state.shape != (m, system.agents.states):
+        raise InvalidInput(
+            f"systems.{system.name}.initial",
+            system.state.shape,
+            f"the state's shape must be ({m}, {system.agents.states})",
+        )
+    if system.law.graph is not None and system.law.graph.agents != system.game.agents:
+        raise InvalidInput(
+            f"systems.{system.name}.controller.graph",
+            system.law.graph.agents,
+            f"the game has {system.game.agents} agents",
+        )
+    if system.mode != "continuous" and not system.law.propagates:
+        raise InvalidInput(
+            f"systems.{system.name}.controller.mode",
+            system.mode,
+            "a plain law with a memory runs in mode 'continuous'",
+        )
+    if system.mode == "implicit" and not hasattr(system.law.kernels, "add_pull_slope"):
+        raise InvalidInput(
+            f"systems.{system.name}.controller.mode",
+            system.mode,
+            "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
+            " with; use mode 'sampled'",
+        )
+    if system.decentralised and (
+        system.mode != "implicit" or system.law.information not in ("full", "partial")
+    ):
+        raise InvalidInput(
+            f"systems.{system.name}.controller.decentralised",
+            True,
+            "it is for mode 'implicit' under full or partial information",
+        )
+    if not np.all(np.isfinite(system.state)):
+        raise InvalidInput(
+            f"systems.{system.name}.initial", "nan or inf", "every entry must be finite"
+        )
+    for quantity in system.game.quantities:  # wrong shapes are better found before a run
+        quantity.at(system.start[None], system.game.entries(quantity))
+        quantity.bounds(system.game.entries(quantity))
+
+
+def check_start(system: "System") -> None:
+    """Refuse a start that is not strictly inside, or within the barrier's tightening."""
+    key = f"systems.{system.name}.initial.action"
+    what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
+    worst, value = system.game.tightest(system.start)
+    if not value < 0.0:
+        raise InfeasibleStart(key, what, system.game.constraint_names[worst], value)
+    tight = system.game.constraints(system.start) + system.game.margins
+    worst = int(np.argmax(tight))
+    if not tight[worst] < 0.0:
+        name = (
+            f"{system.game.constraint_names[worst]}, tightened by {system.game.margins[worst]:g},"
+        )
+        raise InfeasibleStart(key, what, name, float(tight[worst]))
+
+
+def check_memory(system: "System") -> None:
+    """Refuse estimates at which an agent would evaluate the barrier outside."""
+    if not np.all(np.isfinite(system.memory)):
+        raise InvalidInput(
+            f"systems.{system.name}.initial.estimate", "nan or inf", "every entry must be finite"
+        )
+    data = system.game.data
+    profiles = system.law.barrier_profiles(system.game.agent_of_action, system.memory)
+    for i, g in enumerate(system.game.constraints(profiles) + system.game.margins):
+        own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
+        outside = own[~(g[own] < 0.0)]
+        if len(outside):
+            raise InfeasibleStart(
+                f"systems.{system.name}.initial.estimate",
+                f"initial estimates of agent {i + 1}",
+                system.game.constraint_names[outside[0]],
+                float(g[outside[0]]),
+            )
+
+
+def check_engine(system: "System") -> None:
+    """Refuse agents, laws and modes that the engine or integrator does not run."""
+    key = f"systems.{system.name}.plant"
+    if system.schedule is not None and system.integrator == "rosenbrock":
+        raise InvalidInput(
+            f"{key}.integrator",
+            system.integrator,
+            "it is for a penalty that does not change in time; use 'rk4'",
+        )
+    own_model = isinstance(system.agents, MjcfRobots)
+    if system.engine == "mujoco" and not own_model and system.agents.kind is not flexible_robot:
+        raise InvalidInput(
+            f"{key}.engine",
+            system.engine,
+            f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
+            f" {system.agents.kind.NAME}s on 'ode'",
+        )
+    if system.engine == "ode" and own_model:
+        raise InvalidInput(f"{key}.engine", system.engine, "MJCF robots run on 'mujoco'")
+    if system.integrator == "rosenbrock" and system.game.agents > ROSENBROCK_AGENTS:
+        raise InvalidInput(
+            f"{key}.integrator",
+            system.integrator,
+            f"it keeps N x N x N numbers and is for up to {ROSENBROCK_AGENTS} agents, not"
+            f" {system.game.agents}; use mode 'sampled'",
+        )
+    if system.integrator == "rosenbrock" and (
+        system.law.information != "distributed"
+        or system.mode != "continuous"
+        or system.engine != "ode"
+    ):
+        raise InvalidInput(
+            f"{key}.integrator",
+            system.integrator,
+            "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4' or"
+            " 'euler'",
+        )
+
+
+def check_faults(system: "System") -> None:
+    """Refuse faults that the integrator, mode or agents do not know."""
+    key = f"systems.{system.name}.faults"
+    if system.faults and system.integrator == "rosenbrock":
+        raise InvalidInput(key, "given", "integrator 'rosenbrock' knows none; use 'rk4'")
+    for number, fault in enumerate(system.faults):
+        try:
+            for_native((fault,), system.game, system.law.graph, system.seed)
+        except InvalidInput as error:
+            where = error.key.replace("faults", f"{key}.{number}", 1)
+            raise InvalidInput(where, error.value, error.expected) from None
+    held = strikes_messages(system.faults) or sensor_delay(system.faults) > 0
+    if held and system.mode == "continuous":
+        raise InvalidInput(
+            key,
+            "messages or late sensors",
+            "they go by control periods: use mode 'sampled' or 'implicit'",
+        )
+    if system.mode == "implicit" and isinstance(system.agents, MjcfRobots):
+        for fault in system.faults:
+            if isinstance(fault, Noise | Bias | SensorDelay):
+                raise InvalidInput(
+                    key,
+                    type(fault).__name__.lower(),
+                    "mode 'implicit' predicts MJCF robots from their whole true state, which"
+                    " such sensors would not tell; use mode 'sampled'",
+                )

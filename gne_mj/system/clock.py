@@ -1,0 +1,42 @@
+"""The clock that all systems of a run share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gne_mj.errors import InvalidInput
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock that all systems of a run share; times in s.
+
+    Args:
+        duration: how long to run.
+        timestep: integration step.
+        control_period: how long an input is held in the held modes; a multiple of the step.
+        sample_period: between recorded samples; a multiple of the step.
+    """
+
+    duration: float
+    timestep: float
+    control_period: float
+    sample_period: float
+
+    def __post_init__(self) -> None:
+        for key in ("duration", "timestep", "control_period", "sample_period"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value > 0):
+                raise InvalidInput(f"simulation.{key}", value, "it must be positive and finite")
+        for key in ("control_period", "sample_period", "duration"):
+            steps = getattr(self, key) / self.timestep
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
+                raise InvalidInput(
+                    f"simulation.{key}",
+                    getattr(self, key),
+                    f"it must be a multiple of the timestep {self.timestep:g} s",
+                )
+
+    def steps(self, time: float) -> int:
+        """Integration steps in a time."""
+        return round(time / self.timestep)
