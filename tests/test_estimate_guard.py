@@ -237,7 +237,7 @@ def line_of_integrators(law, count, mode="continuous", integrator="rk4", engine=
 def growth(system, h, steps=1000):
     """Of the estimates' errors over so many steps, whatever the product thinks of the step."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(steps, "check_step", lambda system, clock: None)
+        patch.setattr("gne_mj.system.steps.check_step", lambda system, clock: None)
         _, _, memory, _ = run_loop(system, h, steps, every=steps)
     count = system.game.agents
     others = ~np.eye(count, dtype=bool)
