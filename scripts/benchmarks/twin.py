@@ -97,7 +97,9 @@ class Twin:
         for c in range(n):
             x = eye[c, :size].reshape(N, self.states)
             y = np.ascontiguousarray(x[:, 0])
-            self.law.kernels.rate(self.problem, y, eye[c, size:], matrix[size:, c])
+            memory = eye[c, size:].copy()
+            memory[np.arange(N) * (N + 1)] = y  # own actions stand in the rows that agents send
+            self.law.kernels.rate(self.problem, y, memory, matrix[size:, c])
             for r in range(N):
                 out = np.zeros(self.states)
                 self.kind.rate(self.channels.parameters[r], x[r], 0.0, out)
@@ -188,7 +190,10 @@ class Twin:
         nudged = self.first * (1.0 + 1e-3 * np.sin(np.arange(len(self.first))))
         if not np.allclose(rate(0.0, nudged), with_numpy(0.0, nudged), rtol=1e-10, atol=1e-10):
             raise ArithmeticError("the compiled and the NumPy rate differ")
-        jacobian(0.0, nudged)
+        step = 1e-6 * np.eye(len(nudged))  # a peer with a wrong Jacobian would be slow
+        slopes = [(rate(0.0, nudged + e) - rate(0.0, nudged - e)) / 2e-6 for e in step]
+        if not np.allclose(jacobian(0.0, nudged), np.transpose(slopes), rtol=1e-5, atol=1e-4):
+            raise ArithmeticError("the Jacobian is not the rate's")
 
 
 def loosest(
