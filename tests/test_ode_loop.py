@@ -423,3 +423,12 @@ def test_inputs_that_are_no_usable_numbers_are_a_divergence():
     assert len(loop.advance(1, 1).input) == 0
     assert loop.monitor[watch.EXIT] == watch.DIVERGED
     assert abs(loop.monitor[watch.EXIT_VALUE]) >= 1e10
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+def test_no_samples_are_no_observation(engine):
+    """Neither a look at the present nor a step."""
+    loop = robot_system(robot_state(FIVE), engine=engine).closed_loop(clock(0.01))
+    assert len(loop.advance(0, 5).input) == 0
+    assert np.all(loop.monitor == 0.0)
+    assert loop.time == 0.0

@@ -157,8 +157,8 @@ def build(
     """The native loop for an agent type, a law and a game: a C function.
 
     It takes the addresses of a run's table and room, and moves the run on by so many steps, or,
-    if that is 0, observes the present state without moving on. It returns False once the run has
-    left. Behind the room's other parts are [flat state, memory, scratch].
+    if that is 0, observes the present state without moving on. It returns 0 once the run has left,
+    else 1. Behind the room's other parts are [flat state, memory, scratch].
     """
     source = source_key(agent, law, game)
 
@@ -274,7 +274,7 @@ class OdeLoop(ClosedLoop):
         self._faulty = faults is not faultless
         sizes = self._table.arrays[STEP]
         self._room = np.zeros(room_length(sizes))
-        self.monitor, self._u, _, rest = parts_of(self._room, 0, sizes)
+        self.monitor, _u, _work, rest = parts_of(self._room, 0, sizes)
         self._state = rest[: state.size + len(memory)]
         self._state[:] = np.concatenate([state.ravel(), memory])
 
@@ -303,7 +303,8 @@ class OdeLoop(ClosedLoop):
             1, rows, self._shape, self._memory, self._faulty,
             first=int(self._room[STEP_NOW]), every=every,
         )  # fmt: skip
-        self._room[RECORDER] = recorder.addresses[0]
-        self._advance(self._table.address, self._room.ctypes.data, steps)
-        self._room[RECORDER] = 0.0
+        if rows > 0:
+            self._room[RECORDER] = recorder.addresses[0]
+            self._advance(self._table.address, self._room.ctypes.data, steps)
+            self._room[RECORDER] = 0.0
         return recorder.samples(0)

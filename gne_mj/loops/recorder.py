@@ -19,33 +19,29 @@ WORDS = HEADER + 10
 
 
 @kernel
-def row_of(column, rows, row):
-    """One row of a column; its start and width."""
+def write(block, index, rows, row, source):
+    """Write a column's row from the beginning of ``source``."""
+    column = floats(block, index)
     width = len(column) // rows
-    return row * width, width
+    copy(source[:width], column[row * width : (row + 1) * width])
 
 
 @kernel
 def record(block, faults, agent, states, problem, clock, step, state, u, memory, work):
     """Write this step's row, if one is due; state and u are flat, as they are at its start."""
     head = integers_at(block, HEADER)
-    behind = step - head[FIRST]
-    if behind < 0 or behind % head[EVERY] != 0 or behind // head[EVERY] >= head[ROWS]:
+    behind, rows = step - head[FIRST], head[ROWS]
+    row = behind // head[EVERY]
+    if behind < 0 or behind % head[EVERY] != 0 or row >= rows:
         return
-    row, rows = behind // head[EVERY], head[ROWS]
-    for r in range(2):
-        source = state if r == 0 else u
-        column = floats(block, STATE if r == 0 else INPUT)
-        at, width = row_of(column, rows, row)
-        copy(source[:width], column[at : at + width])
-    column = floats(block, MEMORY)
-    at, width = row_of(column, rows, row)
-    copy(memory[:width], column[at : at + width])
+    write(block, STATE, rows, row, state)
+    write(block, INPUT, rows, row, u)
+    write(block, MEMORY, rows, row, memory)
     seen, acts = floats(block, SEEN), floats(block, ACTS)
-    at, width = row_of(seen, rows, row)
+    width = len(seen) // rows
+    at, end = row * width, (row + 1) * width
     faults.record(
-        agent, states, problem, clock, step, state, u, work, seen[at : at + width],
-        acts[at : at + width],
+        agent, states, problem, clock, step, state, u, work, seen[at:end], acts[at:end]
     )  # fmt: skip
     head[DONE] = row + 1
 
