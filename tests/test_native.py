@@ -141,8 +141,7 @@ trajectory = run("velocity-sync", {"plant.engine": "ode", "simulation.duration":
 advance = ode.build(
     flexible_robot, full_information, velocity_synchronization, explicit, faultless
 )
-statistics = [sum(advance.stats.cache_hits.values()), sum(advance.stats.cache_misses.values())]
-print(json.dumps([statistics, trajectory["robots"]["action"].values.tolist()]))
+print(json.dumps([advance.cache_hits, trajectory["robots"]["action"].values.tolist()]))
 """
 
 
@@ -158,8 +157,7 @@ def test_loops_are_cached_between_processes(tmp_path):
         )  # fmt: skip
         results.append(json.loads(done.stdout))
     (first, first_bits), (second, second_bits) = results
-    assert first == [0, 1]
-    assert second == [1, 0]
+    assert (first, second) == (0, 1)
     assert first_bits == second_bits
     assert any(tmp_path.rglob("*.nbi"))
 
