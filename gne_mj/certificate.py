@@ -78,6 +78,7 @@ def certify_run(
     duration: float,
     wall_time: float,
     interrupted: bool = False,
+    intervened: bool = False,
 ) -> Certificate:
     """Put together what a run of ``system`` showed.
 
@@ -91,6 +92,7 @@ def certify_run(
         duration: how long the run was meant to last.
         wall_time: real time that it took.
         interrupted: the user stopped it.
+        intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
     """
     distance = np.max(np.abs(action - system.equilibrium.action), axis=1)
     (settled,) = verdicts.settling_time(time, distance[None])
@@ -109,7 +111,7 @@ def certify_run(
         equilibrium=_equilibrium(system, action[-1]),
         epsilon=_epsilon(system, system.equilibrium),
         settling_time=None if np.isnan(settled) else float(settled),
-        lyapunov=_lyapunov(system, monitor),
+        lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
         exit=_exit_report(system, monitor),
         implicit=_implicit(system, monitor),
@@ -117,6 +119,26 @@ def certify_run(
         end_time=float(time[-1]),
         wall_time=wall_time,
     )
+
+
+def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+    """How a run that goes on stands: status and sentence, least margin so far, where and when.
+
+    Args:
+        system: what runs.
+        monitor: the loop's flat array of what was seen at every step.
+    """
+    status, message = "running", ""
+    if monitor[watch.EXIT] != watch.INSIDE:
+        status, message = _exit(system, monitor)
+    worst = _worst_constraint(system, monitor) or {}
+    return {
+        "status": status,
+        "message": message,
+        "margin": worst.get("margin"),
+        "margin_name": worst.get("name"),
+        "margin_time": worst.get("time"),
+    }
 
 
 def _status(
@@ -302,10 +324,10 @@ def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def _lyapunov(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) -> dict[str, Any]:
     start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
     unhindered = bool(monitor[watch.STARTED]) and not monitor[watch.SATURATED]
-    claimed = unhindered and Theorem(system).lyapunov
+    claimed = unhindered and not intervened and Theorem(system).lyapunov
     return {
         "claimed": claimed,
         "known": system.agents.knows_storage,

@@ -3,20 +3,21 @@
 import signal
 import threading
 import time as real_time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.certificate import certify_run
+from gne_mj.certificate import Certificate, certify_run
 from gne_mj.errors import InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
-from gne_mj.trajectory import Trajectory
+from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s
 _CHUNK = 0.1
@@ -53,6 +54,9 @@ class Simulation:
         seed: kept with the results; systems have their own, of what is random in their faults.
         source: the scenario as JSON, kept with the results.
 
+    Attributes:
+        interventions: what :meth:`change` and :meth:`push` did, each with its time in s.
+
     >>> simulation = Simulation([system], clock)
     >>> snapshot = simulation.step()["robots"]    # one integration step
     >>> trajectory = simulation.run()             # on to the end
@@ -70,14 +74,31 @@ class Simulation:
         names = [system.name for system in systems]
         if len(set(names)) != len(names) or not names:
             raise InvalidInput("systems", names, "there must be systems, with different names")
-        self.systems, self.clock, self.tolerance = tuple(systems), clock, tolerance
+        self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
-        self._runs = [_Run(system, clock) for system in systems]
+        self.interventions: list[dict[str, Any]] = []
+        self._runs = {system.name: SystemRun(system, clock) for system in systems}
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The systems as they are now."""
+        return tuple(run.system for run in self._runs.values())
+
+    @property
+    def runs(self) -> Mapping[str, "SystemRun"]:
+        """Each system's run, by its name."""
+        return self._runs
 
     @property
     def time(self) -> float:
         """Simulated time in s that all systems still inside have reached."""
-        return max(run.loop.time for run in self._runs)
+        return max(run.loop.time for run in self._runs.values())
+
+    @property
+    def ended(self) -> bool:
+        """Whether the clock's end is reached, or every system has left its set."""
+        left = not any(run.inside for run in self._runs.values())
+        return left or self.clock.steps(self.time) >= self.clock.steps(self.clock.duration)
 
     def step(self) -> dict[str, Snapshot]:
         """Take one integration step of every system; what is returned is its beginning.
@@ -85,7 +106,43 @@ class Simulation:
         Measurement, input and state are those at the step's start. A system that has left its set
         stays where it was, its input not a number. Steps taken here are not recorded.
         """
-        return {run.system.name: run.step() for run in self._runs}
+        return {name: run.step() for name, run in self._runs.items()}
+
+    def advance(self, steps: int) -> None:
+        """Take so many integration steps of every system still inside, recording on the way."""
+        for run in self._runs.values():
+            run.advance(steps)
+
+    def change(self, system: System, what: str) -> None:
+        """Go on with other numbers in one of the systems, as of the next step.
+
+        Args:
+            system: of the same name, game, law, agents and engine; its start is not used.
+            what: the change in words, kept with the results.
+
+        Raises:
+            InvalidInput: a step that the new numbers do not allow; nothing has changed then.
+        """
+        self._runs[system.name].change(system)
+        self._note(what)
+
+    def push(self, system: str, channel: int, force: float, duration: float) -> None:
+        """Push one of a system's outputs for a while, as of the next step.
+
+        Args:
+            system: its name.
+            channel: which output, from 0.
+            force: in N (N m at a hinge), besides the input; it takes an earlier push's place.
+            duration: in s, at least one step.
+
+        Raises:
+            EngineError: the system does not run in MuJoCo.
+        """
+        self._runs[system].push(channel, force, max(1, self.clock.steps(duration)))
+        self._note(f"systems.{system}: output {channel + 1} pushed by {force:g} for {duration:g} s")
+
+    def _note(self, what: str) -> None:
+        self.interventions.append({"time": self.time, "what": what})
 
     def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run to the clock's end, recording; Ctrl-C ends it early and keeps what was done.
@@ -93,70 +150,63 @@ class Simulation:
         Args:
             progress: called now and then with the simulated time in s.
         """
-        started = real_time.perf_counter()
         every = self.clock.steps(self.clock.sample_period)
         total = self.clock.steps(self.clock.duration)
-        done = self.clock.steps(self.time)
         size = 1
         with interruption() as interrupted:
-            while done < total and not interrupted.is_set() and any(r.inside for r in self._runs):
-                # Whole sample periods; the last one may be shorter.
-                samples = min(size, (total - done) // every)
-                stride = every if samples else total - done
-                samples = max(samples, 1)
-                chunk_started = real_time.perf_counter()
-                for run in self._runs:
-                    run.advance(samples, stride)
-                done += samples * stride
-                elapsed = real_time.perf_counter() - chunk_started
+            while not self.ended and not interrupted.is_set():
+                steps = min(size * every, total - self.clock.steps(self.time))
+                started = real_time.perf_counter()
+                self.advance(steps)
+                elapsed = real_time.perf_counter() - started
                 size = max(1, min(10 * size, int(size * _CHUNK / max(elapsed, 1e-6))))
                 if progress is not None:
-                    progress(done * self.clock.timestep)
-            return self._trajectory(interrupted.is_set() and done < total, started)
+                    progress(self.time)
+            return self.trajectory(interrupted=interrupted.is_set() and not self.ended)
 
-    def _trajectory(self, interrupted: bool, started: float) -> Trajectory:
-        parts = {}
-        for run in self._runs:
-            run.finish()
-            time, samples = run.recorded()
-            certificate = certify_run(
-                run.system,
-                time,
-                samples.state[:, :, run.system.agents.kind.OUTPUT],
-                samples.input,
-                run.loop.monitor,
-                tolerance=self.tolerance,
-                duration=self.clock.duration,
-                wall_time=run.wall_time,
-                interrupted=interrupted,
-            )
-            parts[run.system.name] = (run.system, time, samples, certificate)
+    def trajectory(self, *, interrupted: bool = False) -> Trajectory:
+        """What was recorded until now, with the present state as the last sample.
+
+        Args:
+            interrupted: the user stopped the run.
+        """
+        intervened = bool(self.interventions)
         return Trajectory.from_parts(
-            parts,
+            {
+                name: run.part(self.tolerance, interrupted, intervened)
+                for name, run in self._runs.items()
+            },
             seed=self.seed,
             source=self.source,
-            wall_time=real_time.perf_counter() - started,
+            wall_time=sum(run.wall_time for run in self._runs.values()),
+            interventions=self.interventions,
         )
 
 
-@dataclass
-class _Run:
-    """One system's loop and what it recorded."""
+class SystemRun:
+    """One system's loop and what it recorded.
 
-    system: System
-    clock: Clock
-    wall_time: float = 0.0
-    _times: list[NDArray[np.float64]] = field(default_factory=list)
-    _samples: list[Samples] = field(default_factory=list)
+    Attributes:
+        system: with the numbers of now.
+        loop: its closed loop.
+        wall_time: real time in s that its steps took.
+    """
 
-    def __post_init__(self) -> None:
-        self.loop = self.system.closed_loop(self.clock)
+    def __init__(self, system: System, clock: Clock) -> None:
+        self.system, self.clock = system, clock
+        self.loop = system.closed_loop(clock)
+        self.wall_time = 0.0
+        self._due: int | None = None  # the step at which the next row is recorded; None: at once
+        self._pushed_until: int | None = None
+        self._recorded: list[Part] = []
 
     @property
     def inside(self) -> bool:
+        """Whether the run has not left its set."""
         return bool(self.loop.monitor[watch.EXIT] == watch.INSIDE)
 
     def step(self) -> Snapshot:
+        """One integration step; what is returned is its beginning."""
         time = self.loop.time
         samples = self.loop.advance(1, 1) if self.inside else self.loop.finish()
         raise_pending()
@@ -167,39 +217,102 @@ class _Run:
         constraint = self.system.game.constraints(y)
         return Snapshot(time, y, samples.input[0], constraint, state, samples.memory[0])
 
-    def advance(self, samples: int, every: int) -> None:
-        if not self.inside:
-            return
-        self._forget_last()
+    def advance(self, steps: int) -> None:
+        """So many steps, if it is still inside, recorded once in a sample period."""
         started = real_time.perf_counter()
-        first = self.clock.steps(self.loop.time)
-        recorded = self.loop.advance(samples, every)
-        raise_pending()
+        now = self.clock.steps(self.loop.time)
+        end = now + steps
+        while now < end and self.inside:
+            if self._pushed_until is not None and now >= self._pushed_until:
+                self._release()
+            now = self._piece(now, min(end, self._pushed_until or end))
         self.wall_time += real_time.perf_counter() - started
-        steps = first + every * np.arange(len(recorded.input), dtype=np.float64)
-        self._times.append(steps * self.clock.timestep)
-        self._samples.append(recorded)
 
-    def finish(self) -> None:
-        """Add the present state as the last row."""
-        self._forget_last()
-        self._times.append(np.array([self.loop.time]))
-        self._samples.append(self.loop.finish())
+    def _piece(self, now: int, end: int) -> int:
+        """On towards a step as far as one call of the loop goes; returns the step reached."""
+        every = self.clock.steps(self.clock.sample_period)
+        if self._due is None or self._due < now:
+            self._due = now
+            self._forget_last()
+        if now < self._due:
+            end = min(end, self._due)
+            self.loop.advance(1, end - now)
+            raise_pending()
+            return end
+        # Whole sample periods; the last one may be shorter.
+        samples = (end - now) // every
+        stride = every if samples else end - now
+        samples = max(samples, 1)
+        rows = self.loop.advance(samples, stride)
         raise_pending()
+        steps = now + stride * np.arange(len(rows.input), dtype=np.float64)
+        self._recorded.append(Part(self.system, steps * self.clock.timestep, rows))
+        self._due = now + samples * every
+        return now + samples * stride
+
+    def recorded(self) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
+        """Sample times so far in s, and what a trajectory has of them, by the variables' names."""
+        parts = joined(self._recorded)
+        if not parts:
+            return np.zeros(0), {}
+        return np.concatenate([part.time for part in parts]), {
+            name: values
+            for name, (dimensions, values, _) in variables_of_parts(parts).items()
+            if dimensions[:1] == ("time",)
+        }
+
+    def change(self, system: System) -> None:
+        """See :meth:`Simulation.change`."""
+        self.loop.adopt(system.setup(self.clock))
+        self.loop.keeps = system
+        self.system = system
+
+    def push(self, channel: int, force: float, steps: int) -> None:
+        """See :meth:`Simulation.push`."""
+        forces = np.zeros(self.system.game.actions)
+        forces[channel] = force
+        self.loop.push(forces)
+        self._pushed_until = self.clock.steps(self.loop.time) + steps
+
+    def _release(self) -> None:
+        self.loop.push(np.zeros(self.system.game.actions))
+        self._pushed_until = None
+
+    def part(
+        self, tolerance: float, interrupted: bool, intervened: bool
+    ) -> tuple[list[Part], Certificate]:
+        """What was recorded, the present state being the last row, and what it shows."""
+        self._forget_last()
+        last = Part(self.system, np.array([self.loop.time]), self.loop.finish())
+        raise_pending()
+        self._recorded.append(last)
+        self._due = None
+        parts = joined(self._recorded)
+        time, samples = parts[-1].time, parts[-1].samples
+        if len(parts) > 1:
+            time = np.concatenate([part.time for part in parts])
+            samples = Samples.join([part.samples for part in parts])
+        certificate = certify_run(
+            self.system,
+            time,
+            samples.state[:, :, self.system.agents.kind.OUTPUT],
+            samples.input,
+            self.loop.monitor,
+            tolerance=tolerance,
+            duration=self.clock.duration,
+            wall_time=self.wall_time,
+            interrupted=interrupted,
+            intervened=intervened,
+        )
+        return parts, certificate
 
     def _forget_last(self) -> None:
         """Drop the last row if it is of the present time, as when a run goes on after its end."""
-        if self._times and len(self._times[-1]) and self._times[-1][-1] >= self.loop.time:
-            self._times[-1] = self._times[-1][:-1]
-            last = self._samples[-1]
-            self._samples[-1] = Samples(*(getattr(last, each.name)[:-1] for each in fields(last)))
-
-    def recorded(self) -> tuple[NDArray[np.float64], Samples]:
-        parts = (
-            np.concatenate([getattr(part, each.name) for part in self._samples])
-            for each in fields(Samples)
-        )
-        return np.concatenate(self._times), Samples(*parts)
+        if not self._recorded:
+            return
+        last = self._recorded[-1]
+        if len(last.time) and last.time[-1] >= self.loop.time:
+            self._recorded[-1] = Part(last.system, last.time[:-1], last.samples.first(-1))
 
 
 @contextmanager

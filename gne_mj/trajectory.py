@@ -6,7 +6,8 @@ xarray alone can read it: ``xarray.open_datatree(folder, engine="zarr")``.
 
 import json
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,39 @@ _ORDER = (
 )
 
 
+@dataclass(frozen=True)
+class Part:
+    """What a system recorded while its numbers stayed the same.
+
+    Attributes:
+        system: with these numbers.
+        time: (samples,) in s.
+        samples: at these times.
+    """
+
+    system: System
+    time: NDArray[np.float64]
+    samples: Samples
+
+
+def joined(parts: Sequence[Part]) -> list[Part]:
+    """Parts of one system that follow each other made one."""
+    groups: list[list[Part]] = []
+    for part in parts:
+        if groups and groups[-1][-1].system is part.system:
+            groups[-1].append(part)
+        else:
+            groups.append([part])
+    return [
+        Part(
+            group[0].system,
+            np.concatenate([part.time for part in group]),
+            Samples.join([part.samples for part in group]),
+        )
+        for group in groups
+    ]
+
+
 class Trajectory:
     """What a run recorded and showed.
 
@@ -54,13 +88,21 @@ class Trajectory:
     @classmethod
     def from_parts(
         cls,
-        parts: dict[str, tuple[System, NDArray[np.float64], Samples, Certificate]],
+        parts: dict[str, tuple[list[Part], Certificate]],
         *,
         seed: int,
         source: str,
         wall_time: float,
+        interventions: Sequence[dict[str, Any]] = (),
     ) -> "Trajectory":
-        """Label what the systems of one run recorded."""
+        """Label what the systems of one run recorded.
+
+        Args:
+            parts: by the systems' names.
+            seed, source: of the run.
+            wall_time: real time in s that it took.
+            interventions: what the user did meanwhile, each with its time in s.
+        """
         import xarray
 
         groups: dict[str, xarray.Dataset] = {
@@ -70,9 +112,10 @@ class Trajectory:
                     "seed": seed,
                     "versions": json.dumps(versions()),
                     "wall_time": wall_time,
-                    "status": _worst(part[3].status for part in parts.values()),
+                    "interventions": json.dumps(list(interventions)),
+                    "status": _worst(certificate.status for _, certificate in parts.values()),
                     "message": "; ".join(
-                        f"{name}: {part[3].message}" for name, part in parts.items()
+                        f"{name}: {certificate.message}" for name, (_, certificate) in parts.items()
                     ),
                 }
             )
@@ -91,6 +134,12 @@ class Trajectory:
         """Whether every system ran to its end inside its set."""
         return self.status in SUCCESSES
 
+    @property
+    def interventions(self) -> list[dict[str, Any]]:
+        """What the user did while it ran: "time" in s, and "what" in words."""
+        done: list[dict[str, Any]] = json.loads(self.tree.attrs.get("interventions", "[]"))
+        return done
+
     def __getitem__(self, system: str) -> "xarray.Dataset":
         """One system's dataset."""
         group: xarray.Dataset = self.tree[system].to_dataset()
@@ -105,6 +154,7 @@ class Trajectory:
             "seed": int(attributes["seed"]),
             "versions": json.loads(attributes["versions"]),
             "wall_time": float(attributes["wall_time"]),
+            "interventions": self.interventions,
         }
 
     def save(self, folder: str | Path) -> Path:
@@ -223,6 +273,12 @@ def variables_of(
             samples.acts,
             {**variables["input"][2], "long_name": "input with pushes, as it moved the plant"},
         )
+    if samples.configuration.shape[1]:
+        variables["configuration"] = (
+            ("time", "coordinate"),
+            samples.configuration,
+            {"long_name": "all joints' positions, MuJoCo's qpos"},
+        )
     if system.schedule is not None:
         variables["penalty"] = (
             ("time",),
@@ -235,6 +291,19 @@ def variables_of(
             game.margins,
             {"long_name": "t: the barrier guards g + t < 0"},
         )
+    return variables
+
+
+def variables_of_parts(
+    parts: Sequence[Part],
+) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
+    """The same of parts one after the other; what has no time is that of the last numbers."""
+    found = [variables_of(part.system, part.time, part.samples) for part in parts]
+    variables = found[-1]
+    for name, (dimensions, _, attributes) in list(variables.items()):
+        if dimensions[:1] == ("time",):
+            values = np.concatenate([each[name][1] for each in found])
+            variables[name] = (dimensions, values, attributes)
     return variables
 
 
@@ -253,14 +322,15 @@ def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
     return coordinates
 
 
-def _dataset(
-    system: System, time: NDArray[np.float64], samples: Samples, certificate: Certificate
-) -> "xarray.Dataset":
+def _dataset(parts: list[Part], certificate: Certificate) -> "xarray.Dataset":
+    """The dataset of a system."""
     import xarray
 
+    system = parts[-1].system
     game, report = system.game, certificate.to_dict()
+    time = np.concatenate([part.time for part in parts])
     return xarray.Dataset(
-        variables_of(system, time, samples),
+        variables_of_parts(parts),
         coordinates_of(system, time),
         attrs={
             "game": game.name,

@@ -199,7 +199,8 @@ def _recorded(
     for name, (dimensions, values, attributes) in variables_of(
         system, np.tile(time[rows], runs), flat
     ).items():
-        if name in ("state", "equilibrium"):  # kept by its components, and once a run
+        # a state is kept by its components, y* once a run, and not all joints of MJCF robots
+        if name in ("state", "equilibrium", "configuration"):
             continue
         if dimensions[:1] == ("time",):
             values = values.reshape(runs, len(rows), *values.shape[1:])

@@ -8,7 +8,7 @@ import typer
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
 from gne_mj.cli.output import PREPARING, progress, results, working
-from gne_mj.cli.runs import load
+from gne_mj.cli.simulating import load
 
 
 @app.command()

@@ -31,6 +31,11 @@ WHERE = Annotated[
 FORMAT = Annotated[
     list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
 ]
+INDEX = Annotated[int | None, typer.Option("--index", help="Number of the batch's run, from 0.")]
+PORT = Annotated[
+    int | None,
+    typer.Option("--port", min=1, max=65535, help="Of the page, on 127.0.0.1; any free one."),
+]
 JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
 
 

@@ -106,14 +106,16 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
         yield lambda now: bar.update(task, completed=now)
 
 
-def tell(trajectory: "Trajectory", as_json: bool) -> None:
-    """Print a run's summary, or its report as JSON."""
+def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
+    """Print a run's summary and where it is kept, or its report as JSON."""
     if as_json:
         print(json.dumps(trajectory.report(), indent=2))
         return
     for name, report in trajectory.reports.items():
         print("\n".join(_summary(name, report)))
         _warn(name, report)
+    if out is not None:
+        print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
 
 
 def _summary(name: str, report: dict[str, Any]) -> list[str]:

@@ -1,10 +1,18 @@
 """What every native closed loop offers to the simulation."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gne_mj.errors import EngineError
+from gne_mj.loops import monitor as watch
+
+if TYPE_CHECKING:
+    from gne_mj.loops.layout import Setup
 
 
 @dataclass(frozen=True)
@@ -18,6 +26,8 @@ class Samples:
         seen: (samples, m) outputs as the law read them for that input; (samples, 0) in a run
             without faults.
         acts: (samples, m) inputs with pushes, which moved the plant; likewise.
+        configuration: (samples, nq) all joints' positions of MJCF robots, MuJoCo's qpos; of other
+            agents, whose state says it, (samples, 0).
     """
 
     state: NDArray[np.float64]
@@ -25,6 +35,25 @@ class Samples:
     memory: NDArray[np.float64]
     seen: NDArray[np.float64]
     acts: NDArray[np.float64]
+    configuration: NDArray[np.float64]
+
+    @classmethod
+    def join(cls, parts: Sequence["Samples"]) -> "Samples":
+        """One after the other."""
+        names = [each.name for each in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    def first(self, rows: int) -> "Samples":
+        """So many rows; all but some of the last ones if negative."""
+        return Samples(*(getattr(self, each.name)[:rows] for each in fields(self)))
+
+
+class Present(NamedTuple):
+    """What a loop's system is like between two steps; shapes as a row's of :class:`Samples`."""
+
+    state: NDArray[np.float64]
+    memory: NDArray[np.float64]
+    configuration: NDArray[np.float64]
 
 
 class ClosedLoop(ABC):
@@ -52,6 +81,35 @@ class ClosedLoop(ABC):
 
         Its input is not a number if there is none, as outside the interior.
         """
+
+    @abstractmethod
+    def present(self) -> Present:
+        """Copies of the present state, which is not observed: nothing changes."""
+
+    def adopt(self, setup: "Setup") -> None:
+        """Go on from the present state with other numbers of the same game, law and agents.
+
+        In the held modes a law's memory that is still of the last control instant moves on by the
+        new numbers from there.
+
+        Args:
+            setup: of the same sizes; its clock is that of the present one.
+        """
+        self._adopt(setup)
+        # V is measured from another equilibrium now, so that a step across the change says nothing.
+        self.monitor[watch.STORAGE] = np.nan
+
+    @abstractmethod
+    def _adopt(self, setup: "Setup") -> None:
+        """Take the numbers."""
+
+    def push(self, force: NDArray[np.float64]) -> None:
+        """Forces (m,) on the agents' outputs besides their inputs, from now until changed.
+
+        Raises:
+            EngineError: this engine knows none.
+        """
+        raise EngineError("only robots in MuJoCo can be pushed while they run")
 
     @property
     @abstractmethod

@@ -12,7 +12,7 @@ import numpy as np
 
 from gne_mj.controllers.settings import DEALT, LINKS, PENALTY, SHELL, SHELL_VALUE
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS
-from gne_mj.native import copy, kernel
+from gne_mj.native import compiled, copy, kernel
 
 # Kinds of rows, in their order in ``Faults.rows``
 PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
@@ -131,6 +131,37 @@ def corrupt(problem, clock, count, step, m, memory):
 
 
 @kernel
+def comes(faults, time, count, link):
+    """Whether the message over a link is not lost in a control period; it may still be late."""
+    for f in range(faults.pointer[LOSS], faults.pointer[LOSS + 1]):
+        row = faults.rows[f]
+        chance = uniform(faults.numbers[SEED], row[STREAM], link, count)
+        if row[TARGET] == link and active(row, time) and chance < row[SIZE]:
+            return False
+    for f in range(faults.pointer[SILENCE], faults.pointer[SILENCE + 1]):
+        row = faults.rows[f]
+        if row[TARGET] == link and active(row, time):
+            return False
+    return True
+
+
+@compiled
+def count_messages(faults, h, period, first, last, out):
+    """Add what came and what was lost over every link, out (links, 2), in steps first to last.
+
+    Args:
+        faults: of the run.
+        h: the step in s.
+        period: steps between messages.
+        first, last: from the start of which step, to before the start of which.
+        out: changed.
+    """
+    for count in range(-(-first // period), -(-last // period)):
+        for link in range(len(out)):
+            out[link, 0 if comes(faults, count * period * h, count, link) else 1] += 1.0
+
+
+@kernel
 def exchange(problem, clock, count, step, memory, work):
     """Send all rows; over each link comes what was sent some periods ago, or nothing."""
     data, graph, faults = problem.data, problem.graph, problem.faults
@@ -142,20 +173,12 @@ def exchange(problem, clock, count, step, memory, work):
         memory[data.owner[r] * m + r] = work.seen[r]
     copy(memory[: agents * m], memory[at : at + agents * m])
     for link in range(len(graph.neighbour)):
-        delay, comes = 0, True
+        delay = 0
         for f in range(faults.pointer[LATE], faults.pointer[LATE + 1]):
             row = faults.rows[f]
             if row[TARGET] == link and active(row, time):
                 delay = max(delay, int(row[SIZE]))
-        for f in range(faults.pointer[LOSS], faults.pointer[LOSS + 1]):
-            row = faults.rows[f]
-            if row[TARGET] == link and active(row, time):
-                chance = uniform(faults.numbers[SEED], row[STREAM], link, count)
-                comes = comes and chance >= row[SIZE]
-        for f in range(faults.pointer[SILENCE], faults.pointer[SILENCE + 1]):
-            row = faults.rows[f]
-            comes = comes and not (row[TARGET] == link and active(row, time))
-        if comes and count >= delay:
+        if comes(faults, time, count, link) and count >= delay:
             sent = ring + ((count - delay) % slots) * agents * m + graph.neighbour[link] * m
             copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
 

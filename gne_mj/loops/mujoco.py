@@ -22,7 +22,7 @@ from gne_mj.errors import EngineError
 from gne_mj.game import Game
 from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import ClosedLoop, Samples
+from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import NO_SIZES, Sizes
 from gne_mj.loops.layout import (
     ACTIONS,
@@ -45,7 +45,7 @@ from gne_mj.loops.ode import CONTINUOUS, look
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.mujoco import MEMORY, NA, NU, NUSERDATA, PLACES, ROOM, SIZES, STAGES
+from gne_mj.plants.mujoco import MEMORY, NA, NQ, NU, NUSERDATA, PLACES, ROOM, SIZES, STAGES
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
@@ -132,7 +132,8 @@ def build(
         )  # fmt: skip
         block = np.int64(userdata[start + RECORDER])
         if good and stage == 0 and block > 0:
-            record(block, faults, agent, states, problem, clock, step, state, u, memory, work)
+            qpos = field(struct, at.qpos, sizes[NQ])
+            record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
         places = integers(table, PLACES)
         acts = faults.push(problem, clock, step, work.u, work.acts)
         for r in range(m):
@@ -198,7 +199,8 @@ def build(
         )  # fmt: skip
         block = np.int64(userdata[sizes[ROOM] + RECORDER])
         if good and block > 0:
-            record(block, faults, agent, states, problem, clock, step, state, u, memory, work)
+            qpos = field(data, at.qpos, sizes[NQ])
+            record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
         return good
 
     return (
@@ -310,7 +312,21 @@ class MujocoLoop(ClosedLoop):
             return recorder.samples(0)
         none = np.full((1, len(self._u)), np.nan)
         struck = none[:, : len(self._u) * self._faulty]
-        return Samples(state[None], none, self._memory[None].copy(), struck, struck)
+        qpos = data.qpos[None, : self.plant.configuration].copy()
+        return Samples(state[None], none, self._memory[None].copy(), struck, struck, qpos)
+
+    def present(self) -> Present:
+        """See the base class."""
+        qpos = self.plant.data.qpos[: self.plant.configuration].copy()
+        return Present(self.plant.state, self._memory.copy(), qpos)
+
+    def _adopt(self, setup: Setup) -> None:
+        self._table = mujoco_table(self.plant, setup, self.plant.agents, len(self._memory))
+
+    def push(self, force: NDArray[np.float64]) -> None:
+        """See the base class; forces are MuJoCo's qfrc_applied at the outputs' joints."""
+        at = self.plant.output_joints
+        self.plant.data.qfrc_applied[at[at >= 0]] = force[at >= 0]
 
     def _recorder(self, rows: int, every: int) -> Recorder:
         """Room for rows from now on, made known to the callbacks."""
@@ -323,7 +339,7 @@ class MujocoLoop(ClosedLoop):
         userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
         recorder = Recorder(
             1, rows, (agents.channels, agents.states), len(self._memory), self._faulty,
-            first=self._step, every=every,
+            self.plant.configuration, first=self._step, every=every,
         )  # fmt: skip
         userdata[self._start + RECORDER] = recorder.addresses[0]
         return recorder

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gne_mj.loops import explicit, faultless
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import ClosedLoop, Samples
+from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import inside
 from gne_mj.loops.layout import (
     ACTIONS,
@@ -195,7 +195,7 @@ def build(
                 if stage == 0 and block > 0:
                     record(
                         block, faults, agent, states, problem, clock, step, state[:size], u,
-                        state[size:], work,
+                        state[size:], work, state[:0],
                     )  # fmt: skip
                 if clock.mode == CONTINUOUS and count > 0:
                     acts = faults.push(problem, clock, step, work.u, work.acts)
@@ -269,6 +269,7 @@ class OdeLoop(ClosedLoop):
         faults: ModuleType = faultless,
     ) -> None:
         self._advance = build(agents.kind, law, game, acting, faults).ctypes
+        self._agents = agents
         self._table = ode_table(setup, agents, len(memory))
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
         self._faulty = faults is not faultless
@@ -292,11 +293,18 @@ class OdeLoop(ClosedLoop):
         rows = self._run(1, 1, 0)
         if len(rows.input):
             return rows
-        size = len(self._state) - self._memory
-        state, memory = self._state[:size].reshape(1, *self._shape), self._state[None, size:]
+        state, memory, _ = (row[None] for row in self.present())
         none = (np.full((1, row.shape[1]), np.nan) for row in (rows.input, rows.seen, rows.acts))
         u, seen, acts = none
-        return Samples(state.copy(), u, memory.copy(), seen, acts)
+        return Samples(state, u, memory, seen, acts, u[:, :0])
+
+    def present(self) -> Present:
+        """See the base class."""
+        now, size = self._state.copy(), len(self._state) - self._memory
+        return Present(now[:size].reshape(self._shape), now[size:], now[:0])
+
+    def _adopt(self, setup: Setup) -> None:
+        self._table = ode_table(setup, self._agents, self._memory)
 
     def _run(self, rows: int, every: int, steps: int) -> Samples:
         recorder = Recorder(

@@ -14,8 +14,8 @@ from gne_mj.table import exact, floats, integers_at
 
 FIRST, EVERY, ROWS, DONE = range(4)
 HEADER = 4  # the same as two pairs of a table
-STATE, INPUT, MEMORY, SEEN, ACTS = range(2, 7)
-WORDS = HEADER + 10
+STATE, INPUT, MEMORY, SEEN, ACTS, CONFIGURATION = range(2, 8)
+WORDS = HEADER + 12
 
 
 @kernel
@@ -27,8 +27,8 @@ def write(block, index, rows, row, source):
 
 
 @kernel
-def record(block, faults, agent, states, problem, clock, step, state, u, memory, work):
-    """Write this step's row, if one is due; state and u are flat, as they are at its start."""
+def record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos):
+    """Write this step's row, if one is due; state, u and qpos are flat, as at its start."""
     head = integers_at(block, HEADER)
     behind, rows = step - head[FIRST], head[ROWS]
     row = behind // head[EVERY]
@@ -37,6 +37,7 @@ def record(block, faults, agent, states, problem, clock, step, state, u, memory,
     write(block, STATE, rows, row, state)
     write(block, INPUT, rows, row, u)
     write(block, MEMORY, rows, row, memory)
+    write(block, CONFIGURATION, rows, row, qpos)
     seen, acts = floats(block, SEEN), floats(block, ACTS)
     width = len(seen) // rows
     at, end = row * width, (row + 1) * width
@@ -55,6 +56,7 @@ class Recorder:
         shape: (m, states) of the agents' channels.
         memory: entries of the law's memory.
         faulty: whether what was seen and what acted is recorded too.
+        configuration: joint positions to record besides.
         first: step of the first row.
         every: steps between rows.
 
@@ -69,13 +71,15 @@ class Recorder:
         shape: tuple[int, int],
         memory: int,
         faulty: bool,
+        configuration: int = 0,
         *,
         first: int = 0,
         every: int = 1,
     ) -> None:
         m = shape[0]
         struck = m * int(faulty)
-        columns = [np.empty((runs, rows, width)) for width in (m, memory, struck, struck)]
+        widths = (m, memory, struck, struck, configuration)
+        columns = [np.empty((runs, rows, width)) for width in widths]
         self._columns = [np.empty((runs, rows, *shape)), *columns]
         self.blocks = np.zeros((runs, WORDS), dtype=np.int64)
         self.blocks[:, : DONE + 1] = first, every, rows, 0

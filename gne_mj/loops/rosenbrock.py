@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from gne_mj.controllers.settings import EPSILON
 from gne_mj.graph import Graph
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import ClosedLoop, Samples
+from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import add_from_modes, modes_of, to_modes
 from gne_mj.loops.feedback import Problem, feedback, work
+from gne_mj.loops.layout import Setup
 from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure, stored
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
@@ -399,6 +400,16 @@ class RosenbrockLoop(ClosedLoop):
         )  # fmt: skip
         return self._samples(row, u)
 
+    def present(self) -> Present:
+        """See the base class; the state between two adaptive steps is interpolated."""
+        row, size = np.empty(self._length), self._shape[0] * self._shape[1]
+        interpolate(self._progress, self.time, self._solver.dense, row)
+        return Present(row[:size].reshape(self._shape), row[size:], row[:0])
+
+    def _adopt(self, setup: Setup) -> None:
+        _, channels, modes, how = self._fixed
+        self._fixed = (setup.problem, Channels(channels.parameters, setup.rest), modes, how)
+
     def _samples(self, states: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
         size = self._shape[0] * self._shape[1]
         return Samples(
@@ -407,4 +418,5 @@ class RosenbrockLoop(ClosedLoop):
             memory=states[:, size:],
             seen=inputs[:, :0],
             acts=inputs[:, :0],
+            configuration=inputs[:, :0],
         )

@@ -111,6 +111,11 @@ class MjcfPlant(Plant):
         return []
 
     @property
+    def configuration(self) -> int:
+        """Joint positions to record: all, since the state has but the outputs' joints."""
+        return int(self.model.nq)
+
+    @property
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
         return bool(np.all(self.places[:, OUTPUT_AT] >= 0))
@@ -165,6 +170,11 @@ class MjcfPlant(Plant):
                 f"actuator '{robot.input}' of agent {i + 1} clamps its input: give a limit of at"
                 f" most {least:g}",
             )
+
+    @property
+    def output_joints(self) -> NDArray[np.int64]:
+        """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
+        return np.maximum(self.places[:, OUTPUT_AT], -1)
 
     @property
     def state(self) -> NDArray[np.float64]:

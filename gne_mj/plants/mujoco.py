@@ -145,6 +145,7 @@ class MujocoPlant(Plant):
     """
 
     measures_every_stage = True
+    configuration = 0  # joint positions to record: the state says them
 
     def __init__(
         self,
@@ -222,6 +223,11 @@ class MujocoPlant(Plant):
             ("tendon_stiffness", tendons, parameters[:, :, 2]),
             ("tendon_damping", tendons, parameters[:, :, 4]),
         ]
+
+    @property
+    def output_joints(self) -> NDArray[np.int64]:
+        """(m,) the degree of freedom whose velocity is each output."""
+        return self.places[:, MAIN_V]
 
     @property
     def state(self) -> NDArray[np.float64]:

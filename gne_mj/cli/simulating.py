@@ -1,0 +1,104 @@
+"""What commands that run something, or read a run, have in common."""
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gne_mj.cli.arguments import settings
+from gne_mj.cli.output import PREPARING, progress, results, working
+
+if TYPE_CHECKING:
+    from gne_mj.simulation import Simulation
+    from gne_mj.trajectory import Trajectory
+
+
+def source_of(
+    scenario: str | None, folder: Path | None, index: int | None
+) -> "str | Mapping[str, Any]":
+    """What to run: a scenario's name, or the tables of a batch's run."""
+    from gne_mj.errors import InvalidInput
+
+    if (scenario is None) == (folder is None):
+        raise InvalidInput("SCENARIO", scenario, "either a scenario or --from must be given")
+    if folder is None:
+        if index is not None:
+            raise InvalidInput("--index", index, "it goes with --from")
+        assert scenario is not None
+        return scenario
+    if index is None:
+        raise InvalidInput("--index", index, "it must say which run of the batch")
+    from gne_mj.batches import Store
+
+    store = Store.open(folder)
+    for difference in store.check_files():
+        print(
+            f"gne-mj: warning: {difference} since the batch was run, so that the last bits may"
+            " differ",
+            file=sys.stderr,
+        )
+    tables: dict[str, Any] = json.loads(store.plan.alone(index).model_dump_json(exclude_none=True))
+    return tables
+
+
+def simulate(
+    scenario: "str | Mapping[str, Any]",
+    changes: list[str] | None,
+    out: Path | None,
+    *,
+    quiet: bool,
+    replace: bool = False,
+    figures: tuple[str, ...] = (),
+) -> "Trajectory":
+    """Run a scenario to its end, with progress, and keep it and ``figures`` in a folder."""
+    from gne_mj.simulation import interruption
+
+    simulation = load(scenario, changes, quiet=quiet)
+    # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
+    with (
+        interruption(),
+        results(out, replace) as folder,
+        progress(simulation.clock.duration, quiet) as show,
+    ):
+        trajectory = simulation.run(show)
+        if folder is not None:
+            keep(trajectory, folder)
+            if figures:
+                from gne_mj import plots
+
+                plots.save(trajectory, folder, figures)
+    return trajectory
+
+
+def keep(trajectory: "Trajectory", folder: Path) -> None:
+    """Write what a run leaves: the trajectory and its report."""
+    trajectory.save(folder / "trajectory.zarr")
+    report = json.dumps(trajectory.report(), indent=2)
+    (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+
+
+def stored(folder: Path) -> "Trajectory":
+    """The trajectory that a run wrote into a folder."""
+    from gne_mj.errors import InvalidInput
+    from gne_mj.trajectory import Trajectory
+
+    store = folder / "trajectory.zarr"
+    if not store.is_dir():
+        raise InvalidInput("RUN", str(folder), "it must be a folder with a trajectory.zarr")
+    try:
+        return Trajectory.load(store)
+    except (OSError, KeyError):
+        raise InvalidInput(
+            "RUN", str(folder), "its trajectory.zarr must be one that a run wrote"
+        ) from None
+
+
+def load(
+    scenario: "str | Mapping[str, Any]", changes: list[str] | None, *, quiet: bool
+) -> "Simulation":
+    """The simulation of a scenario with what --set changes."""
+    from gne_mj.scenario import load_scenario
+
+    with working(quiet, PREPARING):
+        return load_scenario(scenario, settings(changes)).simulation_object()

@@ -1,0 +1,138 @@
+"""Commands that show a run in a browser."""
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gne_mj.cli.application import app
+from gne_mj.cli.arguments import INDEX, PORT, settings
+from gne_mj.cli.output import PREPARING, results, tell, working
+from gne_mj.cli.simulating import keep, simulate, source_of, stored
+
+if TYPE_CHECKING:
+    from gne_mj.trajectory import Trajectory
+
+
+@app.command()
+def view(
+    run_folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Folder that `run --out`, `paper` or (with --index) `batch` wrote."
+        ),
+    ],
+    index: INDEX = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE", help="Write one file that opens from disk instead."),
+    ] = None,
+    port: PORT = None,
+) -> None:
+    """Show a stored run in a browser, with a time slider; a batch's run is run again for it."""
+    from gne_mj.errors import InvalidInput
+
+    if html is not None and port is not None:
+        raise InvalidInput("--port", port, "it is of no use with --html")
+    if html is not None and not html.parent.is_dir():
+        raise InvalidInput("--html", str(html), "its folder must exist")
+    if index is None:
+        trajectory, title = stored(run_folder), run_folder.name
+    else:
+        source = source_of(None, run_folder, index)
+        trajectory = simulate(source, None, None, quiet=False)
+        title = f"{run_folder.name}, run {index}"
+    if html is not None:
+        from gne_mj.view import write_html
+
+        print(write_html(trajectory, html, title))
+        return
+    _show(trajectory, title, port)
+
+
+def watch(
+    source: "str | Mapping[str, Any]",
+    changes: list[str] | None,
+    out: Path | None,
+    as_json: bool,
+    *,
+    title: str,
+    speed: str | None,
+    port: int | None,
+) -> "Trajectory":
+    """Run a scenario on a live page until Ctrl-C; what is kept and told is its first run.
+
+    Args:
+        source, changes: what to run, with what --set changes.
+        out: where to keep it.
+        as_json: print the report and nothing else.
+        title: of the page.
+        speed: as --speed gives it.
+        port: as --port gives it.
+    """
+    from gne_mj.scenario import load_scenario
+    from gne_mj.simulation import interruption
+
+    factor = _speed(speed)
+    with interruption() as stop:
+        with results(out, False) as folder:
+            with working(as_json, PREPARING):
+                from gne_mj.view import Session
+
+                scenario = load_scenario(source, settings(changes))
+                session = Session(scenario, title, speed=factor, port=port or 0)
+            _announce(session.server.url)
+            trajectory = session.run(stop)
+            if folder is not None:
+                keep(trajectory, folder)
+        tell(trajectory, as_json, out)
+        sys.stdout.flush()  # whoever reads it need not wait for the page's end
+        session.linger(stop)
+        session.server.close()
+    return trajectory
+
+
+def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
+    from gne_mj.simulation import interruption
+
+    with interruption() as stop:
+        with working(False, "preparing the replay"):
+            from gne_mj.view import serve
+
+            server = serve(trajectory, title, port=port or 0)
+        _announce(server.url)
+        while not stop.wait(1.0):
+            pass
+        server.close()
+
+
+def _speed(given: str | None) -> float | None:
+    """Times real time; None for as fast as possible."""
+    from gne_mj.errors import InvalidInput
+    from gne_mj.view.session import FASTEST
+
+    if given == "max":
+        return None
+    try:
+        speed = 1.0 if given is None else float(given)
+    except ValueError:
+        speed = 0.0
+    if not 0.0 < speed <= FASTEST:
+        raise InvalidInput(
+            "--speed", given, f"it must be 'max' or a positive number, at most {FASTEST:g}"
+        )
+    return speed
+
+
+def _announce(url: str) -> None:
+    """Say where the page is, and open it where somebody sits in front of a screen."""
+    print(f"view        {url}   (Ctrl-C ends)", file=sys.stderr, flush=True)
+    if sys.stderr.isatty() and (
+        sys.platform == "darwin" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        import webbrowser
+
+        webbrowser.open(url)

@@ -1,0 +1,32 @@
+"""Shows a simulation in a browser: live, as a replay, or as one file that needs no network.
+
+From MuJoCo's model and state come drawing commands and one array of poses (`mirror.py`, which
+serves any model and any ``meshcat.Visualizer``). With a game's quantities, bounds and messages they
+make up a scene of stages, one a system (`stage.py`, `fleet.py`, `scene.py`). A live page is fed by
+a session in the simulation's own thread through a server on the loopback interface (`session.py`,
+`server.py`). A replay is the same numbers in one pack (`replay.py`, `pack.py`), with the page
+around it or beside it (`html.py`, `page/`).
+"""
+
+from gne_mj.trajectory import Trajectory
+from gne_mj.view.html import html_page, write_html
+from gne_mj.view.mirror import Mirror
+from gne_mj.view.replay import replay
+from gne_mj.view.server import Server
+from gne_mj.view.session import Session
+
+__all__ = ["Mirror", "Server", "Session", "html_page", "replay", "serve", "write_html"]
+
+
+def serve(trajectory: Trajectory, title: str = "gne-mj replay", *, port: int = 0) -> Server:
+    """Serve a trajectory's replay on 127.0.0.1 until the server is closed or the process ends.
+
+    Args:
+        trajectory: of a scenario, which it holds.
+        title: of the page.
+        port: 0 for any that is free.
+
+    Raises:
+        InvalidInput: see :func:`gne_mj.view.replay.replay`; the port is taken.
+    """
+    return Server(title, replay=replay(trajectory, title), port=port)

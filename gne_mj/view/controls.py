@@ -1,0 +1,112 @@
+"""Which numbers of a scenario a live page can change, and which agents it can push."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gne_mj.scenario import Scenario
+from gne_mj.view.stage import Stage
+
+DECADES = 100.0  # a positive number's slider goes so many times up and down
+REACH = 5.0  # m/s, how far a velocity's slider goes up and down
+PUSH_FORCE, PUSH_DURATION = 5.0, 0.2  # N, s
+
+
+@dataclass(frozen=True)
+class Control:
+    """A number that a slider changes.
+
+    Attributes:
+        key: in the scenario, dotted; with an index in brackets for an entry of a list.
+        label: what a person reads.
+        system: that it is of.
+        unit: of the value.
+        value: at the start.
+        low, high: ends of the slider; any value that the scenario allows can be typed in.
+        logarithmic: whether the slider goes by ratios.
+    """
+
+    key: str
+    label: str
+    system: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    logarithmic: bool
+
+    def meta(self) -> dict[str, Any]:
+        """What JSON tells the page."""
+        return {
+            "key": self.key, "label": self.label, "system": self.system, "unit": self.unit,
+            "value": self.value, "min": self.low, "max": self.high,
+            "scale": "log" if self.logarithmic else "linear",
+        }  # fmt: skip
+
+    def change(self, tables: Mapping[str, Any], value: float) -> tuple[str, Any]:
+        """The scenario's key and its new value, a whole list where this is an entry of one."""
+        if not self.key.endswith("]"):
+            return self.key, value
+        key, _, index = self.key[:-1].rpartition("[")
+        found: Any = tables
+        for part in key.split("."):
+            found = found[part]
+        values = list(found)
+        values[int(index)] = value
+        return key, values
+
+
+def controls_of(scenario: Scenario) -> list[Control]:
+    """What can be changed while a scenario runs: penalties, reference velocities, gains."""
+    found = []
+    for name, table in scenario.systems.items():
+        start = f"systems.{name}"
+        if table.barrier.schedule is None:
+            found.append(
+                _positive(f"{start}.barrier.rho", "penalty ρ", name, "", table.barrier.rho)
+            )
+        reference = getattr(table.game, "reference_velocity", None)
+        if isinstance(reference, float):
+            key = f"{start}.game.reference_velocity"
+            found.append(_velocity(key, "reference v₀", name, reference))
+        elif isinstance(reference, list):
+            for index, (axis, value) in enumerate(zip("xyz", reference, strict=False)):
+                key = f"{start}.game.reference_velocity[{index}]"
+                found.append(_velocity(key, f"reference v₀, {axis}", name, value))
+        for key, label in (("coupling", "coupling c"), ("gain", "gain k")):
+            value = getattr(table.controller, key, None)
+            if value is not None:
+                found.append(_positive(f"{start}.controller.{key}", label, name, "", value))
+    return found
+
+
+def pushes_of(stages: list[Stage]) -> list[dict[str, Any]]:
+    """Whose agents have push buttons: robots that MuJoCo moves."""
+    found = []
+    for stage in stages:
+        system = stage.system
+        if system.engine != "mujoco":
+            continue
+        axes = max(system.game.sizes)
+        found.append(
+            {
+                "system": system.name,
+                "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
+                "unit": "N",
+                "force": PUSH_FORCE,
+                "duration": PUSH_DURATION,
+            }
+        )
+    return found
+
+
+def _positive(key: str, label: str, system: str, unit: str, value: float) -> Control:
+    return Control(
+        key, label, system, unit, value, value / DECADES, value * DECADES, logarithmic=True
+    )
+
+
+def _velocity(key: str, label: str, system: str, value: float) -> Control:
+    return Control(
+        key, label, system, "m/s", value, value - REACH, value + REACH, logarithmic=False
+    )

@@ -1,0 +1,129 @@
+"""A fleet of robots as it is drawn: which bodies stand for agents, and what shows their use."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.plants import flexible_robot
+from gne_mj.plants.mjcf_fleet import MjcfPlant
+from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.plants.mujoco import APPENDAGE_Q, MAIN_Q, MujocoPlant
+from gne_mj.system import Clock, System
+from gne_mj.view.mirror import Mirror
+
+
+class Fleet:
+    """A system's robots in their MJCF, whichever engine moves them.
+
+    Args:
+        plant: the robots; only looked at.
+        name: of their system.
+        agents: N.
+
+    Attributes:
+        mirror: draws them below the name.
+    """
+
+    def __init__(self, plant: MujocoPlant | MjcfPlant, name: str, agents: int) -> None:
+        self.plant, self.agents = plant, agents
+        self.mirror = Mirror(
+            plant.model,
+            prefix=(name,),
+            tinted=[geom for geoms in self._tinted for geom in geoms],
+            coils=self._coils,
+        )
+
+    def qpos(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """(T, nq) joint positions at the samples of a trajectory's variables."""
+        if isinstance(self.plant, MjcfPlant):
+            return values["configuration"]
+        state, at = values["state"], self.plant.places.T
+        extension, _, _, position = np.moveaxis(state, -1, 0)
+        found = np.zeros((len(state), self.plant.model.nq))
+        found[:, at[MAIN_Q]] = position
+        found[:, at[APPENDAGE_Q]] = position - extension
+        return found
+
+    @property
+    def places(self) -> dict[str, Any]:
+        """Where the page finds each agent's body, see :meth:`gne_mj.view.stage.Stage.meta`."""
+        model, mirror = self.plant.model, self.mirror
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        top = data.geom_xpos[:, 2] + model.geom_rbound
+        robots = model.body_rootid[model.geom_bodyid]
+        heights = [
+            np.max(top[robots == model.body_rootid[body]], initial=0.0) - data.xpos[body, 2]
+            for body in self._bodies
+        ]
+        anchors = [mirror.item_of(body) for body in self._bodies]
+        drawn = {path for path, _ in mirror.objects}
+        tints = [f"{mirror.items[item]}/tint" for item in anchors]
+        return {
+            "anchors": anchors,
+            "height": float(max(heights)),
+            "tints": [[path] if path in drawn else [] for path in tints],
+        }
+
+    @cached_property
+    def _bodies(self) -> list[int]:
+        """The body that stands for each agent: a main mass, or the one that an output moves."""
+        plant, model, count = self.plant, self.plant.model, self.agents
+        if isinstance(plant, MujocoPlant):
+            return [int(model.body(f"robot_{i + 1}/main").id) for i in range(count)]
+        joints = plant.output_joints
+        return [
+            int(model.dof_bodyid[joint]) if joint >= 0 else _first_body(model, f"robot_{i + 1}/")
+            for i, joint in enumerate(joints)
+        ]
+
+    @cached_property
+    def _tinted(self) -> list[list[int]]:
+        """The geoms of each agent that show by their colour how much of a bound is used."""
+        plant, model = self.plant, self.plant.model
+        if isinstance(plant, MujocoPlant):
+            names = [f"robot_{i + 1}/chassis" for i in range(self.agents)]
+            return [[int(model.geom(name).id)] for name in names]
+        return [np.flatnonzero(model.geom_bodyid == body).tolist() for body in self._bodies]
+
+    @property
+    def _coils(self) -> list[str] | None:
+        """Tendons drawn as springs: of flexible robots the ones for the eye."""
+        if isinstance(self.plant, MujocoPlant):
+            return [f"robot_{i + 1}/coil" for i in range(self.agents)]
+        return None
+
+
+def fleet_of(
+    system: System, clock: Clock, plant: MujocoPlant | MjcfPlant | None = None
+) -> Fleet | None:
+    """The fleet of a system, or None if its agents have no bodies.
+
+    Args:
+        system: whose robots.
+        clock: how it steps.
+        plant: the robots, if they are in MuJoCo already.
+    """
+    plant = plant or _plant(system, clock)
+    return None if plant is None else Fleet(plant, system.name, system.game.agents)
+
+
+def _plant(system: System, clock: Clock) -> MujocoPlant | MjcfPlant | None:
+    if isinstance(system.agents, MjcfRobots):
+        return MjcfPlant(system.agents, clock.timestep)
+    if system.agents.kind is not flexible_robot:
+        return None
+    try:
+        return MujocoPlant(system.agents, clock.timestep)
+    except InvalidInput:  # an ODE's robot whose axes have different masses is no body
+        return None
+
+
+def _first_body(model: mujoco.MjModel, prefix: str) -> int:
+    names = [model.body(body).name for body in range(model.nbody)]
+    return next(body for body, name in enumerate(names) if name.startswith(prefix))

@@ -1,0 +1,112 @@
+"""The page as text: served with its scripts beside it, or as one file with everything inside."""
+
+import base64
+import html
+import json
+import re
+from importlib.resources import files
+from pathlib import Path
+
+from gne_mj.trajectory import Trajectory
+from gne_mj.view.replay import replay
+
+# Names the page uses for files that are not its own
+_BUNDLE = "vendor/meshcat.min.js"
+_SETTINGS = '<script id="settings" type="application/json">{}</script>'
+# A page from disk has no business on any network.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline';"
+    " img-src data: blob:; base-uri 'none'; form-action 'none'"
+)
+
+
+def served_page(mode: str, title: str) -> str:
+    """The page that asks its server for scripts; mode "live" or "served"."""
+    return _begin(mode, title)
+
+
+def html_page(trajectory: Trajectory, title: str | None = None) -> str:
+    """A trajectory's replay as one page that needs no other file and no network.
+
+    Args:
+        trajectory: of a scenario, which it holds.
+        title: of the page; the scenario's description if left out.
+
+    Raises:
+        InvalidInput: see :func:`gne_mj.view.replay.replay`.
+    """
+    data = base64.b64encode(replay(trajectory, title)).decode("ascii")
+    text = _begin("file", title or "gne-mj replay")
+    text = text.replace(
+        "<head>",
+        f'<head>\n<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+        1,
+    )
+    text = re.sub(r'<script src="([^"]+)"></script>', _script, text)
+    text = re.sub(r'<link rel="stylesheet" href="([^"]+)">', _style, text)
+    # before the scripts, which look for it at once
+    return text.replace(
+        "<body>", f'<body>\n<script id="replay" type="text/plain">{data}</script>', 1
+    ).replace("</body>", f"<!--\n{_licences()}\n-->\n</body>")
+
+
+def write_html(trajectory: Trajectory, path: str | Path, title: str | None = None) -> Path:
+    """Write :func:`html_page` into a file, which it replaces only when it is whole."""
+    path = Path(path)
+    text = html_page(trajectory, title)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def page_file(name: str) -> bytes:
+    """One of the page's files, or meshcat's bundle under the name that the page has for it.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    if not re.fullmatch(r"(vendor/)?[\w-]+(\.[\w-]+)+", name, flags=re.ASCII):
+        raise FileNotFoundError(name)
+    if name == _BUNDLE:
+        return (_meshcat_viewer() / "dist" / "main.min.js").read_bytes()
+    return files("gne_mj.view").joinpath("page", *name.split("/")).read_bytes()
+
+
+def _begin(mode: str, title: str) -> str:
+    text = page_file("index.html").decode("utf-8")
+    settings = json.dumps({"mode": mode})
+    text = text.replace(_SETTINGS, _SETTINGS.replace("{}", settings), 1)
+    return re.sub("<title>.*?</title>", lambda _: f"<title>{html.escape(title)}</title>", text)
+
+
+def _script(match: re.Match[str]) -> str:
+    text = page_file(match[1]).decode("utf-8")
+    # what ends a script, or begins a comment, for HTML's parser
+    text = re.sub(r"<(/script|!--)", r"\\x3c\1", text, flags=re.IGNORECASE)
+    return f"<script>{text}</script>"
+
+
+def _style(match: re.Match[str]) -> str:
+    return f"<style>{page_file(match[1]).decode('utf-8')}</style>"
+
+
+def _licences() -> str:
+    """Of what a page from disk carries along."""
+    viewer = _meshcat_viewer()
+    texts = [
+        "meshcat\n" + (viewer / "LICENSE").read_text(encoding="utf-8"),
+        (viewer / "dist" / "main.min.js.LICENSE.txt").read_text(encoding="utf-8"),
+        "uPlot\n" + page_file("vendor/uPlot-LICENSE.txt").decode("utf-8"),
+    ]
+    return "\n".join(texts).replace("--", "- -")
+
+
+def _meshcat_viewer() -> Path:
+    from meshcat import viewer_assets_path
+
+    return Path(viewer_assets_path())

@@ -1,0 +1,357 @@
+"""A MuJoCo model as meshcat draws it: what is drawn once, and where it is at a state."""
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gne_mj.view.shapes import (
+    Group,
+    Json,
+    Matrix,
+    Part,
+    coil,
+    height_field,
+    material,
+    mesh,
+    plane,
+    plane_texture,
+    primitive,
+    texture,
+    tube,
+)
+
+GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2 unless told otherwise
+DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)  # an element of this colour has its material's
+APART = 1e-3  # m between joints that a fixed tendon is drawn between
+COIL_RADIUS = 2.5, 0.02  # of a tendon's width, and at least so many m
+# A floor does not shine, and is behind what lies in it, as meshcat's own grid does
+FLOOR = {
+    "specular": 0, "polygonOffset": True, "polygonOffsetFactor": 1, "polygonOffsetUnits": 1
+}  # fmt: skip
+NOTHING = 1e-9  # scale of what is hidden; three.js cannot take 0 apart into rotation and scale
+
+# An item's entries in an array of poses
+POSITION, QUATERNION, LENGTH = slice(0, 3), slice(3, 7), 7
+
+
+class Mirror:
+    """Draws a model, and says where everything is for given joint positions.
+
+    Geoms and sites that move with one body are one object, those that never move one more. As in
+    MuJoCo's viewer, of groups 0 to 2 what is not transparent altogether is drawn, and an element's
+    own colour hides its material's. Of textures the 2-D ones of planes, and of meshes with texture
+    coordinates, are there. Flexes, skins, lights, cameras, contacts and what else a viewer adds
+    are not.
+
+    Tendons are lines of straight segments, as many as there can ever be. A fixed tendon goes
+    through the anchors of its joints where they lie apart.
+
+    Args:
+        model: any model. It is kept, and read again with each call of :meth:`poses`.
+        prefix: parts of the path that everything is drawn below, as ``("robots",)``.
+        tinted: names or numbers of geoms to draw as an object of their own, their body's
+            ``.../tint``, which a viewer can colour.
+        coils: names of tendons to draw as helical springs; None: those with a stiffness that run
+            straight from one site to another.
+
+    Attributes:
+        items: K paths of what moves: bodies, which have the path of their name, then segments of
+            tendons.
+        objects: path and object of all that is drawn, to be set once.
+
+    Raises:
+        KeyError: a name that the model does not have.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        *,
+        prefix: tuple[str, ...] = (),
+        tinted: Iterable[str | int] = (),
+        coils: Iterable[str] | None = None,
+    ) -> None:
+        self.model = model
+        self._data = mujoco.MjData(model)
+        self._mocap = np.concatenate([self._data.mocap_pos, self._data.mocap_quat], axis=1)
+        mujoco.mj_kinematics(model, self._data)
+        # bodies that are welded to the world never move; mocap bodies do not count as such
+        self._bodies = np.flatnonzero(model.body_weldid)
+        segments = self._tendon_segments()
+        first = len(self._bodies) + np.cumsum(segments) - segments
+        self._segments, self._first = segments, first
+        self._joints, self._joint_rows = self._fixed_tendons()
+        self._spatial = bool(np.any(segments[~self._is_fixed()]))
+
+        world, *self.items = self._paths(prefix)
+        paths = np.full(model.nbody, world, dtype=object)
+        paths[self._bodies] = self.items[: len(self._bodies)]
+        parts: dict[str, list[Part]] = {}
+        tints = {model.geom(name).id for name in tinted}
+        for geom in _shown(model, "geom"):
+            path = paths[model.geom_bodyid[geom]] + ("/tint" if geom in tints else "")
+            parts.setdefault(path, []).extend(self._parts("geom", geom))
+        for site in _shown(model, "site"):
+            parts.setdefault(paths[model.site_bodyid[site]], []).extend(self._parts("site", site))
+        coiled = self._springs() if coils is None else {model.tendon(name).id for name in coils}
+        for tendon in np.flatnonzero(segments).tolist():
+            part = self._segment(tendon, coiled=tendon in coiled)
+            for row in range(first[tendon], first[tendon] + segments[tendon]):
+                parts[self.items[row]] = [part]
+        self.objects = [(path, Group(own)) for path, own in parts.items() if own]
+
+    def item_of(self, body: int) -> int:
+        """Which item a body is.
+
+        Raises:
+            KeyError: it never moves.
+        """
+        (found,) = np.nonzero(self._bodies == body)
+        if not len(found):
+            raise KeyError(self.model.body(body).name)
+        return int(found[0])
+
+    def poses(self, qpos: ArrayLike, mocap: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Where all items are.
+
+        Only kinematics are computed, which call none of MuJoCo's callbacks.
+
+        Args:
+            qpos: (nq,) joint positions.
+            mocap: (nmocap, 7) mocap bodies' position (m) and quaternion w x y z; None: the model's.
+
+        Returns:
+            (K, 8): position (m), quaternion w x y z, and length: 1 for bodies, in m for segments of
+            tendons, which begin at their position and go along their z axis; 0 hides one that is
+            not needed.
+        """
+        model, data = self.model, self._data
+        data.qpos[:] = qpos
+        mocap = self._mocap if mocap is None else np.asarray(mocap, dtype=np.float64)
+        data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
+        mujoco.mj_kinematics(model, data)
+        poses = np.zeros((len(self.items), 8))
+        poses[:, QUATERNION.start] = 1.0
+        bodies = poses[: len(self._bodies)]
+        bodies[:, POSITION] = data.xpos[self._bodies]
+        bodies[:, QUATERNION] = data.xquat[self._bodies]
+        bodies[:, LENGTH] = 1.0
+        if len(self._joints):
+            anchors = data.xanchor[self._joints]
+            _stretch(poses, self._joint_rows, anchors[:, 0], anchors[:, 1], least=APART)
+        if self._spatial:
+            _stretch(poses, *self._spatial_segments())
+        return poses
+
+    def draw(self, visualizer: Any) -> None:
+        """Draw everything, at the model's reference position, into a ``meshcat.Visualizer``."""
+        for path, content in self.objects:
+            visualizer[path].set_object(content)
+        self.set_poses(visualizer, self.poses(self.model.qpos0))
+
+    def set_poses(self, visualizer: Any, poses: NDArray[np.float64]) -> None:
+        """Move everything to its pose, (K, 8) of :meth:`poses`, in a ``meshcat.Visualizer``."""
+        for path, matrix in zip(self.items, transforms(poses), strict=True):
+            visualizer[path].set_transform(matrix)
+
+    def _paths(self, prefix: tuple[str, ...]) -> list[str]:
+        """The paths of the world, of bodies that move, of segments."""
+        model = self.model
+        # name, and what is called so if it has none or another one the same
+        names = [(model.body(body).name, f"body_{body}") for body in (0, *self._bodies)]
+        for tendon in np.flatnonzero(self._segments):
+            name, other = model.tendon(tendon).name, f"tendon_{tendon}"
+            if self._segments[tendon] == 1:
+                names.append((name, other))
+                continue
+            for number in range(1, self._segments[tendon] + 1):
+                names.append((f"{name or other}/{number}", f"{other}_{number}"))
+        paths = [
+            (*prefix, *(part for part in (name or other).split("/") if part))
+            for name, other in names
+        ]
+        # meshcat moves what is below a path along with it, so none may be below another
+        while True:
+            uses = Counter(path[:end] for path in paths for end in range(len(path) + 1))
+            if all(uses[path] == 1 for path in paths):
+                return ["/".join(path) for path in paths]
+            paths = [
+                path if uses[path] == 1 else (*path, other)
+                for path, (_, other) in zip(paths, names, strict=True)
+            ]
+
+    def _parts(self, what: str, number: int) -> list[Part]:
+        """A geom or site as a mesh of its body's group; none if it cannot be drawn."""
+        element = getattr(self.model, what)(number)
+        drawn = self._shape(element, int(getattr(self.model, f"{what}_dataid")[number]))
+        if drawn is None:
+            return []
+        geometry, own, surface = drawn
+        at = np.eye(4)
+        if self.model.body_weldid[element.bodyid[0]]:
+            at[:3, :3], at[:3, 3] = rotations(element.quat), element.pos
+        else:
+            place = getattr(self._data, what)(number)
+            at[:3, :3], at[:3, 3] = place.xmat.reshape(3, 3), place.xpos
+        return [Part(element.name or f"{what}_{number}", geometry, surface, at @ own)]
+
+    def _shape(self, element: Any, number: int) -> tuple[Json, Matrix, Json] | None:
+        """Geometry (of mesh or height field ``number``), its own matrix, and material."""
+        model, kind, matid = self.model, int(element.type[0]), int(element.matid[0])
+        rgba = _colours(model, element.rgba[None], element.matid)[0]
+        image = _image(model, matid)
+        more: Json = {}
+        match mujoco.mjtGeom(kind):
+            case mujoco.mjtGeom.mjGEOM_PLANE:
+                if image >= 0:
+                    repeat, uniform = model.mat_texrepeat[matid], bool(model.mat_texuniform[matid])
+                    more["map"] = plane_texture(
+                        model, image, element.size, repeat=repeat, uniform=uniform
+                    )
+                return plane(element.size), np.eye(4), material(rgba, **FLOOR, **more)
+            case mujoco.mjtGeom.mjGEOM_MESH | mujoco.mjtGeom.mjGEOM_SDF:
+                if image >= 0 and model.mesh_texcoordadr[number] >= 0:
+                    more["map"] = texture(model, image, model.mat_texrepeat[matid])
+                return mesh(model, number), np.eye(4), material(rgba, **more)
+            case mujoco.mjtGeom.mjGEOM_HFIELD:
+                return height_field(model, number), np.eye(4), material(rgba)
+        drawn = primitive(kind, element.size)
+        return None if drawn is None else (*drawn, material(rgba))
+
+    def _is_fixed(self) -> NDArray[np.bool_]:
+        """(tendons,)"""
+        model = self.model
+        if not model.ntendon:
+            return np.zeros(0, dtype=bool)
+        return model.wrap_type[model.tendon_adr] == mujoco.mjtWrap.mjWRAP_JOINT
+
+    def _tendon_segments(self) -> NDArray[np.int64]:
+        """(tendons,) how many segments each has at most; none if it is not shown."""
+        model, wrap = self.model, mujoco.mjtWrap
+        segments = np.zeros(model.ntendon, dtype=np.int64)
+        for tendon in _shown(model, "tendon"):
+            at = model.tendon_adr[tendon]
+            path = model.wrap_type[at : at + model.tendon_num[tendon]]
+            # a geom that is wrapped around is touched where the tendon comes and where it goes
+            round_geom = np.isin(path, [wrap.mjWRAP_SPHERE, wrap.mjWRAP_CYLINDER])
+            whole = np.repeat(path, np.where(round_geom, 2, 1)) != wrap.mjWRAP_PULLEY
+            segments[tendon] = np.count_nonzero(whole[:-1] & whole[1:])
+        return segments
+
+    def _fixed_tendons(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(n, 2) joints that segments of fixed tendons go between, and their rows of poses."""
+        joints, rows = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        for tendon in np.flatnonzero(self._is_fixed() & (self._segments > 0)):
+            places = self.model.tendon_adr[tendon] + np.arange(self._segments[tendon])
+            along = self.model.wrap_objid
+            joints.append(np.column_stack([along[places], along[places + 1]]))
+            rows.append(self._first[tendon] + np.arange(len(places)))
+        return np.concatenate(joints), np.concatenate(rows)
+
+    def _spatial_segments(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Rows of poses, starts and ends (m) of the segments that spatial tendons have now."""
+        model, data = self.model, self._data
+        mujoco.mj_tendon(model, data)  # its Jacobians, not needed here, would want mj_comPos
+        tendon = np.repeat(np.arange(model.ntendon), data.ten_wrapnum)
+        points = data.wrap_xpos.reshape(-1, 3)[: len(tendon)]
+        whole = data.wrap_obj.ravel()[: len(tendon)] != -2  # at a pulley
+        whole &= self._segments[tendon] > 0
+        starts = np.flatnonzero(whole[:-1] & whole[1:] & (tendon[:-1] == tendon[1:]))
+        owner = tendon[starts]
+        rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        return self._first[owner] + rank, points[starts], points[starts + 1]
+
+    def _springs(self) -> set[int]:
+        """Spatial tendons with a stiffness, from one site straight to another."""
+        model = self.model
+        straight = ~self._is_fixed() & (model.tendon_num == 2)
+        return set(np.flatnonzero(straight & (model.tendon_stiffness > 0)).tolist())
+
+    def _segment(self, tendon: int, *, coiled: bool) -> Part:
+        model = self.model
+        width = float(model.tendon_width[tendon])
+        if coiled:
+            share, least = COIL_RADIUS
+            length = float(model.tendon_length0[tendon]) / int(self._segments[tendon])
+            geometry, matrix = coil(max(share * width, least), length)
+        else:
+            geometry, matrix = tube(width)
+        rgba = _colours(model, model.tendon_rgba[[tendon]], model.tendon_matid[[tendon]])[0]
+        name = model.tendon(tendon).name or f"tendon_{tendon}"
+        return Part(name, geometry, material(rgba), matrix)
+
+
+def _colours(model: mujoco.MjModel, rgba: Any, matid: Any) -> NDArray[np.float64]:
+    """(n, 4) what MuJoCo takes of elements' own colours (n, 4) and of their materials (n,)."""
+    of_material = (matid >= 0) & np.all(rgba == DEFAULT_RGBA, axis=1)
+    return np.where(of_material[:, None], model.mat_rgba[matid] if model.nmat else rgba, rgba)
+
+
+def _image(model: mujoco.MjModel, matid: int) -> int:
+    """The 2-D texture of a material; -1: none."""
+    roles = mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA
+    image = -1 if matid < 0 else max(int(model.mat_texid[matid, int(role)]) for role in roles)
+    flat = image >= 0 and model.tex_type[image] == mujoco.mjtTexture.mjTEXTURE_2D
+    return image if flat else -1
+
+
+def _shown(model: mujoco.MjModel, what: str) -> list[int]:
+    """The geoms, sites or tendons that MuJoCo's viewer shows."""
+    group, rgba, matid = (getattr(model, f"{what}_{n}") for n in ("group", "rgba", "matid"))
+    return np.flatnonzero((group < GROUPS) & (_colours(model, rgba, matid)[:, 3] > 0)).tolist()
+
+
+def _stretch(
+    poses: NDArray[np.float64],
+    rows: NDArray[np.int64],
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    *,
+    least: float = 0.0,
+) -> None:
+    """Lay segments from (n, 3) to (n, 3); one shorter than ``least`` (m) is hidden."""
+    length = np.linalg.norm(end - start, axis=1)
+    direction = (end - start) / np.maximum(length, np.finfo(float).tiny)[:, None]
+    poses[rows, POSITION] = start
+    poses[rows, QUATERNION] = turning_z_to(direction)
+    poses[rows, LENGTH] = np.where(length >= least, length, 0.0)
+
+
+def turning_z_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 4) quaternions w x y z that take z the shortest way to unit vectors (n, 3); zeros: none.
+
+    They depend continuously on the direction but at -z, where no choice would.
+    """
+    x, y, z = direction.T
+    across = x * x + y * y
+    # 1 + z, which loses all digits near -z where it is written so
+    w = np.where(z >= 0, 1 + z, across / (1 + np.abs(z)))
+    quaternion = np.column_stack([w, -y, x, np.zeros_like(w)])
+    quaternion[(z < 0) & (across < 1e-30)] = 0.0, 1.0, 0.0, 0.0
+    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+
+
+def rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(..., 3, 3) matrices of unit quaternions (..., 4), w x y z."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def transforms(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K, 4, 4) matrices of poses (K, 8): what is hidden shrinks to a point."""
+    length = poses[:, LENGTH]
+    scale = np.where(length > 0, [np.ones_like(length), np.ones_like(length), length], NOTHING)
+    matrices = np.zeros((len(poses), 4, 4))
+    matrices[:, :3, :3] = rotations(poses[:, QUATERNION]) * scale.T[:, None, :]
+    matrices[:, :3, 3] = poses[:, POSITION]
+    matrices[:, 3, 3] = 1.0
+    return matrices

@@ -1,0 +1,76 @@
+"""The one container in which numbers reach the page: a JSON header and arrays behind it.
+
+Bytes: ``GNE1``, the header's length (unsigned 32 bits, little-endian), the header, zeros up to a
+multiple of 8, the arrays' data. The header is ``{"meta": ..., "arrays": [...]}``; each array has a
+name, dtype, shape and offset into the data. A shuffled array has the first bytes of all its entries
+first, then all second ones and so on, which compresses to a fraction for smooth data. Meshcat's own
+messages never begin with a "G".
+"""
+
+import json
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAGIC = b"GNE1"
+_DTYPES = {"f8": "<f8", "f4": "<f4", "i4": "<i4", "u1": "u1"}
+
+
+def pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """One message of the live page.
+
+    Args:
+        meta: what JSON can hold; numbers must be finite.
+        arrays: of float64, float32, int32 or uint8, by name.
+    """
+    return _pack(meta, arrays, shuffled=False)
+
+
+def packed_small(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """The same, shuffled and compressed (zlib), for a replay."""
+    return zlib.compress(_pack(meta, arrays, shuffled=True), 9)
+
+
+def unpack(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Meta and arrays of a pack, or of a compressed one."""
+    if not data.startswith(MAGIC):
+        data = zlib.decompress(data)
+    length = int.from_bytes(data[4:8], "little")
+    header = json.loads(data[8 : 8 + length])
+    start = _aligned(8 + length)
+    arrays = {}
+    for entry in header["arrays"]:
+        kind = np.dtype(_DTYPES[entry["dtype"]])
+        count = int(np.prod(entry["shape"], dtype=np.int64))
+        first = start + entry["offset"]
+        raw = np.frombuffer(data, dtype=np.uint8, count=count * kind.itemsize, offset=first)
+        if entry["shuffled"]:
+            raw = np.ascontiguousarray(raw.reshape(kind.itemsize, count).T).reshape(-1)
+        arrays[entry["name"]] = raw.view(kind).reshape(entry["shape"])
+    return header["meta"], arrays
+
+
+def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled: bool) -> bytes:
+    entries, pieces, offset = [], [], 0
+    for name, array in arrays.items():
+        code = f"{array.dtype.kind}{array.dtype.itemsize}"
+        raw = np.ascontiguousarray(array, dtype=_DTYPES[code]).reshape(-1).view(np.uint8)
+        mixed = shuffled and array.dtype.itemsize > 1
+        if mixed:
+            raw = np.ascontiguousarray(raw.reshape(-1, array.dtype.itemsize).T)
+        entries.append(
+            {"name": name, "dtype": code, "shape": array.shape, "offset": offset, "shuffled": mixed}
+        )
+        piece = raw.tobytes()
+        pieces.append(piece + bytes(_aligned(len(piece)) - len(piece)))
+        offset += len(pieces[-1])
+    header = json.dumps({"meta": meta, "arrays": entries}, allow_nan=False).encode()
+    head = MAGIC + len(header).to_bytes(4, "little") + header
+    return b"".join([head, bytes(_aligned(len(head)) - len(head)), *pieces])
+
+
+def _aligned(length: int) -> int:
+    return -(-length // 8) * 8

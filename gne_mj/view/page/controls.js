@@ -1,0 +1,244 @@
+"use strict";
+// What users press: transport, tuning, keys, notices.
+(() => {
+  const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
+
+  const speedName = (speed) => (speed === null ? "max" : `×${speed}`);
+
+  /** Play, step, speed and time. */
+  GNE.Transport = class {
+    /** page: what is to be driven: playPause, step, restart, setSpeed, seek. */
+    constructor(page) {
+      this.page = page;
+      this.play = GNE.byId("play");
+      this.speed = GNE.byId("speed");
+      this.slider = GNE.byId("time-slider");
+      this.marks = GNE.byId("time-marks");
+      this.play.onclick = () => page.playPause();
+      GNE.byId("step").onclick = (event) => page.step(1, event.shiftKey);
+      GNE.byId("back").onclick = (event) => page.step(-1, event.shiftKey);
+      GNE.byId("restart").onclick = () => page.restart();
+      this.speed.onchange = () => page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
+      this.slider.oninput = () => page.seek(Number(this.slider.value));
+    }
+
+    setSpeeds(live, speed) {
+      const all = live ? [...SPEEDS, null] : [...SPEEDS];
+      if (!all.includes(speed)) all.unshift(speed);
+      const key = JSON.stringify([all, speed]);
+      if (key === this.speedKey) return;
+      this.speedKey = key;
+      this.speed.replaceChildren(
+        ...all.map((each) =>
+          GNE.element("option", { value: each ?? "max", text: speedName(each), selected: each === speed }),
+        ),
+      );
+    }
+
+    /** state: {playing, seekable, live, connected, time, end, speed} */
+    show(state) {
+      const { playing, seekable } = state;
+      this.play.dataset.playing = playing;
+      this.play.setAttribute("aria-label", playing ? "pause" : "play");
+      this.play.title = playing ? "Pause (space)" : "Play (space)";
+      const dead = !seekable && !state.connected;
+      for (const id of ["play", "step", "speed"]) GNE.byId(id).disabled = dead;
+      GNE.byId("back").disabled = !seekable;
+      const restart = GNE.byId("restart");
+      restart.disabled = state.live && !state.connected;
+      restart.title = state.live ? "Restart the simulation (R)" : "To the start (R)";
+      restart.setAttribute("aria-label", state.live ? "restart the simulation" : "to the start");
+      this.setSpeeds(!seekable, state.speed);
+      this.showTime(state);
+    }
+
+    showTime({ time, end, seekable }) {
+      this.slider.disabled = !seekable;
+      GNE.byId("time-track").title = seekable
+        ? ""
+        : "While the simulation runs, time cannot be turned back; the slider works when the run has ended.";
+      if (Number(this.slider.max) !== end) this.slider.max = end;
+      this.slider.value = time;
+      this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds of ${end}`);
+      this.slider.style.setProperty("--done", `${end ? (100 * time) / end : 0}%`);
+    }
+
+    /** Marks along the slider: exits and interventions. */
+    mark(marks, end) {
+      this.marks.replaceChildren(
+        ...marks.map(({ time, what, bad }) =>
+          GNE.element("span", {
+            class: bad ? "mark bad" : "mark",
+            title: `${time.toFixed(2)} s: ${what}`,
+            style: `left: ${(100 * time) / (end || 1)}%`,
+          }),
+        ),
+      );
+    }
+  };
+
+  /** Sliders and pushes of a live simulation. */
+  GNE.Tuning = class {
+    constructor(send) {
+      this.send = send;
+      this.panel = GNE.byId("tuning");
+      this.body = GNE.byId("tuning-body");
+      this.sliders = new Map();
+    }
+
+    build(meta) {
+      this.sliders.clear();
+      this.body.replaceChildren();
+      const controls = meta.controls || [];
+      const pushes = meta.pushes || [];
+      this.panel.hidden = controls.length + pushes.length === 0;
+      this.panel.open = innerWidth > 1000 && innerHeight > 600; // else the view needs the room
+      for (const { name } of meta.systems) {
+        const own = controls.filter((control) => control.system === name);
+        const push = pushes.filter((each) => each.system === name);
+        if (!own.length && !push.length) continue;
+        const system = meta.systems.find((each) => each.name === name);
+        this.body.append(
+          GNE.element(
+            "div", { class: "tuning-row", role: "group", "aria-label": name },
+            GNE.element("h3", { text: name }),
+            ...own.map((control) => this.slider(control)),
+            ...push.map((each) => this.pushes(each, system)),
+          ),
+        );
+      }
+      const general = controls.filter(({ system }) => !meta.systems.some(({ name }) => name === system));
+      if (general.length)
+        this.body.append(
+          GNE.element("div", { class: "tuning-row" }, ...general.map((control) => this.slider(control))),
+        );
+    }
+
+    slider(control) {
+      const { key, label, unit, min, max, scale, value } = control;
+      const log = scale === "log" && min > 0;
+      const toPlace = log
+        ? (v) => Math.log(v / min) / Math.log(max / min)
+        : (v) => (v - min) / (max - min);
+      const fromPlace = log ? (p) => min * (max / min) ** p : (p) => min + (max - min) * p;
+      const range = GNE.element("input", {
+        type: "range", min: 0, max: 1, step: 0.002, "aria-label": label, title: key,
+      });
+      const number = GNE.element("input", {
+        type: "number", min, max, step: "any", "aria-label": `${label}, as a number`,
+      });
+      const show = (v) => {
+        range.value = toPlace(v);
+        range.setAttribute("aria-valuetext", GNE.withUnit(v, unit));
+        range.style.setProperty("--done", `${100 * toPlace(v)}%`);
+        if (document.activeElement !== number) number.value = Number(v.toPrecision(3));
+      };
+      const set = this.atMost(12, (v) => this.send({ do: "set", key, value: v }));
+      range.oninput = () => {
+        const v = Number(fromPlace(Number(range.value)).toPrecision(3));
+        show(v);
+        set(v);
+      };
+      number.onchange = () => {
+        const v = Number(number.value);
+        if (number.value !== "" && Number.isFinite(v)) set(v);
+      };
+      show(value);
+      this.sliders.set(key, show);
+      return GNE.element(
+        "div", { class: "control" },
+        GNE.element("span", { class: "control-label", text: label }),
+        range,
+        number,
+        GNE.element("span", { class: "unit", text: unit }),
+      );
+    }
+
+    /** Calls at most so many times per second; the last value is never dropped. */
+    atMost(perSecond, call) {
+      let waiting = null;
+      let latest;
+      return (value) => {
+        latest = value;
+        waiting ??= setTimeout(() => {
+          waiting = null;
+          call(latest);
+        }, 1000 / perSecond);
+      };
+    }
+
+    pushes({ system, axes, unit, force, duration }, { agents, agent_name: noun }) {
+      const title = `Push with ${GNE.withUnit(force, unit)} for ${GNE.number(duration)} s`;
+      const buttons = (agentOf, about) =>
+        axes.flatMap((axis, k) =>
+          [-1, 1].map((sign) =>
+            GNE.element("button", {
+              type: "button", class: "push",
+              text: axis === "y" ? (sign < 0 ? "↓" : "↑") : sign < 0 ? "←" : "→",
+              title: `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
+              "aria-label": `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
+              onclick: () =>
+                this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force }),
+            }),
+          ),
+        );
+      const box = GNE.element("div", { class: "pushes", role: "group", "aria-label": title });
+      box.append(GNE.element("p", { class: "small", text: title }));
+      if (agents <= 8) {
+        const list = GNE.element("div", { class: "push-list" });
+        for (let agent = 1; agent <= agents; agent++)
+          list.append(
+            GNE.element(
+              "span", { class: "push-one" },
+              GNE.element("b", { text: agent }),
+              ...buttons(() => agent, () => `${noun} ${agent}`),
+            ),
+          );
+        box.append(list);
+        return box;
+      }
+      const select = GNE.element("select", { "aria-label": `${noun} to push` });
+      for (let agent = 1; agent <= agents; agent++)
+        select.append(GNE.element("option", { value: agent, text: `${noun} ${agent}` }));
+      const chosen = () => Number(select.value);
+      box.append(GNE.element("span", { class: "push-one" }, select, ...buttons(chosen, () => `the chosen ${noun}`)));
+      return box;
+    }
+
+    follow(values) {
+      for (const [key, value] of Object.entries(values)) this.sliders.get(key)?.(value);
+    }
+  };
+
+  /** A sentence that goes away by itself; errors stay longer and are announced at once. */
+  GNE.toast = (text, level = "info") => {
+    const error = level === "error";
+    const toast = GNE.element(
+      "div", { class: `toast ${error ? "error" : ""}` },
+      GNE.element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
+      GNE.element("span", { text }),
+    );
+    const place = GNE.byId(error ? "alerts" : "notices");
+    place.append(toast);
+    while (place.children.length > 3) place.firstChild.remove();
+    setTimeout(() => toast.remove(), error ? 12000 : 5000);
+  };
+
+  /** Keys by name; not while one types, nor where a key means something to the focused element. */
+  GNE.keys = (actions) => {
+    addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const { target } = event;
+      const type = target.tagName === "INPUT" ? target.type : target.tagName;
+      if (["number", "text", "SELECT", "TEXTAREA"].includes(type)) return;
+      const steers = type === "range" && target.id !== "time-slider" && event.key.startsWith("Arrow");
+      const separates = target.getAttribute("role") === "separator" && event.key.startsWith("Arrow");
+      const presses = event.key === " " && ["BUTTON", "SUMMARY", "checkbox"].includes(type);
+      if (steers || separates || presses || document.querySelector("dialog[open]")) return;
+      const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      if (!action) return;
+      event.preventDefault();
+      action(event);
+    });
+  };
+})();

@@ -1,0 +1,150 @@
+"""A trajectory as one compressed pack: everything that a page needs to show it again."""
+
+import json
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import umsgpack
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.scenario import load_scenario
+from gne_mj.trajectory import Trajectory
+from gne_mj.view.pack import packed_small
+from gne_mj.view.scene import Scene
+from gne_mj.view.stage import Arrays, Stage
+
+if TYPE_CHECKING:
+    import xarray
+
+SAMPLES = 6000  # of longer trajectories so many are shown, evenly chosen
+
+
+def replay(trajectory: Trajectory, title: str | None = None) -> bytes:
+    """The pack of a trajectory.
+
+    Args:
+        trajectory: of a scenario, which it holds.
+        title: of the page; the scenario's description if left out.
+
+    Raises:
+        InvalidInput: it holds no scenario, or files of the user's that the scenario names are gone.
+    """
+    source = trajectory.tree.attrs["scenario"]
+    if not source:
+        raise InvalidInput(
+            "trajectory", "of no scenario", "robots are drawn from the scenario that it must hold"
+        )
+    scenario = load_scenario(json.loads(source))
+    clock = scenario.clock()
+    stages = [Stage(system, clock) for system in scenario.system_objects()]
+    datasets = {stage.system.name: trajectory[stage.system.name] for stage in stages}
+    time = _times(list(datasets.values()))
+    duration = float(time[-1]) if len(time) else 0.0
+    scene = Scene(stages, title or scenario.description or ", ".join(datasets), duration)
+    values = {name: _values(data, time) for name, data in datasets.items()}
+    arrays: Arrays = {"time": time, **scene.arrays(values)}
+    for stage in stages:
+        ended = float(datasets[stage.system.name]["time"][-1])
+        _cut(arrays, stage.system.name, time > ended + 1e-9)
+        arrays |= _messages(stage, time)
+    poses = scene.poses(values).reshape(len(time), -1)
+    varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
+    arrays["pose_base"] = poses[0]
+    arrays["pose_columns"] = varies.astype(np.int32)
+    arrays["pose_values"] = np.ascontiguousarray(poses[:, varies].T)
+    commands = _Commands()
+    scene.draw(commands.visualizer)
+    arrays["commands"] = np.frombuffer(b"".join(commands.sent), dtype=np.uint8)
+    meta = {
+        "kind": "replay",
+        **scene.meta(),
+        "outcome": {name: outcome(report) for name, report in trajectory.reports.items()},
+        "interventions": trajectory.interventions,
+        "command_lengths": [len(command) for command in commands.sent],
+    }
+    return packed_small(meta, {name: _lean(name, array) for name, array in arrays.items()})
+
+
+def outcome(report: dict[str, Any]) -> dict[str, Any]:
+    """How a system's run ended, from its report."""
+    worst, left = report["worst_constraint"], report["exit"]
+    return {
+        "status": report["status"],
+        "message": report["message"],
+        "margin": None if worst is None else worst["margin"],
+        "margin_name": None if worst is None else worst["name"],
+        "margin_time": None if worst is None else worst["time"],
+        "exit_time": None if left is None else left["time"],
+    }
+
+
+class _Commands:
+    """Stands in for a meshcat window, and keeps what it is sent."""
+
+    def __init__(self) -> None:
+        from meshcat import Visualizer
+
+        self.sent: list[bytes] = []
+        self.visualizer = Visualizer(window=self)
+
+    def send(self, command: Any) -> None:
+        """Keep one of meshcat's commands."""
+        self.sent.append(umsgpack.packb(command.lower()))
+
+
+def _times(datasets: Sequence["xarray.Dataset"]) -> NDArray[np.float64]:
+    """All times at which a system was sampled, at most SAMPLES and the last one always."""
+    time = np.unique(np.concatenate([data["time"].to_numpy() for data in datasets]))
+    every = -(-len(time) // SAMPLES)
+    kept = np.zeros(len(time), dtype=bool)
+    kept[::every] = kept[-1:] = True
+    return time[kept]
+
+
+def _values(data: "xarray.Dataset", time: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """What depends on time, at these times: between samples interpolated, later as at the end."""
+    own = data["time"].to_numpy()
+    after = np.clip(np.searchsorted(own, time), 0, len(own) - 1)
+    before = np.clip(after - 1, 0, None)
+    length = own[after] - own[before]
+    rest = np.where(length > 0, (own[after] - time) / np.where(length > 0, length, 1.0), 0.0)
+    rest = np.clip(rest, 0.0, 1.0)
+    found = {}
+    for name, variable in data.variables.items():
+        if variable.dims[:1] == ("time",) and name != "time":
+            rows = variable.to_numpy()
+            weight = rest.reshape(-1, *(1,) * (rows.ndim - 1))
+            mixed = rows[after] + weight * (rows[before] - rows[after])
+            # exact at samples, also where a neighbour is not a number
+            found[str(name)] = np.where(weight == 0.0, rows[after], mixed)
+    return found
+
+
+def _cut(arrays: Arrays, name: str, gone: NDArray[np.bool_]) -> None:
+    """No lines after a system's end."""
+    for key, array in arrays.items():
+        if key.startswith((f"{name}/action", f"{name}/quantity/")) and np.any(gone):
+            arrays[key] = array.copy()
+            arrays[key][gone] = np.nan
+
+
+def _messages(stage: Stage, time: NDArray[np.float64]) -> Arrays:
+    """Messages since the sample before."""
+    steps = [0, *(stage.clock.steps(t) for t in time)]
+    rows = [stage.messages(*pair) for pair in pairwise(steps)]
+    return {key: np.stack([row[key] for row in rows]) for key in rows[0]} if rows else {}
+
+
+def _lean(name: str, array: NDArray[Any]) -> NDArray[Any]:
+    """What is looked at only, with the digits that can be seen; poses as they are."""
+    if name.startswith("pose") or array.dtype.kind != "f" or name == "time":
+        return array
+    return _rounded(array.astype(np.float32), bits=9 if name.endswith("/estimate") else 0)
+
+
+def _rounded(array: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
+    """Without the last so many of the 23 binary digits."""
+    return (array.view(np.uint32) & np.uint32(0xFFFFFFFF << bits & 0xFFFFFFFF)).view(np.float32)

@@ -1,0 +1,362 @@
+"""A simulation that people watch and act on: paced by the clock on the wall, driven by a page."""
+
+import math
+import queue
+import threading
+import time as real_time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from meshcat import Visualizer
+
+from gne_mj.certificate import status_now
+from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
+from gne_mj.loops.base import Present, Samples
+from gne_mj.scenario import Scenario, load_scenario
+from gne_mj.simulation import SystemRun
+from gne_mj.trajectory import Trajectory, variables_of
+from gne_mj.view.controls import Control, controls_of, pushes_of
+from gne_mj.view.pack import pack
+from gne_mj.view.replay import outcome, replay
+from gne_mj.view.scene import Scene
+from gne_mj.view.server import Browser, Server
+from gne_mj.view.stage import Stage
+
+FRAME = 1 / 60  # s between frames, at best
+SHARE = 0.03  # of the time at most goes into frames while a run is as fast as it can
+SLOWEST = 0.5  # s between frames, at worst
+PIECE = 0.05  # s of computing between looks at what the page asks for
+PACE_OVER = 1.0  # s over which the pace is measured
+FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
+
+
+class Session:
+    """One scenario on a page of its own, run as often as its viewers like.
+
+    All happens in the thread that calls :meth:`run`; messages of browsers wait until it looks.
+
+    Args:
+        scenario: what is run.
+        title: of the page.
+        speed: simulated s per s; None for as fast as possible.
+        port: of the page's server; 0 for any that is free.
+
+    Attributes:
+        simulation: the present run.
+        server: of the page.
+    """
+
+    def __init__(
+        self, scenario: Scenario, title: str, *, speed: float | None = 1.0, port: int = 0
+    ) -> None:
+        self._tables = scenario.model_dump(mode="json", exclude_none=True)
+        self._changes: dict[str, Any] = {}
+        self._title, self._speed = title, speed
+        self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
+        self._playing = True
+        self._controls = {control.key: control for control in controls_of(scenario)}
+        self._values = {key: control.value for key, control in self._controls.items()}
+        self._begin(scenario)
+        stages = [
+            Stage(run.system, self.simulation.clock, getattr(run.loop, "plant", None))
+            for run in self.simulation.runs.values()
+        ]
+        self._scene = Scene(stages, title, self.simulation.clock.duration)
+        self._pushes = pushes_of(stages)
+        self.server = Server(title, port=port, received=self._receive)
+        self._scene.draw(self.visualizer)
+
+    @property
+    def visualizer(self) -> Visualizer:
+        """A ``meshcat.Visualizer`` of the page, to draw something of one's own besides."""
+        return Visualizer(window=self.server)
+
+    def _receive(self, message: dict[str, Any], browser: Browser) -> None:
+        self._asked.put((message, browser))  # in the server's thread
+
+    def run(self, stop: threading.Event) -> Trajectory:
+        """Until the run has ended or ``stop`` is set; returns what it recorded."""
+        while not stop.is_set() and not self.simulation.ended:
+            self._turn()
+        trajectory = self.simulation.trajectory(interrupted=not self.simulation.ended)
+        self.server.replay = replay(trajectory, self._title)
+        self._publish(trajectory)
+        return trajectory
+
+    def linger(self, stop: threading.Event) -> None:
+        """Show the run that has ended, and further ones if viewers restart, until ``stop``."""
+        while not stop.is_set():
+            if self.simulation.ended:
+                self._look(0.1)
+            else:
+                self.run(stop)
+
+    def _begin(self, scenario: Scenario) -> None:
+        """A new run, at the scenario's start."""
+        simulation = scenario.simulation_object()
+        self.simulation, self._scenario = simulation, scenario
+        self._messages_from = 0
+        self._ended: Trajectory | None = None
+        self._anchor()
+        self._next_frame, self._cost = 0.0, 0.0
+        self._pace: list[tuple[float, float]] = []
+
+    def _anchor(self) -> None:
+        """Simulated time goes with the wall's clock from here."""
+        self._since = real_time.perf_counter(), self.simulation.time
+
+    def _turn(self) -> None:
+        """Answer the page, move on for a moment, show it."""
+        now = real_time.perf_counter()
+        if self._playing and self._speed is None:
+            self._look(0.0)
+            self._move(self._steps_in(min(PIECE, max(self._next_frame - now, 0.0) + 1e-3)))
+        else:
+            self._look(max(0.0, self._next_frame - now))
+            if self._playing:
+                self._catch_up()
+        if real_time.perf_counter() >= self._next_frame:
+            self._publish()
+
+    def _catch_up(self) -> None:
+        """On to where the wall's clock says, unless that takes too long."""
+        if self._speed is None:
+            return
+        clock, (wall, time) = self.simulation.clock, self._since
+        due = time + (real_time.perf_counter() - wall) * self._speed
+        steps = math.floor((due - self.simulation.time) / clock.timestep + 1e-9)
+        most = self._steps_in(PIECE)
+        self._move(min(steps, most))
+        if steps > most:
+            self._anchor()  # it cannot keep up, and never tries to make up for it
+
+    def _steps_in(self, seconds: float) -> int:
+        """Steps that computing for so long takes; a few as long as that is not known."""
+        return max(1, int(seconds / self._step_cost)) if self._step_cost else 10
+
+    _step_cost = 0.0  # s of computing for a step, smoothed
+
+    def _move(self, steps: int) -> None:
+        simulation = self.simulation
+        left = simulation.clock.steps(simulation.clock.duration - simulation.time)
+        steps = min(steps, left)
+        if steps <= 0:
+            return
+        started = real_time.perf_counter()
+        simulation.advance(steps)
+        cost = (real_time.perf_counter() - started) / steps
+        self._step_cost = 0.7 * self._step_cost + 0.3 * cost if self._step_cost else cost
+
+    def _look(self, wait: float) -> None:
+        """Do what browsers ask for, waiting so long (s) for the first of them."""
+        asked: list[tuple[dict[str, Any], Browser]] = []
+        try:
+            if wait > 0:
+                asked.append(self._asked.get(timeout=wait))
+            while True:
+                asked.append(self._asked.get_nowait())
+        except queue.Empty:
+            pass
+        # of a slider that is dragged only where it is now counts
+        last = {m.get("key"): n for n, (m, _) in enumerate(asked) if m.get("do") == "set"}
+        for number, (message, browser) in enumerate(asked):
+            if message.get("do") == "set" and last[message.get("key")] != number:
+                continue
+            try:
+                self._do(message, browser)
+            except GneError as error:
+                self._notice(_complaint(error), browser)
+        if asked:
+            self._next_frame = 0.0  # show at once what it did
+
+    def _do(self, message: Mapping[str, Any], browser: Browser) -> None:
+        match message.get("do"):
+            case "connect":
+                self._welcome(browser)
+            case "play":
+                self._playing = True
+                self._anchor()
+            case "pause":
+                self._playing = False
+            case "step":
+                self._playing = False
+                self._move(self._step_length())
+            case "restart":
+                self._restart()
+            case "speed":
+                self._set_speed(message.get("value"))
+            case "set":
+                self._set(message.get("key"), message.get("value"))
+            case "push":
+                self._push(message)
+            case other:
+                raise InvalidInput("do", other, "the page asks for what this version does not know")
+
+    def _step_length(self) -> int:
+        """Integration steps in one step of the page: to the next control instant, or sample."""
+        clock = self.simulation.clock
+        held = any(system.mode != "continuous" for system in self.simulation.systems)
+        return clock.steps(clock.control_period if held else clock.sample_period)
+
+    def _restart(self) -> None:
+        self._begin(load_scenario(self._tables, self._changes))
+        self._playing = True
+        self.server.broadcast(self._history())
+
+    def _set_speed(self, value: Any) -> None:
+        if value is not None:
+            value = _number("speed", value)
+            if not 0 < value <= FASTEST:
+                raise InvalidInput("speed", value, f"it must be positive, at most {FASTEST:g}")
+        self._speed = value
+        self._anchor()
+        self._pace.clear()
+
+    def _set(self, key: Any, value: Any) -> None:
+        """Change a number of the running simulation; a value that cannot be leaves all as it is."""
+        control = self._controls.get(key)
+        if control is None:
+            raise InvalidInput("key", key, "this scenario has no such slider")
+        try:
+            number = _number(key, value)
+            self._change(control, number)
+            self._values[key] = number
+        finally:
+            self.server.tell({"kind": "controls", "values": self._values})
+
+    def _change(self, control: Control, value: float) -> None:
+        tables = self._scenario.model_dump(mode="json", exclude_none=True)
+        changed, given = control.change(tables, value)
+        scenario = load_scenario(tables, {changed: given})
+        run = self.simulation.runs[control.system]
+        if run.inside and not self.simulation.ended:
+            built = scenario.systems[control.system].build(control.system, scenario.simulation)
+            present = run.loop.present()
+            # what a system refuses at a start it refuses here and now
+            built = replace(
+                built, state=present.state, memory=present.memory[: len(built.memory)].copy()
+            )
+            self.simulation.change(built, f"{control.key} = {value:g}")
+        self._scenario = scenario
+        self._changes[changed] = given
+
+    def _push(self, message: Mapping[str, Any]) -> None:
+        name, agent, axis = message.get("system"), message.get("agent"), message.get("axis", 0)
+        about = next((each for each in self._pushes if each["system"] == name), None)
+        if about is None:
+            raise InvalidInput("push", name, "only robots in MuJoCo can be pushed")
+        game = self.simulation.runs[str(name)].system.game
+        if not isinstance(agent, int) or not 1 <= agent <= game.agents:
+            raise InvalidInput("push", agent, f"agents are numbered 1 to {game.agents}")
+        if not isinstance(axis, int) or not 0 <= axis < game.sizes[agent - 1]:
+            raise InvalidInput("push", axis, f"agent {agent} has {game.sizes[agent - 1]} axes")
+        force = _number("push", message.get("force", about["force"]))
+        channel = int(game.data.offsets[agent - 1]) + axis
+        if not self.simulation.ended:
+            self.simulation.push(str(name), channel, force, about["duration"])
+
+    def _welcome(self, browser: Browser) -> None:
+        scene = {
+            "kind": "scene",
+            **self._scene.meta(),
+            "controls": [control.meta() for control in self._controls.values()],
+            "pushes": self._pushes,
+        }
+        self.server.welcome(browser, [pack(scene, {}), self._history(), self._frame()])
+        self.server.tell({"kind": "controls", "values": self._values}, browser)
+
+    def _notice(self, text: str, browser: Browser) -> None:
+        self.server.tell({"kind": "notice", "level": "error", "text": text}, browser)
+
+    def _history(self) -> bytes:
+        """What was recorded so far, for the plots."""
+        recorded = {name: run.recorded() for name, run in self.simulation.runs.items()}
+        longest = max(recorded.values(), key=lambda found: len(found[0]))
+        time = longest[0]
+        values = {}
+        for name, (own, variables) in recorded.items():
+            rows = np.clip(np.searchsorted(own, time), 0, max(len(own) - 1, 0))
+            values[name] = {key: value[rows] for key, value in variables.items()}
+        arrays = {"time": time}
+        if len(time):
+            arrays |= self._scene.arrays(values)
+        return pack({"kind": "history"}, arrays)
+
+    def _publish(self, trajectory: Trajectory | None = None) -> None:
+        """Offer a frame to whoever looks; the next one comes when this one's cost allows."""
+        if trajectory is not None:
+            self._ended = trajectory
+        started = real_time.perf_counter()
+        self._pace.append((started, self.simulation.time))
+        while len(self._pace) > 2 and self._pace[0][0] < started - PACE_OVER:
+            self._pace.pop(0)
+        self.server.publish(self._frame())
+        cost = real_time.perf_counter() - started
+        fast = self._playing and self._speed is None
+        self._next_frame = started + min(SLOWEST, max(FRAME, cost / SHARE if fast else 2 * cost))
+
+    def _frame(self) -> bytes:
+        """The present instant."""
+        simulation = self.simulation
+        values = {name: _now(run) for name, run in simulation.runs.items()}
+        arrays = {
+            name: array[0] if array.ndim else array
+            for name, array in self._scene.arrays(values).items()
+        }
+        arrays["poses"] = self._scene.poses(values)[0]
+        step = simulation.clock.steps(simulation.time)
+        for stage in self._scene.stages:
+            arrays |= stage.messages(self._messages_from, step)
+        self._messages_from = step
+        meta = {
+            "kind": "frame",
+            "time": simulation.time,
+            "playing": self._playing and not simulation.ended,
+            "speed": self._speed,
+            "pace": self._measured_pace(),
+            "ended": self._ended is not None,
+            "state": {name: self._state(name) for name in simulation.runs},
+        }
+        return pack(meta, arrays)
+
+    def _state(self, name: str) -> dict[str, Any]:
+        """How a system's run stands or, at its end, how it ended."""
+        if self._ended is not None:
+            return outcome(self._ended.reports[name])
+        run = self.simulation.runs[name]
+        return status_now(run.system, run.loop.monitor)
+
+    def _measured_pace(self) -> float:
+        (wall, time), (wall_now, time_now) = self._pace[0], self._pace[-1]
+        return (time_now - time) / (wall_now - wall) if wall_now > wall else 0.0
+
+
+def _now(run: SystemRun) -> dict[str, np.ndarray]:
+    """The variables of one instant, with one row."""
+    present: Present = run.loop.present()
+    nothing = np.zeros((1, 0))
+    inputs = np.zeros((1, run.system.game.actions))
+    row = Samples(
+        present.state[None], inputs, present.memory[None], nothing, nothing,
+        present.configuration[None],
+    )  # fmt: skip
+    time = np.array([run.loop.time])
+    return {name: values for name, (_, values, _) in variables_of(run.system, time, row).items()}
+
+
+def _number(key: Any, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InvalidInput(str(key), value, "it must be a finite number")
+    return float(value)
+
+
+def _complaint(error: GneError) -> str:
+    """One sentence for the page."""
+    if isinstance(error, InfeasibleStart):
+        return (
+            f"Refused: at the present outputs constraint '{error.constraint}' would have"
+            f" g = {error.value:.4g}, which must be negative."
+        )
+    return str(error)

@@ -1,0 +1,200 @@
+"""What a page shows of one system: words about it once, arrays of numbers from what is recorded."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.faults import for_native
+from gne_mj.game import Game
+from gne_mj.loops.faults import count_messages
+from gne_mj.plants.mjcf_fleet import MjcfPlant
+from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.quantity import Quantity
+from gne_mj.system import Clock, System
+from gne_mj.view.fleet import fleet_of
+
+Arrays = dict[str, NDArray[Any]]
+Values = Mapping[str, NDArray[np.float64]]
+
+
+class Stage:
+    """One system as a page shows it: a fleet of robots in their MJCF, or bars.
+
+    Args:
+        system: what is shown.
+        clock: how it steps.
+        plant: its fleet, if there is one already; it is only looked at.
+
+    Attributes:
+        fleet: its robots; None for agents without bodies.
+    """
+
+    def __init__(
+        self, system: System, clock: Clock, plant: MujocoPlant | MjcfPlant | None = None
+    ) -> None:
+        self.system, self.clock = system, clock
+        self.fleet = fleet_of(system, clock, plant)
+
+    def meta(self) -> dict[str, Any]:
+        """What JSON tells the page of the system; constant while it runs."""
+        system, game = self.system, self.system.game
+        about = {
+            "name": system.name,
+            "game": game.name,
+            "agent_name": game.agent_name,
+            "agents": game.agents,
+            "information": system.law.information,
+            "mode": system.mode,
+            "engine": system.engine,
+            "rho": system.rho,
+            "drawn_as": "bars" if self.fleet is None else "fleet",
+            "action": {
+                "name": game.action_name,
+                "unit": game.action_unit,
+                "owner": (game.agent_of_action + 1).tolist(),
+                "axis": list(game.axis_of_action) if max(game.sizes) > 1 else [""] * game.actions,
+            },
+            "quantities": [_quantity(game, quantity) for quantity in game.quantities],
+            "edges": self._edges,
+            "edges_are": "measurements" if system.law.graph is None else "messages",
+            "links": self._links,
+            "message_period": self._message_period,
+            "estimates": self.has_estimates,
+            "anchors": [],
+            "height": 0.0,
+            "tints": [],
+        }
+        if self.fleet is not None:
+            about |= self.fleet.places
+        return about
+
+    @property
+    def has_estimates(self) -> bool:
+        """Whether agents hold estimates of each other's actions."""
+        return self.system.law.information in ("partial", "distributed")
+
+    def arrays(self, values: Values) -> Arrays:
+        """What the page draws at the samples of a trajectory's variables, by array name.
+
+        Args:
+            values: of leading dimension T: "action", "constraint", the game's quantities, and
+                "estimate" where agents have some.
+        """
+        name, game = self.system.name, self.system.game
+        found: Arrays = {f"{name}/action": values["action"]}
+        for quantity in game.quantities:
+            rows = values[quantity.name]
+            found[f"{name}/quantity/{quantity.name}"] = rows.reshape(len(rows), -1)
+        margin = -np.max(values["constraint"], axis=1)
+        found[f"{name}/margin"] = margin.astype(np.float32)
+        found[f"{name}/share"] = shares(game, values).astype(np.float32)
+        if self.has_estimates:
+            found[f"{name}/estimate"] = values["estimate"].astype(np.float32)
+        return found
+
+    def messages(self, first: int, last: int) -> Arrays:
+        """How many messages came and how many were lost, (links, 2), from one step to another."""
+        if self._message_period is None or not self._links:
+            return {}
+        out = np.zeros((len(self._links), 2))
+        period = self.clock.steps(self.clock.control_period)
+        count_messages(self._faults, self.clock.timestep, period, first, last, out)
+        return {f"{self.system.name}/messages": out.astype(np.float32)}
+
+    @cached_property
+    def _faults(self) -> Any:
+        system = self.system
+        return for_native(system.faults, system.game, system.law.graph, system.seed)
+
+    @property
+    def _message_period(self) -> float | None:
+        """s between messages; None if they flow all the time."""
+        system = self.system
+        held = system.law.graph is not None and system.mode != "continuous"
+        return self.clock.control_period if held else None
+
+    @cached_property
+    def _edges(self) -> list[list[int]]:
+        """Pairs of agents, from 1, that communicate, or that measure one another without."""
+        system, game = self.system, self.system.game
+        if system.law.graph is not None:
+            return [[i + 1, j + 1] for i, j in system.law.graph.edges]
+        pairs = {(min(i, j), max(i, j)) for i, seen in enumerate(game.in_cost) for j in seen}
+        pairs |= {(i, j) for members in game.in_constraint for i in members for j in members}
+        return [[i + 1, j + 1] for i, j in sorted(pairs) if i < j]
+
+    @cached_property
+    def _links(self) -> list[list[int]]:
+        """[hearer, sender], from 1, in the order of native neighbour lists."""
+        graph = self.system.law.graph
+        if graph is None:
+            return []
+        hearer = np.repeat(np.arange(graph.agents), np.diff(graph.data.pointer))
+        return (np.column_stack([hearer, graph.data.neighbour]) + 1).tolist()
+
+
+def shares(game: Game, values: Values) -> NDArray[np.float64]:
+    """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
+
+    A quantity's bounds count for the agent or for the agents of the constraint that it is of, and
+    for all agents if it is one number.
+    """
+    found = np.full((len(values["action"]), game.agents), np.nan)
+    for quantity in game.quantities:
+        entries = game.entries(quantity)
+        bounds = quantity.bounds(entries)
+        high = bounds.get(f"{quantity.name}_bound")
+        low = bounds.get(f"{quantity.name}_lower_bound")
+        used = _used(values[quantity.name].reshape(len(found), -1), high, low)
+        if used is None:
+            continue
+        if quantity.each == "agent":
+            groups = [[i] for i in range(game.agents)]
+        elif quantity.each == "constraint":
+            groups = [list(members) for members in game.in_constraint]
+        else:
+            groups = [list(range(game.agents))]
+        for column, agents in enumerate(groups):
+            found[:, agents] = np.fmax(found[:, agents], used[:, column, None])
+    return found
+
+
+def _used(
+    values: NDArray[np.float64],
+    high: NDArray[np.float64] | None,
+    low: NDArray[np.float64] | None,
+) -> NDArray[np.float64] | None:
+    """Values (T, n) as a part of the way from the middle, or from 0, to their bounds."""
+    if high is not None and low is not None:
+        return np.abs(values - 0.5 * (high + low)) / (0.5 * (high - low))
+    bound = high if high is not None else low
+    if bound is None:
+        return None
+    bound = bound.reshape(-1) if high is not None else -bound.reshape(-1)
+    sign = 1.0 if high is not None else -1.0
+    return np.where(bound > 0, sign * values / np.where(bound > 0, bound, 1.0), np.nan)
+
+
+def _quantity(game: Game, quantity: Quantity) -> dict[str, Any]:
+    entries = game.entries(quantity)
+    labels = {
+        "agent": [str(i + 1) for i in range(game.agents)],
+        "constraint": list(game.constraint_names),
+    }
+    bounds = quantity.bounds(entries)
+    about: dict[str, Any] = {
+        "name": quantity.name,
+        "long_name": quantity.long_name,
+        "symbol": quantity.symbol,
+        "unit": quantity.unit,
+        "labels": labels.get(quantity.each, [""]),
+    }
+    for key in ("bound", "lower_bound"):
+        given = bounds.get(f"{quantity.name}_{key}")
+        about[key] = None
+        if given is not None:
+            about[key] = [float(b) if np.isfinite(b) else None for b in given.reshape(-1)]
+    return about

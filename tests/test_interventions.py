@@ -1,0 +1,189 @@
+"""What a user does to a run that goes on: numbers changed, agents pushed, looks in between."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import FIVE, robot_state, robot_system
+
+import gne_mj
+from gne_mj import graph as graphs
+from gne_mj.controllers import PartialInformation
+from gne_mj.errors import EngineError, InvalidInput
+from gne_mj.faults import Push
+from gne_mj.scenario import load_scenario
+from gne_mj.simulation import Simulation
+from gne_mj.system import Clock
+from gne_mj.trajectory import Trajectory
+
+CLOCK = Clock(duration=4.0, timestep=0.01, control_period=0.01, sample_period=0.1)
+OSNR = {"simulation.duration": 1.0, "recording.period": 0.1}
+
+
+def robots(engine="ode", **options):
+    return robot_system(robot_state(FIVE), engine=engine, **options)
+
+
+def same(one: Trajectory, other: Trajectory) -> bool:
+    return all(
+        np.array_equal(one[name][key], other[name][key], equal_nan=True)
+        for name in one.tree.children
+        for key in one[name].variables
+        if one[name][key].dtype.kind == "f"
+    )
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+def test_pieces_and_looks_change_no_bit(engine):
+    whole = Simulation([robots(engine)], CLOCK).run()
+    simulation = Simulation([robots(engine)], CLOCK)
+    for steps in (1, 3, 9, 37, 50, 10, 200, 90):
+        simulation.advance(steps)
+        for run in simulation.runs.values():
+            before = run.loop.monitor.copy()
+            run.loop.present()
+            run.recorded()
+            assert np.array_equal(before, run.loop.monitor)
+    assert simulation.ended
+    assert same(simulation.trajectory(), whole)
+    assert simulation.trajectory().reports["robots"]["steps"] == 400
+
+
+def test_a_run_that_goes_on_after_it_was_looked_at_is_the_same():
+    whole = Simulation([robots()], CLOCK).run()
+    simulation = Simulation([robots()], CLOCK)
+    simulation.advance(150)
+    halfway = simulation.trajectory(interrupted=True)
+    assert halfway.status == "interrupted"
+    assert float(halfway["robots"]["time"][-1]) == 1.5
+    simulation.advance(250)
+    assert same(simulation.trajectory(), whole)
+
+
+def test_adaptive_steps_are_looked_at_without_a_change():
+    whole = gne_mj.run("osnr", OSNR)
+    simulation = load_scenario("osnr", OSNR).simulation_object()
+    for steps in (7, 43, 150, 300):
+        simulation.advance(steps)
+        present = simulation.runs["channels"].loop.present()
+        assert present.state.shape == (10, 2)
+        assert present.memory.shape == (110,)
+    assert same(simulation.trajectory(), whole)
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+def test_changed_numbers_are_those_of_a_system_that_starts_there(engine):
+    simulation = Simulation([robots(engine)], CLOCK)
+    simulation.advance(100)
+    loop = simulation.runs["robots"].loop
+    present = loop.present()
+    changed = replace(robots(engine, rho=0.7), state=present.state)
+    simulation.change(changed, "rho = 0.7")
+    simulation.advance(100)
+    afresh = changed.closed_loop(CLOCK)
+    afresh.advance(1, 100)
+    # MuJoCo has positions, the fresh one extensions: the last bits differ
+    assert np.allclose(loop.present().state, afresh.present().state, rtol=0, atol=1e-12)
+    assert simulation.systems[0].rho == 0.7
+
+    report = simulation.trajectory().reports["robots"]
+    assert not report["lyapunov"]["claimed"]
+    assert report["lyapunov"]["largest_rise"] < 1e-12  # V jumps with y*, and that is no rise
+    assert report["equilibrium"]["penalised"] == changed.equilibrium.action.tolist()
+
+
+@pytest.mark.parametrize("mode", ["continuous", "sampled"])
+def test_a_changed_gain_reaches_the_estimates(mode):
+    law = PartialInformation(graphs.ring(5), 1.0, 1.0)
+    simulation = Simulation([robots(law=law, mode=mode)], CLOCK)
+    simulation.advance(50)
+    simulation.trajectory()  # held modes: the estimates of now, not of the last control instant
+    loop = simulation.runs["robots"].loop
+    present = loop.present()
+    changed = replace(
+        robots(law=PartialInformation(graphs.ring(5), 3.0, 1.0), mode=mode),
+        state=present.state, memory=present.memory,
+    )  # fmt: skip
+    simulation.change(changed, "c = 3")
+    simulation.advance(50)
+    afresh = changed.closed_loop(CLOCK)
+    afresh.advance(1, 50)
+    assert np.allclose(loop.present().state, afresh.present().state, rtol=0, atol=1e-13)
+    assert np.allclose(loop.present().memory, afresh.present().memory, rtol=0, atol=1e-13)
+
+
+def test_each_part_of_a_run_is_told_by_its_own_numbers(tmp_path):
+    scenario = load_scenario("velocity-sync", {"plant.engine": "ode", "simulation.duration": 2})
+    simulation = scenario.simulation_object()
+    simulation.advance(500)
+    other = load_scenario(
+        scenario.model_dump(mode="json", exclude_none=True), {"game.reference_velocity": 2.0}
+    )
+    state = simulation.runs["robots"].loop.present().state
+    simulation.change(replace(other.system_objects()[0], state=state), "v_0 = 2")
+    simulation.advance(500)
+    trajectory = simulation.trajectory()
+    data = trajectory["robots"]
+    first = data["gap"].to_numpy()[:, 0]
+    velocity = data["action"].to_numpy()[:, 0]
+    reference = np.where(data["time"] < 1.0, 3.0, 2.0)
+    assert np.array_equal(first, velocity - reference)
+    assert trajectory.interventions == [{"time": 1.0, "what": "v_0 = 2"}]
+
+    trajectory.save(tmp_path / "run.zarr")
+    loaded = Trajectory.load(tmp_path / "run.zarr")
+    assert loaded.interventions == trajectory.interventions
+    assert loaded.report()["interventions"] == trajectory.interventions
+
+
+def test_refused_numbers_change_nothing():
+    simulation = Simulation([robots()], CLOCK)
+    simulation.advance(10)
+    fast = robots(law=PartialInformation(graphs.ring(5), 1.0, 1e-6))
+    with pytest.raises(InvalidInput):
+        simulation.change(fast, "too fast for this step")
+    assert simulation.interventions == []
+    assert simulation.systems[0].law.information == "full"
+
+
+@pytest.mark.parametrize("channel", [1, 4])
+def test_a_push_is_the_fault_of_the_same_force(channel):
+    fault = Push(agents=(channel,), start=0.5, end=0.7, force=4.0)
+    struck = Simulation([robots("mujoco", faults=(fault,))], CLOCK)
+    struck.advance(200)
+    pushed = Simulation([robots("mujoco")], CLOCK)
+    pushed.advance(50)
+    pushed.push("robots", channel, 4.0, 0.2)
+    pushed.advance(150)
+    one, other = (s.runs["robots"].loop.present().state for s in (struck, pushed))
+    assert np.allclose(one, other, rtol=0, atol=1e-13)
+    free = Simulation([robots("mujoco")], CLOCK)
+    free.advance(200)
+    assert np.max(np.abs(other - free.runs["robots"].loop.present().state)) > 1e-2
+    report = pushed.trajectory().reports["robots"]
+    assert not report["lyapunov"]["claimed"]
+    assert pushed.interventions[0]["time"] == 0.5
+
+
+def test_only_robots_in_mujoco_are_pushed():
+    simulation = Simulation([robots()], CLOCK)
+    with pytest.raises(EngineError, match="only robots in MuJoCo"):
+        simulation.push("robots", 0, 1.0, 0.1)
+    assert simulation.interventions == []
+
+
+def test_all_joints_of_own_robots_are_recorded():
+    from pathlib import Path
+
+    scenario = Path(__file__).parent.parent / "examples" / "robot" / "scenario.toml"
+    simulation = load_scenario(scenario, {"simulation.duration": 0.5}).simulation_object()
+    (run,) = simulation.runs.values()
+    model = run.loop.plant.model
+    data = simulation.run()[run.system.name]
+    assert data["configuration"].shape == (len(data["time"]), model.nq)
+    assert np.array_equal(data["configuration"][-1], run.loop.plant.data.qpos)
+    at = run.loop.plant.places[:, 1]
+    known = at >= 0
+    assert np.array_equal(
+        data["configuration"].to_numpy()[:, at[known]], data["position"].to_numpy()[:, known]
+    )
