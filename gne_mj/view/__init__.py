@@ -11,11 +11,11 @@ around it or beside it (`html.py`, `page/`).
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.html import html_page, write_html
 from gne_mj.view.mirror import Mirror
-from gne_mj.view.replay import replay
+from gne_mj.view.replay import replay_pack
 from gne_mj.view.server import Server
 from gne_mj.view.session import Session
 
-__all__ = ["Mirror", "Server", "Session", "html_page", "replay", "serve", "write_html"]
+__all__ = ["Mirror", "Server", "Session", "html_page", "replay_pack", "serve", "write_html"]
 
 
 def serve(trajectory: Trajectory, title: str = "gne-mj replay", *, port: int = 0) -> Server:
@@ -27,6 +27,6 @@ def serve(trajectory: Trajectory, title: str = "gne-mj replay", *, port: int = 0
         port: 0 for any that is free.
 
     Raises:
-        InvalidInput: see :func:`gne_mj.view.replay.replay`; the port is taken.
+        InvalidInput: see :func:`gne_mj.view.replay.replay_pack`; the port is taken.
     """
-    return Server(title, replay=replay(trajectory, title), port=port)
+    return Server(title, replay=replay_pack(trajectory, title), port=port)

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.replay import replay
+from gne_mj.view.replay import replay_pack
 
 # Names the page uses for files that are not its own
 _BUNDLE = "vendor/meshcat.min.js"
@@ -33,9 +33,9 @@ def html_page(trajectory: Trajectory, title: str | None = None) -> str:
         title: of the page; the scenario's description if left out.
 
     Raises:
-        InvalidInput: see :func:`gne_mj.view.replay.replay`.
+        InvalidInput: see :func:`gne_mj.view.replay.replay_pack`.
     """
-    data = base64.b64encode(replay(trajectory, title)).decode("ascii")
+    data = base64.b64encode(replay_pack(trajectory, title)).decode("ascii")
     text = _begin("file", title or "gne-mj replay")
     text = text.replace(
         "<head>",

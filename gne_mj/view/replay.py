@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SAMPLES = 6000  # of longer trajectories so many are shown, evenly chosen
 
 
-def replay(trajectory: Trajectory, title: str | None = None) -> bytes:
+def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
     """The pack of a trajectory.
 
     Args:

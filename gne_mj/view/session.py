@@ -18,8 +18,9 @@ from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.trajectory import Trajectory, variables_of
 from gne_mj.view.controls import Control, controls_of, pushes_of
+from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
-from gne_mj.view.replay import outcome, replay
+from gne_mj.view.replay import outcome, replay_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
 from gne_mj.view.stage import Stage
@@ -28,7 +29,6 @@ FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.03  # of the time at most goes into frames while a run is as fast as it can
 SLOWEST = 0.5  # s between frames, at worst
 PIECE = 0.05  # s of computing between looks at what the page asks for
-PACE_OVER = 1.0  # s over which the pace is measured
 FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
 
 
@@ -53,7 +53,7 @@ class Session:
     ) -> None:
         self._tables = scenario.model_dump(mode="json", exclude_none=True)
         self._changes: dict[str, Any] = {}
-        self._title, self._speed = title, speed
+        self._title, self._pacer = title, Pacer(speed)
         self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
         self._playing = True
         self._controls = {control.key: control for control in controls_of(scenario)}
@@ -81,7 +81,7 @@ class Session:
         while not stop.is_set() and not self.simulation.ended:
             self._turn()
         trajectory = self.simulation.trajectory(interrupted=not self.simulation.ended)
-        self.server.replay = replay(trajectory, self._title)
+        self.server.replay = replay_pack(trajectory, self._title)
         self._publish(trajectory)
         return trajectory
 
@@ -99,20 +99,16 @@ class Session:
         self.simulation, self._scenario = simulation, scenario
         self._messages_from = 0
         self._ended: Trajectory | None = None
-        self._anchor()
-        self._next_frame, self._cost = 0.0, 0.0
-        self._pace: list[tuple[float, float]] = []
-
-    def _anchor(self) -> None:
-        """Simulated time goes with the wall's clock from here."""
-        self._since = real_time.perf_counter(), self.simulation.time
+        self._pacer.restart(simulation.time)
+        self._next_frame = 0.0
 
     def _turn(self) -> None:
         """Answer the page, move on for a moment, show it."""
         now = real_time.perf_counter()
-        if self._playing and self._speed is None:
+        if self._playing and self._pacer.speed is None:
             self._look(0.0)
-            self._move(self._steps_in(min(PIECE, max(self._next_frame - now, 0.0) + 1e-3)))
+            until_frame = max(self._next_frame - now, 1e-3)
+            self._move(self._pacer.affordable(min(PIECE, until_frame)))
         else:
             self._look(max(0.0, self._next_frame - now))
             if self._playing:
@@ -122,32 +118,23 @@ class Session:
 
     def _catch_up(self) -> None:
         """On to where the wall's clock says, unless that takes too long."""
-        if self._speed is None:
+        simulation, pacer = self.simulation, self._pacer
+        if pacer.speed is None:  # it was changed just now
             return
-        clock, (wall, time) = self.simulation.clock, self._since
-        due = time + (real_time.perf_counter() - wall) * self._speed
-        steps = math.floor((due - self.simulation.time) / clock.timestep + 1e-9)
-        most = self._steps_in(PIECE)
+        steps = pacer.due(simulation.time, simulation.clock.timestep)
+        most = pacer.affordable(PIECE)
         self._move(min(steps, most))
-        if steps > most:
-            self._anchor()  # it cannot keep up, and never tries to make up for it
-
-    def _steps_in(self, seconds: float) -> int:
-        """Steps that computing for so long takes; a few as long as that is not known."""
-        return max(1, int(seconds / self._step_cost)) if self._step_cost else 10
-
-    _step_cost = 0.0  # s of computing for a step, smoothed
+        if steps > most:  # it cannot keep up, and never tries to make up for it
+            pacer.restart(simulation.time)
 
     def _move(self, steps: int) -> None:
         simulation = self.simulation
         left = simulation.clock.steps(simulation.clock.duration - simulation.time)
         steps = min(steps, left)
-        if steps <= 0:
-            return
-        started = real_time.perf_counter()
-        simulation.advance(steps)
-        cost = (real_time.perf_counter() - started) / steps
-        self._step_cost = 0.7 * self._step_cost + 0.3 * cost if self._step_cost else cost
+        if steps > 0:
+            started = real_time.perf_counter()
+            simulation.advance(steps)
+            self._pacer.took(steps, real_time.perf_counter() - started)
 
     def _look(self, wait: float) -> None:
         """Do what browsers ask for, waiting so long (s) for the first of them."""
@@ -160,9 +147,9 @@ class Session:
         except queue.Empty:
             pass
         # of a slider that is dragged only where it is now counts
-        last = {m.get("key"): n for n, (m, _) in enumerate(asked) if m.get("do") == "set"}
+        last = {str(m.get("key")): n for n, (m, _) in enumerate(asked) if m.get("do") == "set"}
         for number, (message, browser) in enumerate(asked):
-            if message.get("do") == "set" and last[message.get("key")] != number:
+            if message.get("do") == "set" and last[str(message.get("key"))] != number:
                 continue
             try:
                 self._do(message, browser)
@@ -177,7 +164,7 @@ class Session:
                 self._welcome(browser)
             case "play":
                 self._playing = True
-                self._anchor()
+                self._pacer.restart(self.simulation.time)
             case "pause":
                 self._playing = False
             case "step":
@@ -210,19 +197,18 @@ class Session:
             value = _number("speed", value)
             if not 0 < value <= FASTEST:
                 raise InvalidInput("speed", value, f"it must be positive, at most {FASTEST:g}")
-        self._speed = value
-        self._anchor()
-        self._pace.clear()
+        self._pacer.speed = value
+        self._pacer.restart(self.simulation.time)
 
     def _set(self, key: Any, value: Any) -> None:
         """Change a number of the running simulation; a value that cannot be leaves all as it is."""
-        control = self._controls.get(key)
+        control = self._controls.get(str(key))
         if control is None:
             raise InvalidInput("key", key, "this scenario has no such slider")
         try:
             number = _number(key, value)
             self._change(control, number)
-            self._values[key] = number
+            self._values[control.key] = number
         finally:
             self.server.tell({"kind": "controls", "values": self._values})
 
@@ -289,12 +275,10 @@ class Session:
         if trajectory is not None:
             self._ended = trajectory
         started = real_time.perf_counter()
-        self._pace.append((started, self.simulation.time))
-        while len(self._pace) > 2 and self._pace[0][0] < started - PACE_OVER:
-            self._pace.pop(0)
+        self._pacer.saw(self.simulation.time)
         self.server.publish(self._frame())
         cost = real_time.perf_counter() - started
-        fast = self._playing and self._speed is None
+        fast = self._playing and self._pacer.speed is None
         self._next_frame = started + min(SLOWEST, max(FRAME, cost / SHARE if fast else 2 * cost))
 
     def _frame(self) -> bytes:
@@ -314,8 +298,8 @@ class Session:
             "kind": "frame",
             "time": simulation.time,
             "playing": self._playing and not simulation.ended,
-            "speed": self._speed,
-            "pace": self._measured_pace(),
+            "speed": self._pacer.speed,
+            "pace": self._pacer.measured,
             "ended": self._ended is not None,
             "state": {name: self._state(name) for name in simulation.runs},
         }
@@ -327,10 +311,6 @@ class Session:
             return outcome(self._ended.reports[name])
         run = self.simulation.runs[name]
         return status_now(run.system, run.loop.monitor)
-
-    def _measured_pace(self) -> float:
-        (wall, time), (wall_now, time_now) = self._pace[0], self._pace[-1]
-        return (time_now - time) / (wall_now - wall) if wall_now > wall else 0.0
 
 
 def _now(run: SystemRun) -> dict[str, np.ndarray]:

@@ -131,20 +131,34 @@
         range.value = toPlace(v);
         range.setAttribute("aria-valuetext", GNE.withUnit(v, unit));
         range.style.setProperty("--done", `${100 * toPlace(v)}%`);
-        if (document.activeElement !== number) number.value = Number(v.toPrecision(3));
+        if (!typing) number.value = Number(v.toPrecision(3));
       };
+      let typing = false;
+      let touched = -Infinity;
       const set = this.atMost(12, (v) => this.send({ do: "set", key, value: v }));
       range.oninput = () => {
+        touched = performance.now();
         const v = Number(fromPlace(Number(range.value)).toPrecision(3));
         show(v);
         set(v);
       };
+      number.oninput = () => (typing = true);
+      number.onblur = () => (typing = false);
       number.onchange = () => {
+        typing = false;
         const v = Number(number.value);
         if (number.value !== "" && Number.isFinite(v)) set(v);
       };
       show(value);
-      this.sliders.set(key, show);
+      let told;
+      const follow = (v) => {
+        // echoes of a moment ago must not pull the slider back under the hand
+        clearTimeout(told);
+        const wait = touched + 400 - performance.now();
+        if (wait > 0) told = setTimeout(follow, wait, v);
+        else show(v);
+      };
+      this.sliders.set(key, follow);
       return GNE.element(
         "div", { class: "control" },
         GNE.element("span", { class: "control-label", text: label }),

@@ -233,7 +233,7 @@
       for (const name of this.names) {
         const cut = name.indexOf("/");
         const values = instant.systems[name.slice(0, cut)][name.slice(cut + 1)];
-        if (values) this.append(name, values);
+        this.append(name, values || []);
       }
       this.time.push(instant.time);
       if (this.time.length > this.most) this.thin();
@@ -241,7 +241,7 @@
 
     append(name, values) {
       const columns = this.columns[name];
-      for (let k = 0; k < values.length; k++) {
+      for (let k = 0; k < Math.max(values.length, columns.length); k++) {
         // a column that begins late is empty before
         columns[k] ??= Array(this.time.length).fill(null);
         columns[k].push(orNull(values[k]));

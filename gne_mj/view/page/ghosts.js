@@ -95,8 +95,9 @@
 
     copy(mesh) {
       const material = new THREE.MeshPhongMaterial({
-        color: GNE.colour("ghost"), transparent: true, opacity: 0.38, depthWrite: false,
+        color: GNE.colour("ghost"), transparent: true, opacity: 0.5, depthWrite: false,
       });
+      material.emissive.set(GNE.colour("ghost")).multiplyScalar(0.35);
       const copy = new THREE.Mesh(mesh.geometry, material);
       copy.matrixAutoUpdate = false;
       this.group.add(copy);

@@ -112,6 +112,10 @@ const GNE = {};
       ? "–"
       : value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 
+  /** Decimals that tell three digits of the greatest value, so that all texts stay as long. */
+  GNE.decimals = (greatest) =>
+    greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
+
   /** "0.42 m/s" or "0.42" */
   GNE.withUnit = (value, unit) => GNE.number(value) + (unit ? ` ${unit}` : "");
 

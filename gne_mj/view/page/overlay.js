@@ -5,6 +5,7 @@
   const REST = 400; // ms between two of one link
   const FLOW = 1800; // ms between two of one link, where messages flow continuously
   const MANY = 160; // links, from which on only some of them show messages
+  const DENSE = 300; // edges, from which on they are straight
 
   /** Agents in the order in which they get a label when there is no room for all: 1, 9, 5, ... */
   const labelOrder = (n) => {
@@ -48,7 +49,7 @@
 
     /** Starts pulses for messages (links x [passed, lost]); of one link not more than the eye can follow. */
     messages(system, counts, now) {
-      if (!this.pulsing || !counts) return;
+      if (!this.pulsing || !counts || document.hidden) return;
       const every = Math.max(1, Math.ceil(system.links.length / MANY));
       for (let link = 0; link < system.links.length; link += every) {
         const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
@@ -123,6 +124,7 @@
 
     /** Curve between two agents on the screen: its two ends and the point that bends it. */
     curve(system, a, b) {
+      if (system.edges.length > DENSE) return this.straight(system, a, b);
       const [p, q] = [this.scene.headOf(system, a), this.scene.headOf(system, b)];
       const length = Math.hypot(...p.map((v, k) => v - q[k]));
       const middle = p.map((v, k) => (v + q[k]) / 2);
@@ -131,7 +133,21 @@
       return ends.includes(null) ? null : ends;
     }
 
+    straight(system, a, b) {
+      const [from, to] = [this.headAt(system, a), this.headAt(system, b)];
+      return from && to && [from, { x: (from.x + to.x) / 2, y: (from.y + to.y) / 2 }, to];
+    }
+
+    /** Where the links of an agent begin on the screen; once a picture for each. */
+    headAt(system, agent) {
+      const key = `${system.name}/${agent}`;
+      if (!this.heads.has(key))
+        this.heads.set(key, this.scene.project(this.scene.headOf(system, agent)));
+      return this.heads.get(key);
+    }
+
     links(now) {
+      this.heads = new Map();
       for (const system of this.meta.systems) this.edges(system);
       const context = this.context;
       this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
@@ -208,8 +224,9 @@
       if (!p) return;
       this.marks.push({ x: p.x, y: p.y, system: system.name, agent });
       const number = String(agent + 1);
-      const percent = Number.isFinite(share) ? `${Math.round(100 * share)} %` : "";
       const out = share > 1;
+      const digits = out && share < 1.1 ? 1 : 0; // not "100 %" of what is outside
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : "";
       for (const text of percent ? [percent, ""] : [""]) {
         const box = this.pillBox(p, number, out ? `⚠ ${text}` : text);
         if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
@@ -267,6 +284,7 @@
       const bars = this.scene.bars.find((each) => each.system === system);
       for (const text of [bars.title(), ...bars.gaugeTexts()]) this.text(text);
       const owners = system.action.owner;
+      const decimals = GNE.decimals(bars.reference);
       owners.forEach((owner, k) => {
         const p = this.scene.project(bars.top(k));
         if (p) this.marks.push({ x: p.x, y: p.y, system: system.name, agent: owner - 1 });
@@ -274,7 +292,7 @@
         const chosen = this.isHighlighted(system, owner - 1);
         const axis = system.action.axis[k] || "";
         this.text({ point: bars.foot(k), text: `${owner}${axis}`, shift: 11, bold: true, chosen });
-        this.text({ point: bars.top(k), text: GNE.number(bars.values[k]), shift: -9, chosen });
+        this.text({ point: bars.top(k), text: GNE.fixed(bars.values[k] ?? null, decimals), shift: -9, chosen });
       });
     }
 

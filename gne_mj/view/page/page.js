@@ -97,12 +97,13 @@
     opened() {
       // another server may stand behind the address now
       if (this.meta) this.scene.clear();
+      this.meta = this.instant = this.pending = null;
       GNE.byId("lost").hidden = true;
       this.connected = true;
     }
 
     lost() {
-      GNE.byId("lost").hidden = !this.connected && !this.meta;
+      GNE.byId("lost").hidden = false;
       this.connected = false;
       if (!this.replaying) this.playing = false;
       this.slowDue = 0;
@@ -427,6 +428,7 @@
 
     pace() {
       if (!this.live || this.replaying || !this.frame) return this.live && this.replaying ? "ended; replay" : "";
+      if (!this.connected) return "not connected";
       if (!this.playing) return "paused";
       const { speed, pace } = this.frame;
       const wished = speed === null ? "as fast as possible" : `×${GNE.number(speed)}`;
@@ -468,7 +470,7 @@
     }
 
     marginText({ margin, margin_name: name, margin_time: time }) {
-      if (!Number.isFinite(margin)) return "no constraint seen yet";
+      if (!Number.isFinite(margin)) return "no margin known";
       const when = Number.isFinite(time) ? ` at ${GNE.fixed(time, time < 10 ? 2 : 1)} s` : "";
       return `least margin ${GNE.number(margin)}${name ? ` · ${name}` : ""}${when}`;
     }
@@ -477,11 +479,11 @@
       const out = this.meta.systems.filter((system) => GNE.outside(this.stateOf(system).status));
       const banner = GNE.byId("banner");
       const text = out.map((system) => this.exitText(system)).join("   ");
-      if (text === this.bannerText) return;
+      GNE.byId("banner-show").hidden = !this.replaying || !Number.isFinite(this.exits[out[0]?.name]);
+      if (text === this.bannerText) return; // closed, perhaps
       this.bannerText = text;
       banner.hidden = !text;
       GNE.byId("banner-text").textContent = text;
-      GNE.byId("banner-show").hidden = !this.replaying || !Number.isFinite(this.exits[out[0]?.name]);
     }
 
     exitText(system) {

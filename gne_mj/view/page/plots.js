@@ -154,8 +154,12 @@
     focus(k) {
       if (this.focused === k) return;
       this.focused = k;
-      this.chart.classList.toggle("focused", k !== null);
+      this.markChip(k);
       this.uplot?.setSeries(k === null ? null : k + 1, { focus: true });
+    }
+
+    markChip(k) {
+      this.values.forEach((value, each) => value.parentElement.classList.toggle("chosen", each === k));
     }
 
     highlight(which) {
@@ -297,6 +301,7 @@
       const line = k === null || k === undefined ? null : k - 1;
       if (line === this.focused) return;
       this.focused = line;
+      this.markChip(line);
       const agent = line === null ? null : this.spec.agents[line];
       this.plots.callbacks.highlight(
         agent === null || agent === undefined ? null : { system: this.spec.system.name, agent }, this,
@@ -349,18 +354,13 @@
       }
     }
 
-    /** As many as tell three digits of the plot's greatest value, so that texts stay as long. */
-    decimals() {
-      const most = this.plots.store.greatest(this.spec.array);
-      return most > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(most)), 0), 8) : 2;
-    }
-
     /** Values at the mouse, or now. */
     writeValues() {
       const u = this.uplot;
       if (!u) return;
+      const decimals = GNE.decimals(this.plots.store.greatest(this.spec.array));
       const i = this.hovered ?? u.valToIdx(this.plots.now);
-      const value = (k) => GNE.fixed(u.data[k + 1][i] ?? null, this.decimals());
+      const value = (k) => GNE.fixed(u.data[k + 1][i] ?? null, decimals);
       this.values.forEach((place, k) => (place.textContent = value(k)));
       if (this.values.length) return;
       const k = this.focused;

@@ -100,7 +100,12 @@
       this.floor = 0;
       this.meta = null;
       this.restyle();
-      new ResizeObserver(() => this.viewer.set_3d_pane_size()).observe(pane);
+      new ResizeObserver(() => this.resized()).observe(pane);
+    }
+
+    resized() {
+      this.viewer.set_3d_pane_size();
+      if (this.instant && this.meta) this.moveCamera();
     }
 
     prepareViewer() {
@@ -310,9 +315,12 @@
       return Number.isFinite(low[0]) ? { low, high } : null;
     }
 
-    /** How far other bodies have swung out of the box; grows only, as the view must not breathe. */
+    /** How far other bodies have swung out of the box; forgotten slowly, as the view must not breathe. */
     noteSpill() {
       if (!this.box) return;
+      const { time } = this.instant;
+      if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 6);
+      this.spillTime = time;
       const { low, high } = this.box;
       const { poses } = this.instant;
       for (let p = 0; p < poses.length; p += 8)
@@ -409,8 +417,8 @@
     defaultDirection() {
       const size = this.box ? this.box.high.map((v, k) => v - this.box.low[k]) : [0, 0];
       const long = Math.min(Math.max((size[0] - 40) / 60, 0), 1);
-      const azimuth = (this.box ? -84 + 71 * long : -84) * DEGREE;
-      const elevation = (this.box && this.planar ? 36 : this.box ? 20 - 5 * long : 12) * DEGREE;
+      const azimuth = (this.box ? -84 + 75 * long : -84) * DEGREE;
+      const elevation = (this.box && this.planar ? 36 : this.box ? 20 - 13 * long : 12) * DEGREE;
       const flat = Math.cos(elevation);
       return GNE.toView([
         Math.cos(azimuth) * flat,

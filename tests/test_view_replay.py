@@ -1,0 +1,266 @@
+"""What a page is given: packs, shares of bounds, messages, and a trajectory's replay."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import FIVE, robot_state, robot_system
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import gne_mj
+from gne_mj import graph as graphs
+from gne_mj.controllers import PartialInformation
+from gne_mj.errors import InvalidInput
+from gne_mj.faults import MessageLoss, Silence, for_native
+from gne_mj.loops import faults as native
+from gne_mj.scenario import load_scenario
+from gne_mj.simulation import Simulation
+from gne_mj.system import Clock
+from gne_mj.view import html_page, replay_pack, write_html
+from gne_mj.view.html import page_file
+from gne_mj.view.pack import MAGIC, pack, packed_small, unpack
+from gne_mj.view.stage import Stage, shares
+
+ROOT = Path(__file__).parent.parent
+SHORT = {"simulation.duration": 1.0}
+
+
+@given(
+    st.dictionaries(
+        st.text(min_size=1, max_size=20),
+        arrays.arrays(
+            st.sampled_from([np.float64, np.float32, np.int32, np.uint8]),
+            arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=7),
+        ),
+        max_size=4,
+    ),
+    st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False) | st.text()),
+)
+def test_packs_carry_every_bit(given_arrays, meta):
+    for bytes_ in (pack(meta, given_arrays), packed_small(meta, given_arrays)):
+        found_meta, found = unpack(bytes_)
+        assert found_meta == meta
+        assert list(found) == list(given_arrays)
+        for name, array in given_arrays.items():
+            assert found[name].dtype == array.dtype
+            assert found[name].shape == array.shape
+            assert found[name].tobytes() == array.tobytes()
+
+
+def test_a_packs_arrays_begin_at_multiples_of_eight():
+    data = pack({"a": "é"}, {"x": np.zeros(3, dtype=np.uint8), "y": np.arange(2.0)})
+    assert data.startswith(MAGIC)
+    length = int.from_bytes(data[4:8], "little")
+    header = json.loads(data[8 : 8 + length])
+    assert [entry["offset"] for entry in header["arrays"]] == [0, 8]
+    start = -(-(8 + length) // 8) * 8
+    assert np.frombuffer(data[start + 8 : start + 24]).tolist() == [0.0, 1.0]
+
+
+def test_no_number_of_the_header_may_be_infinite():
+    with pytest.raises(ValueError, match="JSON"):
+        pack({"bound": np.inf}, {})
+
+
+def test_shares_of_two_sided_bounds_are_those_of_the_gaps():
+    game = robot_system(robot_state(FIVE)).game
+    y = np.array([[1.0, 0.0, -1.0, 0.5, 2.0], [3.0, 6.0, 9.5, 9.5, 9.5]])
+    gaps = np.array([[-2.0, -1.0, -1.0, 1.5, 1.5], [0.0, 3.0, 3.5, 0.0, 0.0]])
+    assert np.allclose(shares(game, {"action": y, "gap": gaps}), np.abs(gaps) / 3.0)
+
+
+def test_shares_of_a_total_are_everybodys():
+    game = load_scenario("osnr").system_objects()[0].game
+    y = np.full((2, 10), 0.2)
+    found = shares(game, {"action": y, "total_power": np.array([2.0, 2.75])})
+    assert np.allclose(found, np.array([[0.8], [1.1]]) * np.ones(10))
+
+
+def test_shares_of_edges_are_the_greatest_of_an_agents():
+    system = load_scenario("planar-sync").system_objects()[0]
+    game, rng = system.game, np.random.default_rng(1)
+    y = system.start + 0.1 * rng.normal(size=(3, game.actions))
+    (quantity,) = game.quantities
+    values = quantity.at(y, game.entries(quantity))
+    bounds = quantity.bounds(game.entries(quantity))["gap_bound"]
+    found = shares(game, {"action": y, "gap": values})
+    for row, used in zip(values / bounds, found, strict=True):
+        for agent in range(game.agents):
+            own = [row[k] for k, members in enumerate(game.in_constraint) if agent in members]
+            assert used[agent] == pytest.approx(max(own))
+
+
+def test_shares_are_not_known_without_bounds():
+    game = load_scenario("cournot").system_objects()[0].game
+    assert game.quantities == ()
+    assert np.all(np.isnan(shares(game, {"action": np.ones((1, game.agents))})))
+
+
+def test_messages_are_counted_as_the_law_gets_them():
+    lost, silent = MessageLoss(probability=0.4), Silence(agents=(2,), start=0.3, end=0.5)
+    law = PartialInformation(graphs.ring(5), 1.0, 1.0)
+    system = robot_system(robot_state(FIVE), law=law, mode="sampled", faults=(lost, silent))
+    clock = Clock(duration=1.0, timestep=0.01, control_period=0.02, sample_period=0.1)
+    stage = Stage(system, clock)
+    links = stage.meta()["links"]
+    assert len(links) == 10
+    assert sorted(map(sorted, links))[::2] == stage.meta()["edges"]
+    found = stage.messages(13, 97)["robots/messages"]
+
+    faults = for_native(system.faults, system.game, law.graph, system.seed)
+    plain = np.zeros((10, 2))
+    for step in range(13, 97):
+        if step % 2:
+            continue
+        for link, (_, sender) in enumerate(links):
+            gone = False
+            for number, row in enumerate(faults.rows):
+                on = row[native.START] <= step * 0.01 + 1e-9 < row[native.END]
+                if row[native.TARGET] != link or not on:
+                    continue
+                with np.errstate(over="ignore"):
+                    chance = native.uniform(system.seed, row[native.STREAM], link, step // 2)
+                silence = number >= faults.pointer[native.SILENCE]
+                gone |= silence or chance < row[native.SIZE]
+            if sender == 3 and 30 <= step < 50:
+                assert gone
+            plain[link, int(gone)] += 1
+    assert np.array_equal(found, plain)
+    assert np.sum(found) == 42 * 10
+
+
+def test_nothing_is_lost_without_faults_and_nothing_counted_in_continuous_time():
+    law = PartialInformation(graphs.ring(5), 1.0, 1.0)
+    clock = Clock(duration=1.0, timestep=0.01, control_period=0.02, sample_period=0.1)
+    held = Stage(robot_system(robot_state(FIVE), law=law, mode="sampled"), clock)
+    assert np.all(held.messages(0, 10)["robots/messages"] == [5, 0])
+    flowing = Stage(robot_system(robot_state(FIVE), law=law), clock)
+    assert flowing.meta()["message_period"] is None
+    assert flowing.messages(0, 10) == {}
+    measured = Stage(robot_system(robot_state(FIVE)), clock).meta()
+    assert measured["edges_are"] == "measurements"
+    assert measured["edges"] == [[1, 2], [2, 3], [3, 4], [4, 5]]
+
+
+def poses_of(found):
+    """(T, K, 8), as the page puts them together."""
+    samples = len(found["time"])
+    poses = np.tile(found["pose_base"], (samples, 1))
+    poses[:, found["pose_columns"]] = found["pose_values"].T
+    return poses.reshape(samples, -1, 8)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "ode"])
+def test_a_replay_has_every_robot_where_the_trajectory_has_it(engine):
+    trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": engine})
+    meta, found = unpack(replay_pack(trajectory))
+    data = trajectory["robots"]
+    assert np.array_equal(found["time"], data["time"])
+    poses = poses_of(found)
+    (about,) = meta["systems"]
+    for agent, item in enumerate(about["anchors"]):
+        assert meta["items"][item] == f"meshcat/robots/robot_{agent + 1}/main"
+        assert np.array_equal(poses[:, item, 0], data["position"][:, agent])
+        assert np.all(poses[:, item, 1:] == [0, 0, 1, 0, 0, 0, 1])
+    coil = meta["items"].index("meshcat/robots/robot_2/coil")
+    # from the mast's top to the hook, which hangs 0.35 m behind an unstretched spring
+    assert np.allclose(poses[:, coil, 7], np.abs(data["extension"][:, 1] + 0.35), atol=1e-12)
+    assert np.allclose(found["robots/action"], data["action"], rtol=1e-6)
+    assert np.allclose(found["robots/quantity/gap"], data["gap"], rtol=1e-6, atol=1e-6)
+    assert np.allclose(found["robots/margin"], -data["constraint"].max("constraint"), rtol=1e-6)
+    assert meta["outcome"]["robots"]["status"] == trajectory.status
+    assert sum(meta["command_lengths"]) == len(found["commands"])
+    assert about["quantities"][0]["bound"] == [3.0] * 5
+
+
+def test_a_replay_of_own_robots_moves_all_their_joints():
+    scenario = ROOT / "examples" / "robot" / "scenario.toml"
+    trajectory = gne_mj.run(scenario, {"simulation.duration": 0.5})
+    (name,) = trajectory.tree.children
+    meta, found = unpack(replay_pack(trajectory))
+    moving = {meta["items"][column // 8] for column in found["pose_columns"]}
+    assert len(moving) > len(meta["systems"][0]["anchors"])
+    data = trajectory[name]
+    (system,) = load_scenario(scenario).system_objects()
+    plant = system.mujoco_plant(load_scenario(scenario).clock())
+    import mujoco
+
+    for sample in (0, 3, -1):
+        plant.data.qpos[:] = data["configuration"][sample]
+        mujoco.mj_kinematics(plant.model, plant.data)
+        for body in range(1, plant.model.nbody):
+            path = f"meshcat/{name}/{plant.model.body(body).name}"
+            if path in meta["items"]:
+                pose = poses_of(found)[sample, meta["items"].index(path)]
+                assert np.allclose(pose[:3], plant.data.xpos[body], atol=1e-12)
+
+
+def test_systems_that_end_early_stay_and_their_lines_stop():
+    changes = {"robots.controller.mode": "sampled", "simulation.control_period": 1.0,
+               "simulation.duration": 3.0}  # fmt: skip
+    trajectory = gne_mj.run("paper", changes)
+    assert trajectory.reports["robots"]["status"] == "left_feasible_set"
+    ended = float(trajectory["robots"]["time"][-1])
+    meta, found = unpack(replay_pack(trajectory))
+    later = found["time"] > ended + 1e-9
+    assert np.any(later)
+    assert np.all(np.isnan(found["robots/action"][later]))
+    assert not np.any(np.isnan(found["channels/action"]))
+    poses = poses_of(found)
+    assert np.all(poses[later] == poses[found["time"] <= ended + 1e-9][-1])
+    assert meta["outcome"]["robots"]["exit_time"] == pytest.approx(ended, abs=0.51)
+
+
+def test_long_trajectories_are_thinned_and_keep_their_end(monkeypatch):
+    monkeypatch.setattr("gne_mj.view.replay.SAMPLES", 7)
+    trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})
+    _, found = unpack(replay_pack(trajectory))
+    assert len(found["time"]) == 7 + 1
+    assert found["time"][-1] == 1.0
+    assert np.all(np.isin(found["time"], trajectory["robots"]["time"]))
+
+
+def test_a_trajectory_of_no_scenario_is_refused():
+    clock = Clock(duration=0.1, timestep=0.01, control_period=0.01, sample_period=0.1)
+    trajectory = Simulation([robot_system(robot_state(FIVE))], clock).run()
+    with pytest.raises(InvalidInput, match="robots are drawn from the scenario"):
+        replay_pack(trajectory)
+
+
+def test_the_file_has_all_inside_and_asks_for_nothing(tmp_path):
+    trajectory = gne_mj.run("paper", SHORT)
+    path = write_html(trajectory, tmp_path / "run.html", "<b>& co</b>")
+    text = path.read_text(encoding="utf-8")
+    assert "&lt;b&gt;&amp; co&lt;/b&gt;" in text
+    assert "connect-src" not in text.split("</head>")[0]  # so that default-src 'none' holds for it
+    assert "default-src 'none'" in text
+    assert ' src="' not in text.replace(page_file("vendor/meshcat.min.js").decode(), "")
+    assert re.findall("<link [^>]*>", text) == ['<link rel="icon" href="data:,">']
+    for licence in ("Robin Deits", "Leon Sorokin"):
+        assert licence in text
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "run.html"
+    path.write_text("old")
+    trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})
+
+    def full(self, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OSError, match="space"):
+        write_html(trajectory, path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_scripts_cannot_end_the_page_they_are_in():
+    trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})
+    text = html_page(trajectory, "</script><script>alert(1)")
+    assert text.count("<script") == text.count("</script>")

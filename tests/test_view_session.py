@@ -1,0 +1,314 @@
+"""A live run: the same steps as any other, and what viewers may do to it."""
+
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gne_mj
+from gne_mj.scenario import load_scenario
+from gne_mj.view import Session
+from gne_mj.view.controls import controls_of
+from gne_mj.view.pack import unpack
+
+ODE = {"plant.engine": "ode", "simulation.duration": 1.0}
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+class Page:
+    """Stands in for browsers: what they would be sent."""
+
+    def __init__(self, session):
+        self.session, self.frames, self.told, self.broadcasts = session, [], [], []
+        self.welcomed = None
+        server = session.server
+        server.publish = self.frames.append
+        server.tell = lambda message, browser=None: self.told.append(message)
+        server.broadcast = self.broadcasts.append
+        server.welcome = lambda browser, messages: setattr(self, "welcomed", messages)
+
+    def ask(self, **message):
+        self.session._receive(message, None)
+        self.session._look(0.0)
+
+    @property
+    def errors(self):
+        return [message["text"] for message in self.told if message["kind"] == "notice"]
+
+
+@contextmanager
+def watched(scenario="velocity-sync", changes=ODE, speed=None):
+    session = Session(load_scenario(scenario, changes), "a title", speed=speed)
+    try:
+        yield session, Page(session)
+    finally:
+        session.server.close()
+
+
+def to_the_end(session):
+    return session.run(threading.Event())
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes"),
+    [
+        ("velocity-sync", ODE),
+        ("velocity-sync", {"simulation.duration": 0.5}),
+        ("osnr", {"simulation.duration": 0.5}),
+        pytest.param("disturbed", {"simulation.duration": 0.5}, marks=pytest.mark.slow),
+        pytest.param("planar-sync", {"simulation.duration": 0.5}, marks=pytest.mark.slow),
+    ],
+)
+def test_watching_changes_no_bit(scenario, changes):
+    plain = gne_mj.run(scenario, changes)
+    with watched(scenario, changes) as (session, page):
+        session._move(3)
+        page.ask(do="connect")
+        page.ask(do="step")
+        page.ask(do="play")
+        session._publish()
+        seen = to_the_end(session)
+    assert seen.interventions == []
+    for name in plain.tree.children:
+        for key, values in plain[name].variables.items():
+            if values.dtype.kind == "f":
+                assert np.array_equal(values, seen[name][key], equal_nan=True), (name, key)
+    assert seen.status == plain.status
+
+
+def test_a_new_browser_is_told_everything():
+    with watched("paper", {"simulation.duration": 0.5}) as (session, page):
+        session._move(100)
+        page.ask(do="connect")
+        scene, history, frame = (unpack(message) for message in page.welcomed)
+    assert scene[0]["kind"] == "scene"
+    assert [system["drawn_as"] for system in scene[0]["systems"]] == ["fleet", "bars"]
+    assert {control["key"] for control in scene[0]["controls"]} == {
+        "systems.robots.barrier.rho",
+        "systems.robots.game.reference_velocity",
+        "systems.channels.barrier.rho",
+        "systems.channels.controller.gain",
+    }
+    assert [push["system"] for push in scene[0]["pushes"]] == ["robots"]
+    assert history[0] == {"kind": "history"}
+    assert np.allclose(history[1]["time"], np.arange(4) * 0.05)
+    assert history[1]["channels/action"].shape == (4, 10)
+    state = session.simulation.runs["robots"].loop.present().state
+    meta, arrays = frame
+    assert meta["time"] == pytest.approx(0.2)
+    assert np.array_equal(arrays["robots/action"], state[:, 1])
+    anchors = scene[0]["systems"][0]["anchors"]
+    assert np.array_equal(arrays["poses"][anchors, 0], state[:, 3])
+    assert arrays["channels/estimate"].shape == (10, 10)
+    assert page.told[-1]["kind"] == "controls"
+
+
+def test_numbers_change_while_it_runs_and_hold_after_a_restart():
+    with watched() as (session, page):
+        session._move(100)
+        page.ask(do="set", key="systems.robots.barrier.rho", value=0.5)
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.5)
+        assert session.simulation.systems[0].rho == 0.5
+        assert session.simulation.time == pytest.approx(0.2)
+        assert page.told[-1]["values"]["systems.robots.game.reference_velocity"] == 2.5
+        first = to_the_end(session)
+        assert [done["what"] for done in first.interventions] == [
+            "systems.robots.barrier.rho = 0.5",
+            "systems.robots.game.reference_velocity = 2.5",
+        ]
+        assert unpack(page.frames[-1])[0]["ended"]
+        page.ask(do="restart")
+        assert not unpack(session._frame())[0]["ended"]
+        second = to_the_end(session)
+    assert second.interventions == []
+    expected = gne_mj.run(
+        "velocity-sync", {**ODE, "barrier.rho": 0.5, "game.reference_velocity": 2.5}
+    )
+    assert np.array_equal(second["robots"]["action"], expected["robots"]["action"])
+
+
+def test_a_reference_with_two_entries_has_two_sliders():
+    scenario = load_scenario("planar-sync")
+    keys = [control.key for control in controls_of(scenario)]
+    assert keys[1:] == [f"systems.robots.game.reference_velocity[{i}]" for i in range(2)]
+    with watched("planar-sync", {"simulation.duration": 0.1}) as (session, page):
+        before = session.simulation.systems[0].game.parameters.copy()
+        page.ask(do="set", key=keys[2], value=0.8)
+        after = session.simulation.systems[0].game.parameters
+        assert page.errors == []
+        changed = np.flatnonzero(before != after)
+        assert after[changed].tolist() == [0.8]
+
+
+def test_of_a_dragged_slider_only_the_last_value_counts():
+    with watched() as (session, _page):
+        for value in (0.2, 0.3, 0.4):
+            message = {"do": "set", "key": "systems.robots.barrier.rho", "value": value}
+            session._receive(message, None)
+        session._look(0.0)
+        assert [d["what"] for d in session.simulation.interventions] == [
+            "systems.robots.barrier.rho = 0.4"
+        ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("systems.robots.game.reference_velocity", 30.0, "Refused: at the present outputs"),
+        ("systems.robots.barrier.rho", -1.0, "systems.robots.barrier.rho: got -1.0"),
+        ("systems.robots.barrier.rho", "much", "systems.robots.barrier.rho: got 'much'"),
+        ("systems.robots.barrier.rho", float("nan"), "it must be a finite number"),
+        ("simulation.timestep", 1.0, "key: got 'simulation.timestep'"),
+        (None, 1.0, "this scenario has no such slider"),
+    ],
+)
+def test_a_value_that_cannot_be_changes_nothing(key, value, words):
+    with watched() as (session, page):
+        session._move(50)
+        system = session.simulation.systems[0]
+        page.ask(do="set", key=key, value=value)
+        assert session.simulation.systems[0] is system
+        assert words in page.errors[-1]
+        assert page.errors[-1].count(". ") == 0
+        assert session.simulation.interventions == []
+        page.ask(do="restart")
+        assert session.simulation.systems[0].rho == 0.1
+
+
+def test_a_push_acts_on_the_robot_it_names():
+    with watched(changes={"simulation.duration": 1.0}) as (session, page):
+        session._move(10)
+        page.ask(do="push", system="robots", agent=3, axis=0, force=-4.0)
+        data = session.simulation.runs["robots"].loop.plant.data
+        assert np.count_nonzero(data.qfrc_applied) == 1
+        assert data.qfrc_applied.min() == -4.0
+        session._move(120)
+        assert not np.any(data.qfrc_applied)
+        trajectory = to_the_end(session)
+    assert not trajectory.reports["robots"]["lyapunov"]["claimed"]
+    assert "pushed by -4" in trajectory.interventions[0]["what"]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"system": "robots", "agent": 6},
+        {"system": "robots", "agent": 0},
+        {"system": "robots", "agent": "1"},
+        {"system": "robots", "agent": 1, "axis": 1},
+        {"system": "robots", "agent": 1, "force": "hard"},
+        {"system": "nobody", "agent": 1},
+        {},
+    ],
+)
+def test_a_push_of_nobody_is_refused(message):
+    with watched(changes={"simulation.duration": 1.0}) as (session, page):
+        page.ask(do="push", **message)
+        assert page.errors
+        assert session.simulation.interventions == []
+
+
+def test_robots_of_the_ode_have_no_push_buttons():
+    with watched() as (_session, page):
+        page.ask(do="connect")
+        assert unpack(page.welcomed[0])[0]["pushes"] == []
+        page.ask(do="push", system="robots", agent=1)
+        assert "only robots in MuJoCo" in page.errors[-1]
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=4,
+)
+WORDS = ["play", "pause", "step", "speed", "set", "push", "restart", "connect", "other"]
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.fixed_dictionaries(
+            {"do": st.sampled_from(WORDS) | JSON},
+            optional={
+                "key": st.just("systems.robots.barrier.rho") | JSON,
+                "value": st.floats(0.01, 10.0) | JSON,
+                "system": st.just("robots") | JSON,
+                "agent": JSON,
+                "axis": JSON,
+            },
+        ),
+        max_size=6,
+    )
+)
+def test_no_message_ends_a_session(shared_session, messages):
+    session, _page = shared_session
+    for message in messages:
+        session._receive(message, None)
+    session._look(0.0)
+    session._move(1)
+    meta, _ = unpack(session._frame())
+    assert meta["state"]["robots"]["status"] in ("running", "completed", "left_feasible_set")
+
+
+@pytest.fixture(scope="module")
+def shared_session():
+    with watched(changes={**ODE, "simulation.duration": 1000.0}) as found:
+        yield found
+
+
+def test_steps_go_from_one_control_instant_to_the_next():
+    changes = {**ODE, "controller.mode": "sampled", "simulation.control_period": 0.04}
+    with watched(changes=changes) as (session, page):
+        page.ask(do="step")
+        assert session.simulation.time == pytest.approx(0.04)
+        assert not session._playing
+    with watched() as (session, page):
+        page.ask(do="step")
+        assert session.simulation.time == pytest.approx(0.05)
+
+
+def test_the_wall_clock_sets_the_pace(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("time.perf_counter", lambda: now[0])
+    with watched(changes={**ODE, "simulation.duration": 100.0}, speed=2.0) as (session, page):
+        for _ in range(50):
+            now[0] += 0.02
+            session._turn()
+        assert session.simulation.time == pytest.approx(2.0, abs=0.05)
+        assert unpack(page.frames[-1])[0]["pace"] == pytest.approx(2.0, rel=0.1)
+        page.ask(do="pause")
+        now[0] += 10.0
+        paused = session.simulation.time
+        session._turn()
+        assert session.simulation.time == paused
+        page.ask(do="play")
+        now[0] += 0.02
+        session._turn()
+        assert session.simulation.time == pytest.approx(paused + 0.04, abs=0.01)
+
+
+def test_an_exit_is_told_with_its_words():
+    changes = {**ODE, "controller.mode": "sampled", "simulation.control_period": 1.0,
+               "simulation.duration": 3.0}  # fmt: skip
+    with watched(changes=changes) as (session, page):
+        trajectory = to_the_end(session)
+    state = unpack(page.frames[-1])[0]["state"]["robots"]
+    assert trajectory.status == state["status"] == "left_feasible_set"
+    assert "was violated" in state["message"]
+    assert state["exit_time"] == trajectory.reports["robots"]["exit"]["time"]
+
+
+def test_a_meshcat_visualizer_draws_into_the_page():
+    import meshcat.geometry
+
+    with watched() as (session, _page):
+        session.visualizer["own"]["box"].set_object(meshcat.geometry.Box([1.0, 1.0, 1.0]))
+        settled = threading.Event()
+        session.server._loop.call_soon_threadsafe(settled.set)
+        settled.wait(5)
+        tree = session.server._bridge.tree
+        assert b"BoxGeometry" in tree["meshcat"]["own"]["box"].object
