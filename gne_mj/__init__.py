@@ -1,5 +1,6 @@
 """Robots that seek a generalized Nash equilibrium and never leave their shared constraint set."""
 
+import sys
 from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,23 @@ __all__ = [
     "run",
     "run_batch",
 ]
+
+
+def _show_in_notebooks() -> None:
+    """Where IPython runs, a trajectory is shown with its replay (see gne_mj.view.notebook)."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if shell is not None:
+        html = shell.display_formatter.formatters["text/html"]
+        html.for_type_by_name("gne_mj.trajectory", "Trajectory", _notebook_html)
+
+
+def _notebook_html(trajectory: "Trajectory") -> str:
+    from gne_mj.view.notebook import notebook_html
+
+    return notebook_html(trajectory)
+
+
+_show_in_notebooks()
 
 
 def __getattr__(name: str) -> Any:

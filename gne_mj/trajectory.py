@@ -124,6 +124,10 @@ class Trajectory:
             groups[f"/{name}"] = _dataset(*part)
         return cls(xarray.DataTree.from_dict(groups))
 
+    def __repr__(self) -> str:
+        words = ", ".join(f"{name}: {report['status']}" for name, report in self.reports.items())
+        return f"<Trajectory of {words}>"
+
     @property
     def status(self) -> str:
         """The worst of the systems' statuses."""

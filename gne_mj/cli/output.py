@@ -108,64 +108,18 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
 
 def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
     """Print a run's summary and where it is kept, or its report as JSON."""
+    from gne_mj.summary import summary
+
     if as_json:
         print(json.dumps(trajectory.report(), indent=2))
         return
     for name, report in trajectory.reports.items():
-        print("\n".join(_summary(name, report)))
+        print(f"\n{name}")
+        for key, value in summary(report).items():
+            print(f"  {key:20} {value}")
         _warn(name, report)
     if out is not None:
         print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
-
-
-def _summary(name: str, report: dict[str, Any]) -> list[str]:
-    worst, gap = report["worst_constraint"], report["worst_gap"]
-    settling, actuators = report["settling_time"], report["actuators"]
-    lyapunov, epsilon = report["lyapunov"], report["epsilon"]
-    distances = report["equilibrium"]
-    unknown = distances["final_distance_to_variational"] is None
-    rows = {
-        "status": f"{report['status']}: {report['message']}",
-        "least margin": "nothing was observed"
-        if worst is None
-        else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
-        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
-        "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
-        + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": "not known of MJCF robots"
-        if not lyapunov["known"]
-        else ("never rose" if lyapunov["monotone"] else "rose")
-        + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
-        + f" (largest rise {lyapunov['largest_rise']:.2g}; "
-        + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
-        "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
-        f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
-    }
-    if gap is not None:
-        rows["widest gap"] = (
-            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
-            f" {gap['time']:.4g} s"
-        )
-    implicit = report["implicit"]
-    if implicit is not None:
-        rows["held inputs"] = (
-            f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
-            f" steps each; predicted outputs off by up to"
-            f" {implicit['largest_prediction_error']:.2g}"
-        )
-        for key, what in (
-            ("not_accurate", "not accurate (though inside)"),
-            ("periods_not_monotone", "periods without dy+/du > 0"),
-        ):
-            if implicit[key]:
-                rows["held inputs"] += f"; {implicit[key]} {what}"
-    if epsilon["measured"] is not None:
-        rows["epsilon"] = (
-            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
-            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
-            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
-        )
-    return [f"\n{name}", *(f"  {key:20} {value}" for key, value in rows.items())]
 
 
 def _warn(name: str, report: dict[str, Any]) -> None:

@@ -11,7 +11,12 @@
   const mesh = (colour, opacity = 1) =>
     new THREE.Mesh(
       BOX,
-      new THREE.MeshPhongMaterial({ color: colour, transparent: opacity < 1, opacity, shininess: 12 }),
+      new THREE.MeshPhongMaterial({
+        color: colour,
+        transparent: opacity < 1,
+        opacity,
+        shininess: 12,
+      }),
     );
 
   const setHeight = (object, height) => {
@@ -161,7 +166,13 @@
       const [x, y] = this.spot(0);
       const unit = action.unit ? ` / ${action.unit}` : "";
       const point = this.point(x - WIDTH / 2, y, TALL);
-      return { point, text: `${name}: ${action.name}${unit}`, shift: -34, align: "left", title: true };
+      return {
+        point,
+        text: `${name}: ${action.name}${unit}`,
+        shift: -34,
+        align: "left",
+        title: true,
+      };
     }
 
     gaugeTexts() {

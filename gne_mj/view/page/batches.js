@@ -16,11 +16,23 @@
 
   const signature = ({ geometry, material: m }) => {
     const shape = geometry.parameters ? JSON.stringify(geometry.parameters) : checksum(geometry);
-    return [geometry.type, shape, m.type, m.opacity, m.transparent, m.side, m.wireframe, m.shininess].join("|");
+    return [
+      geometry.type,
+      shape,
+      m.type,
+      m.opacity,
+      m.transparent,
+      m.side,
+      m.wireframe,
+      m.shininess,
+    ].join("|");
   };
 
   const batchable = (mesh) =>
-    mesh.isMesh && !mesh.isInstancedMesh && !Array.isArray(mesh.material) && !mesh.material.map &&
+    mesh.isMesh &&
+    !mesh.isInstancedMesh &&
+    !Array.isArray(mesh.material) &&
+    !mesh.material.map &&
     !mesh.material.vertexColors;
 
   /** Far away nobody counts the corners of a ball. */
@@ -29,7 +41,14 @@
     const around = count > 100 ? 10 : 14;
     if (geometry.type === "SphereGeometry") return new THREE.SphereGeometry(p.radius, around, 7);
     if (geometry.type === "CylinderGeometry")
-      return new THREE.CylinderGeometry(p.radiusTop, p.radiusBottom, p.height, around, 1, p.openEnded);
+      return new THREE.CylinderGeometry(
+        p.radiusTop,
+        p.radiusBottom,
+        p.height,
+        around,
+        1,
+        p.openEnded,
+      );
     return geometry;
   };
 

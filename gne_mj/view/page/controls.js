@@ -18,7 +18,8 @@
       GNE.byId("step").onclick = (event) => page.step(1, event.shiftKey);
       GNE.byId("back").onclick = (event) => page.step(-1, event.shiftKey);
       GNE.byId("restart").onclick = () => page.restart();
-      this.speed.onchange = () => page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
+      this.speed.onchange = () =>
+        page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
       this.slider.oninput = () => page.seek(Number(this.slider.value));
     }
 
@@ -30,7 +31,11 @@
       this.speedKey = key;
       this.speed.replaceChildren(
         ...all.map((each) =>
-          GNE.element("option", { value: each ?? "max", text: speedName(each), selected: each === speed }),
+          GNE.element("option", {
+            value: each ?? "max",
+            text: speedName(each),
+            selected: each === speed,
+          }),
         ),
       );
     }
@@ -100,17 +105,24 @@
         const system = meta.systems.find((each) => each.name === name);
         this.body.append(
           GNE.element(
-            "div", { class: "tuning-row", role: "group", "aria-label": name },
+            "div",
+            { class: "tuning-row", role: "group", "aria-label": name },
             GNE.element("h3", { text: name }),
             ...own.map((control) => this.slider(control)),
             ...push.map((each) => this.pushes(each, system)),
           ),
         );
       }
-      const general = controls.filter(({ system }) => !meta.systems.some(({ name }) => name === system));
+      const general = controls.filter(
+        ({ system }) => !meta.systems.some(({ name }) => name === system),
+      );
       if (general.length)
         this.body.append(
-          GNE.element("div", { class: "tuning-row" }, ...general.map((control) => this.slider(control))),
+          GNE.element(
+            "div",
+            { class: "tuning-row" },
+            ...general.map((control) => this.slider(control)),
+          ),
         );
     }
 
@@ -122,10 +134,19 @@
         : (v) => (v - min) / (max - min);
       const fromPlace = log ? (p) => min * (max / min) ** p : (p) => min + (max - min) * p;
       const range = GNE.element("input", {
-        type: "range", min: 0, max: 1, step: 0.002, "aria-label": label, title: key,
+        type: "range",
+        min: 0,
+        max: 1,
+        step: 0.002,
+        "aria-label": label,
+        title: key,
       });
       const number = GNE.element("input", {
-        type: "number", min, max, step: "any", "aria-label": `${label}, as a number`,
+        type: "number",
+        min,
+        max,
+        step: "any",
+        "aria-label": `${label}, as a number`,
       });
       const show = (v) => {
         range.value = toPlace(v);
@@ -160,7 +181,8 @@
       };
       this.sliders.set(key, follow);
       return GNE.element(
-        "div", { class: "control" },
+        "div",
+        { class: "control" },
         GNE.element("span", { class: "control-label", text: label }),
         range,
         number,
@@ -187,7 +209,8 @@
         axes.flatMap((axis, k) =>
           [-1, 1].map((sign) =>
             GNE.element("button", {
-              type: "button", class: "push",
+              type: "button",
+              class: "push",
               text: axis === "y" ? (sign < 0 ? "↓" : "↑") : sign < 0 ? "←" : "→",
               title: `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
               "aria-label": `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
@@ -203,9 +226,13 @@
         for (let agent = 1; agent <= agents; agent++)
           list.append(
             GNE.element(
-              "span", { class: "push-one" },
+              "span",
+              { class: "push-one" },
               GNE.element("b", { text: agent }),
-              ...buttons(() => agent, () => `${noun} ${agent}`),
+              ...buttons(
+                () => agent,
+                () => `${noun} ${agent}`,
+              ),
             ),
           );
         box.append(list);
@@ -215,7 +242,14 @@
       for (let agent = 1; agent <= agents; agent++)
         select.append(GNE.element("option", { value: agent, text: `${noun} ${agent}` }));
       const chosen = () => Number(select.value);
-      box.append(GNE.element("span", { class: "push-one" }, select, ...buttons(chosen, () => `the chosen ${noun}`)));
+      box.append(
+        GNE.element(
+          "span",
+          { class: "push-one" },
+          select,
+          ...buttons(chosen, () => `the chosen ${noun}`),
+        ),
+      );
       return box;
     }
 
@@ -228,7 +262,8 @@
   GNE.toast = (text, level = "info") => {
     const error = level === "error";
     const toast = GNE.element(
-      "div", { class: `toast ${error ? "error" : ""}` },
+      "div",
+      { class: `toast ${error ? "error" : ""}` },
       GNE.element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
       GNE.element("span", { text }),
     );
@@ -245,8 +280,10 @@
       const { target } = event;
       const type = target.tagName === "INPUT" ? target.type : target.tagName;
       if (["number", "text", "SELECT", "TEXTAREA"].includes(type)) return;
-      const steers = type === "range" && target.id !== "time-slider" && event.key.startsWith("Arrow");
-      const separates = target.getAttribute("role") === "separator" && event.key.startsWith("Arrow");
+      const steers =
+        type === "range" && target.id !== "time-slider" && event.key.startsWith("Arrow");
+      const separates =
+        target.getAttribute("role") === "separator" && event.key.startsWith("Arrow");
       const presses = event.key === " " && ["BUTTON", "SUMMARY", "checkbox"].includes(type);
       if (steers || separates || presses || document.querySelector("dialog[open]")) return;
       const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];

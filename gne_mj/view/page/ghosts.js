@@ -43,7 +43,10 @@
       const system = this.scene.meta.systems.find((each) => each.name === this.shown.system);
       const { estimate, action } = instant.systems[system.name];
       if (!estimate || !action) return void (this.group.visible = false);
-      const row = estimate.subarray(this.shown.agent * action.length, (this.shown.agent + 1) * action.length);
+      const row = estimate.subarray(
+        this.shown.agent * action.length,
+        (this.shown.agent + 1) * action.length,
+      );
       if (system.drawn_as === "bars") this.outlines(system, row);
       else this.shadows(system, row, action);
     }
@@ -73,7 +76,11 @@
         if (agent === this.shown.agent) continue;
         const ahead = this.ahead(system, agent, row, action);
         const sources = this.scene.tinted.get(system.name)[agent];
-        if (!this.copies.has(agent)) this.copies.set(agent, sources.map((mesh) => this.copy(mesh)));
+        if (!this.copies.has(agent))
+          this.copies.set(
+            agent,
+            sources.map((mesh) => this.copy(mesh)),
+          );
         this.copies.get(agent).forEach((copy, k) => {
           copy.matrix.copy(this.scene.matrixOf(sources[k]));
           ahead.forEach((v, axis) => (copy.matrix.elements[12 + axis] += v));
@@ -95,7 +102,10 @@
 
     copy(mesh) {
       const material = new THREE.MeshPhongMaterial({
-        color: GNE.colour("ghost"), transparent: true, opacity: 0.5, depthWrite: false,
+        color: GNE.colour("ghost"),
+        transparent: true,
+        opacity: 0.5,
+        depthWrite: false,
       });
       material.emissive.set(GNE.colour("ghost")).multiplyScalar(0.35);
       const copy = new THREE.Mesh(mesh.geometry, material);

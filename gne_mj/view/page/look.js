@@ -110,7 +110,10 @@ const GNE = {};
   GNE.fixed = (value, decimals) =>
     value === null || Number.isNaN(value)
       ? "–"
-      : value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+      : value
+          .toFixed(decimals)
+          .replace(/^-(?=[0.]*$)/, "")
+          .replace("-", "−");
 
   /** Decimals that tell three digits of the greatest value, so that all texts stay as long. */
   GNE.decimals = (greatest) =>

@@ -114,7 +114,11 @@
       context.textBaseline = "top";
       context.fillStyle = GNE.colour("muted");
       const step = major > 10 ? major : 5;
-      for (let x = Math.floor((low[0] - 2 * step) / step) * step; x <= high[0] + 2 * step; x += step) {
+      for (
+        let x = Math.floor((low[0] - 2 * step) / step) * step;
+        x <= high[0] + 2 * step;
+        x += step
+      ) {
         const p = scene.project([x, y, scene.floor]);
         if (!p || !this.free({ x: p.x - 26, y: p.y, w: 52, h: 18 })) continue;
         this.taken.push({ x: p.x - 26, y: p.y, w: 52, h: 18 });
@@ -292,7 +296,12 @@
         const chosen = this.isHighlighted(system, owner - 1);
         const axis = system.action.axis[k] || "";
         this.text({ point: bars.foot(k), text: `${owner}${axis}`, shift: 11, bold: true, chosen });
-        this.text({ point: bars.top(k), text: GNE.fixed(bars.values[k] ?? null, decimals), shift: -9, chosen });
+        this.text({
+          point: bars.top(k),
+          text: GNE.fixed(bars.values[k] ?? null, decimals),
+          shift: -9,
+          chosen,
+        });
       });
     }
 

@@ -47,7 +47,10 @@
     async start() {
       if (this.live) return this.startLive();
       try {
-        const packed = this.mode === "file" ? GNE.fromBase64(GNE.byId("replay").textContent) : await this.fetchReplay();
+        const packed =
+          this.mode === "file"
+            ? GNE.fromBase64(GNE.byId("replay").textContent)
+            : await this.fetchReplay();
         this.showReplay(GNE.decodePack(await GNE.inflate(packed)));
       } catch (error) {
         this.warn(`The replay cannot be read: ${error.message}`);
@@ -209,10 +212,16 @@
     /** Exits and interventions of a replay, marked in plots and along the slider. */
     takeOutcome() {
       const { outcome, interventions } = this.replay.meta;
-      const exits = Object.entries(outcome || {}).filter(([, each]) => Number.isFinite(each.exit_time));
+      const exits = Object.entries(outcome || {}).filter(([, each]) =>
+        Number.isFinite(each.exit_time),
+      );
       this.exits = Object.fromEntries(exits.map(([name, each]) => [name, each.exit_time]));
       this.plots.interventions = interventions || [];
-      const marks = exits.map(([name, { exit_time: time }]) => ({ time, what: `${name} left the set`, bad: true }));
+      const marks = exits.map(([name, { exit_time: time }]) => ({
+        time,
+        what: `${name} left the set`,
+        bad: true,
+      }));
       this.transport.mark([...this.plots.interventions, ...marks], this.replay.end);
     }
 
@@ -224,7 +233,10 @@
         option("fleet", "all"),
         ...fleets.flatMap((system) =>
           [...Array(system.agents).keys()].map((agent) =>
-            option(JSON.stringify({ system: system.name, agent }), `${system.agent_name} ${agent + 1}`),
+            option(
+              JSON.stringify({ system: system.name, agent }),
+              `${system.agent_name} ${agent + 1}`,
+            ),
           ),
         ),
         option("none", "nothing"),
@@ -237,10 +249,12 @@
       GNE.byId("ghost-agent").replaceChildren(
         ...systems.map((system) =>
           GNE.element(
-            "optgroup", { label: system.name },
+            "optgroup",
+            { label: system.name },
             ...[...Array(system.agents).keys()].map((agent) =>
               GNE.element("option", {
-                value: JSON.stringify({ system: system.name, agent }), text: `${system.agent_name} ${agent + 1}`,
+                value: JSON.stringify({ system: system.name, agent }),
+                text: `${system.agent_name} ${agent + 1}`,
               }),
             ),
           ),
@@ -257,7 +271,8 @@
       const parts = [];
       if (words.has("messages")) parts.push("lines: messages pass");
       if (words.has("measurements")) parts.push("dashed lines: measured directly");
-      if (linked.some((system) => system.links.length && system.message_period !== null)) parts.push("✕ lost");
+      if (linked.some((system) => system.links.length && system.message_period !== null))
+        parts.push("✕ lost");
       const note = GNE.byId("link-note");
       note.textContent = parts.join(" · ");
       note.hidden = parts.length === 0;
@@ -277,7 +292,8 @@
     ghostNote({ system: name, agent }) {
       const system = this.meta.systems.find((each) => each.name === name);
       const who = `${system.agent_name} ${agent + 1}`;
-      if (system.drawn_as === "bars") return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
+      if (system.drawn_as === "bars")
+        return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
       return `Pale copies: the others as ${who} takes them to be, displaced by (estimate − actual ${system.action.name}) × 1 s.`;
     }
 
@@ -340,7 +356,11 @@
       if (!withMessages) return;
       const now = performance.now();
       for (const system of this.meta.systems)
-        this.overlay.messages(system, this.replay.messagesBetween(system.name, before, this.time), now);
+        this.overlay.messages(
+          system,
+          this.replay.messagesBetween(system.name, before, this.time),
+          now,
+        );
     }
 
     // ---- pictures
@@ -409,8 +429,13 @@
     showTransport() {
       const { replaying } = this;
       this.transport.show({
-        playing: this.playing, seekable: replaying, live: this.live, connected: Boolean(this.connected),
-        time: this.time, end: replaying ? this.replay.end : this.meta.duration, speed: this.speed,
+        playing: this.playing,
+        seekable: replaying,
+        live: this.live,
+        connected: Boolean(this.connected),
+        time: this.time,
+        end: replaying ? this.replay.end : this.meta.duration,
+        speed: this.speed,
       });
     }
 
@@ -427,7 +452,8 @@
     }
 
     pace() {
-      if (!this.live || this.replaying || !this.frame) return this.live && this.replaying ? "ended; replay" : "";
+      if (!this.live || this.replaying || !this.frame)
+        return this.live && this.replaying ? "ended; replay" : "";
       if (!this.connected) return "not connected";
       if (!this.playing) return "paused";
       const { speed, pace } = this.frame;
@@ -457,12 +483,19 @@
       const state = this.stateOf(system);
       const { kind, symbol, words } = GNE.status(state.status);
       const about = [
-        system.game, `${system.agents} ${system.agent_name}s`, `information: ${system.information}`,
-        `mode: ${system.mode}`, `engine: ${system.engine}`, `ρ = ${GNE.number(system.rho)}`,
+        system.game,
+        `${system.agents} ${system.agent_name}s`,
+        `information: ${system.information}`,
+        `mode: ${system.mode}`,
+        `engine: ${system.engine}`,
+        `ρ = ${GNE.number(system.rho)}`,
       ];
       return GNE.element(
         "div",
-        { class: `chip ${kind}`, title: [state.message, about.join(" · ")].filter(Boolean).join("\n") },
+        {
+          class: `chip ${kind}`,
+          title: [state.message, about.join(" · ")].filter(Boolean).join("\n"),
+        },
         GNE.element("span", { class: "sign", "aria-hidden": true, text: symbol }),
         GNE.element("span", {}, GNE.element("b", { text: system.name }), `: ${words}`),
         GNE.element("span", { class: "margin", text: this.marginText(state) }),
@@ -479,7 +512,8 @@
       const out = this.meta.systems.filter((system) => GNE.outside(this.stateOf(system).status));
       const banner = GNE.byId("banner");
       const text = out.map((system) => this.exitText(system)).join("   ");
-      GNE.byId("banner-show").hidden = !this.replaying || !Number.isFinite(this.exits[out[0]?.name]);
+      GNE.byId("banner-show").hidden =
+        !this.replaying || !Number.isFinite(this.exits[out[0]?.name]);
       if (text === this.bannerText) return; // closed, perhaps
       this.bannerText = text;
       banner.hidden = !text;
@@ -552,7 +586,8 @@
       pane.addEventListener("mousemove", (event) => {
         if (event.buttons) return;
         const which = near(event);
-        if (JSON.stringify(which) !== JSON.stringify(this.overlay.highlighted)) this.highlight(which);
+        if (JSON.stringify(which) !== JSON.stringify(this.overlay.highlighted))
+          this.highlight(which);
       });
       pane.addEventListener("mouseleave", () => this.highlight(null));
       pane.addEventListener("dblclick", (event) => {
@@ -572,7 +607,9 @@
         document.documentElement.style.setProperty("--plots", `${fitting}px`);
         divider.setAttribute("aria-valuenow", fitting);
       };
-      divider.addEventListener("pointerdown", (event) => divider.setPointerCapture(event.pointerId));
+      divider.addEventListener("pointerdown", (event) =>
+        divider.setPointerCapture(event.pointerId),
+      );
       divider.addEventListener("pointermove", (event) => {
         if (divider.hasPointerCapture(event.pointerId)) set(innerWidth - event.clientX);
       });
@@ -633,11 +670,20 @@
     describe() {
       const systems = this.meta?.systems || [];
       return {
-        mode: this.mode, time: this.time, playing: this.playing, speed: this.speed,
-        replaying: this.replaying, connected: Boolean(this.connected), theme: GNE.theme(),
-        exits: { ...this.exits }, systems: Object.fromEntries(systems.map((s) => [s.name, this.stateOf(s)])),
-        controls: [...(this.tuning?.sliders.keys() || [])], interventions: this.plots.interventions,
-        pulses: this.overlay.pulses.length, following: this.scene.following, follow: this.scene.follow,
+        mode: this.mode,
+        time: this.time,
+        playing: this.playing,
+        speed: this.speed,
+        replaying: this.replaying,
+        connected: Boolean(this.connected),
+        theme: GNE.theme(),
+        exits: { ...this.exits },
+        systems: Object.fromEntries(systems.map((s) => [s.name, this.stateOf(s)])),
+        controls: [...(this.tuning?.sliders.keys() || [])],
+        interventions: this.plots.interventions,
+        pulses: this.overlay.pulses.length,
+        following: this.scene.following,
+        follow: this.scene.follow,
         ghosts: this.scene.ghosts?.shown ?? null,
       };
     }

@@ -24,20 +24,35 @@
     const specs = [...new Set(action.axis)].map((axis) => {
       const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
       return {
-        system, name: "action", axis, array: `${system.name}/action`, unit: action.unit, columns,
-        title: axis ? `${action.name}, ${axis}` : action.name, symbol: "",
+        system,
+        name: "action",
+        axis,
+        array: `${system.name}/action`,
+        unit: action.unit,
+        columns,
+        title: axis ? `${action.name}, ${axis}` : action.name,
+        symbol: "",
         labels: columns.map((k) => String(action.owner[k])),
-        agents: columns.map((k) => action.owner[k] - 1), noun: agent, bounds: [],
+        agents: columns.map((k) => action.owner[k] - 1),
+        noun: agent,
+        bounds: [],
       };
     });
     for (const quantity of system.quantities) {
       const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
       specs.push({
-        system, name: quantity.name, axis: "", array: `${system.name}/quantity/${quantity.name}`,
-        unit: quantity.unit, columns: [...quantity.labels.keys()], title: quantity.long_name,
-        symbol: quantity.symbol, labels: quantity.labels.map((each) => each || quantity.long_name),
+        system,
+        name: quantity.name,
+        axis: "",
+        array: `${system.name}/quantity/${quantity.name}`,
+        unit: quantity.unit,
+        columns: [...quantity.labels.keys()],
+        title: quantity.long_name,
+        symbol: quantity.symbol,
+        labels: quantity.labels.map((each) => each || quantity.long_name),
         agents: quantity.labels.map((_, k) => (ofAgents ? k : null)),
-        noun: ofAgents ? agent : "", bounds: boundsOf(quantity),
+        noun: ofAgents ? agent : "",
+        bounds: boundsOf(quantity),
       });
     }
     return specs.map(thinned);
@@ -49,7 +64,8 @@
     for (const values of [bound, lower_bound])
       (values || []).forEach((value, k) => {
         if (!Number.isFinite(value)) return;
-        if (!found.has(value)) found.set(value, { value, whose: [], lower: values === lower_bound });
+        if (!found.has(value))
+          found.set(value, { value, whose: [], lower: values === lower_bound });
         found.get(value).whose.push(labels[k]);
       });
     const all = [...found.values()];
@@ -65,7 +81,11 @@
     const pick = (values) => chosen.map((k) => values[k]);
     const total = spec.columns.length;
     return {
-      ...spec, total, columns: pick(spec.columns), labels: pick(spec.labels), agents: pick(spec.agents),
+      ...spec,
+      total,
+      columns: pick(spec.columns),
+      labels: pick(spec.labels),
+      agents: pick(spec.agents),
     };
   };
 
@@ -92,7 +112,8 @@
         "figure",
         { class: "plot", "aria-label": `${spec.system.name}: ${spec.title} over time` },
         GNE.element(
-          "figcaption", {},
+          "figcaption",
+          {},
           GNE.element("span", { class: "plot-system", text: spec.system.name }),
           GNE.element("span", { class: "plot-title", text: spec.title }),
           symbolOf(spec.symbol),
@@ -118,7 +139,12 @@
       return spec.labels.map((label, k) => {
         const { colour, dash } = this.lineOf(k);
         const value = GNE.element("span", { class: "chip-value" });
-        const swatch = GNE.element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
+        const swatch = GNE.element("canvas", {
+          class: "swatch",
+          width: 28,
+          height: 6,
+          "aria-hidden": true,
+        });
         const context = swatch.getContext("2d");
         Object.assign(context, { strokeStyle: colour, lineWidth: 5 });
         context.setLineDash(dash.map((length) => 1.6 * length));
@@ -134,7 +160,9 @@
             onmouseenter: () => this.point(k),
             onmouseleave: () => this.point(null),
           },
-          swatch, text, value,
+          swatch,
+          text,
+          value,
         );
         this.chips.append(chip);
         return value;
@@ -159,7 +187,9 @@
     }
 
     markChip(k) {
-      this.values.forEach((value, each) => value.parentElement.classList.toggle("chosen", each === k));
+      this.values.forEach((value, each) =>
+        value.parentElement.classList.toggle("chosen", each === k),
+      );
     }
 
     highlight(which) {
@@ -177,7 +207,9 @@
       this.uplot = new uPlot(this.options(width, height), this.data(), this.chart);
       this.timeLine = GNE.element("div", { class: "time-line" });
       this.exitLine = GNE.element(
-        "div", { class: "exit-line", hidden: true }, GNE.element("span", { text: "left the set" }),
+        "div",
+        { class: "exit-line", hidden: true },
+        GNE.element("span", { text: "left the set" }),
       );
       this.uplot.over.append(this.timeLine, this.exitLine);
       this.listen(this.uplot.over);
@@ -190,29 +222,47 @@
 
     options(width, height) {
       const axis = {
-        stroke: GNE.colour("muted"), font: FONT,
+        stroke: GNE.colour("muted"),
+        font: FONT,
         grid: { stroke: GNE.colour("plot-grid"), width: 1 },
         ticks: { stroke: GNE.colour("plot-grid"), width: 1, size: 4 },
       };
       return {
-        width, height, legend: { show: false }, padding: [6, 16, 0, 0],
+        width,
+        height,
+        legend: { show: false },
+        padding: [6, 16, 0, 0],
         scales: {
           x: { time: false, range: () => [0, this.plots.span()] },
           y: { range: (_, low, high) => this.rangeY(low, high) },
         },
         axes: [
-          { ...axis, size: 24, gap: 2, space: 60, values: (_, ticks) => ticks.map((v) => `${GNE.number(v, 6)} s`) },
           {
-            ...axis, size: 50, gap: 3, space: 24, label: this.spec.unit || undefined,
-            labelSize: 18, labelGap: 0, labelFont: FONT,
+            ...axis,
+            size: 24,
+            gap: 2,
+            space: 60,
+            values: (_, ticks) => ticks.map((v) => `${GNE.number(v, 6)} s`),
+          },
+          {
+            ...axis,
+            size: 50,
+            gap: 3,
+            space: 24,
+            label: this.spec.unit || undefined,
+            labelSize: 18,
+            labelGap: 0,
+            labelFont: FONT,
             values: (_, ticks) => ticks.map((v) => GNE.number(v, 6)),
           },
         ],
         series: [{}, ...this.spec.labels.map((label, k) => this.series(label, k))],
         focus: { alpha: 0.22 },
         cursor: {
-          drag: { x: false, y: false }, points: { show: this.spec.total <= MOST_CHIPS, size: 6 },
-          focus: { prox: 14 }, sync: { key: "gne", setSeries: false, scales: ["x", null] },
+          drag: { x: false, y: false },
+          points: { show: this.spec.total <= MOST_CHIPS, size: 6 },
+          focus: { prox: 14 },
+          sync: { key: "gne", setSeries: false, scales: ["x", null] },
         },
         hooks: {
           drawAxes: [(u) => this.drawBounds(u)],
@@ -226,8 +276,12 @@
       const { colour, dash } = this.lineOf(k);
       const many = this.spec.columns.length > MOST_CHIPS;
       return {
-        label, stroke: colour, dash: dash.length ? dash : undefined, width: many ? 1 : 1.75,
-        points: { show: false }, spanGaps: false,
+        label,
+        stroke: colour,
+        dash: dash.length ? dash : undefined,
+        width: many ? 1 : 1.75,
+        points: { show: false },
+        spanGaps: false,
       };
     }
 
@@ -304,7 +358,8 @@
       this.markChip(line);
       const agent = line === null ? null : this.spec.agents[line];
       this.plots.callbacks.highlight(
-        agent === null || agent === undefined ? null : { system: this.spec.system.name, agent }, this,
+        agent === null || agent === undefined ? null : { system: this.spec.system.name, agent },
+        this,
       );
     }
 
@@ -418,7 +473,10 @@
       if (!this.meta || !this.column.clientWidth) return;
       const width = this.column.clientWidth - 24;
       const count = Math.max(this.plots.length, 1);
-      const extra = this.plots.reduce((sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight, 0);
+      const extra = this.plots.reduce(
+        (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
+        0,
+      );
       const room = (this.column.clientHeight - extra - 16) / count;
       const height = Math.floor(Math.min(Math.max(room, 112), 300));
       const size = `${width} ${height}`;
@@ -449,9 +507,15 @@
 
     describe() {
       return this.plots.map(({ spec, uplot }) => ({
-        system: spec.system.name, name: spec.name, axis: spec.axis, title: spec.title,
-        series: [...spec.labels], total: spec.total, bounds: spec.bounds.map(({ value }) => value),
-        width: uplot?.width ?? 0, samples: uplot?.data[0].length ?? 0,
+        system: spec.system.name,
+        name: spec.name,
+        axis: spec.axis,
+        title: spec.title,
+        series: [...spec.labels],
+        total: spec.total,
+        bounds: spec.bounds.map(({ value }) => value),
+        width: uplot?.width ?? 0,
+        samples: uplot?.data[0].length ?? 0,
       }));
     }
   };

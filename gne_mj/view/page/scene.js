@@ -13,8 +13,21 @@
     __folders: {},
     addFolder: folder,
     removeFolder() {},
-    add: () => ({ min() { return this; }, max() { return this; }, step() { return this; },
-      onChange() { return this; }, updateDisplay() {} }),
+    add: () => ({
+      min() {
+        return this;
+      },
+      max() {
+        return this;
+      },
+      step() {
+        return this;
+      },
+      onChange() {
+        return this;
+      },
+      updateDisplay() {},
+    }),
     remove() {},
   });
 
@@ -50,13 +63,23 @@
     constructor(scene) {
       const uniform = (value) => ({ value });
       this.uniforms = {
-        size: uniform(1), colour: uniform(new THREE.Color()), middle: uniform(new THREE.Vector2()),
-        minor: uniform(1), major: uniform(10), reach: uniform(30), lane: uniform(0),
-        laneWidth: uniform(0), strength: uniform(0.6),
+        size: uniform(1),
+        colour: uniform(new THREE.Color()),
+        middle: uniform(new THREE.Vector2()),
+        minor: uniform(1),
+        major: uniform(10),
+        reach: uniform(30),
+        lane: uniform(0),
+        laneWidth: uniform(0),
+        strength: uniform(0.6),
       };
       const material = new THREE.ShaderMaterial({
-        uniforms: this.uniforms, vertexShader: GROUND_VERTEX, fragmentShader: GROUND_FRAGMENT,
-        transparent: true, depthWrite: false, side: THREE.DoubleSide,
+        uniforms: this.uniforms,
+        vertexShader: GROUND_VERTEX,
+        fragmentShader: GROUND_FRAGMENT,
+        transparent: true,
+        depthWrite: false,
+        side: THREE.DoubleSide,
         extensions: { derivatives: true },
       });
       this.mesh = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), material);
@@ -124,7 +147,11 @@
       this.camera = viewer.camera;
       Object.assign(this.camera, { fov: 38, near: 0.05, far: 4000 });
       this.controls = viewer.controls;
-      Object.assign(this.controls, { maxPolarAngle: 89 * DEGREE, minDistance: 0.8, maxDistance: 1500 });
+      Object.assign(this.controls, {
+        maxPolarAngle: 89 * DEGREE,
+        minDistance: 0.8,
+        maxDistance: 1500,
+      });
       this.controls.addEventListener("change", () => {
         if (!this.rendering) this.rememberZoom();
       });
@@ -381,7 +408,8 @@
           box.expandByPoint(GNE.toView([x, y, this.floor]));
           box.expandByPoint(GNE.toView([x, y, z + system.height]));
         }
-      for (const bars of this.bars) for (const corner of bars.corners()) box.expandByPoint(GNE.toView(corner));
+      for (const bars of this.bars)
+        for (const corner of bars.corners()) box.expandByPoint(GNE.toView(corner));
       return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
     }
 
@@ -396,8 +424,14 @@
 
     /** Distance from the target at which all points are in view from a direction. */
     fitDistance(direction, target) {
-      const view = new THREE.Matrix4().lookAt(direction, new THREE.Vector3(), new THREE.Vector3(0, 1, 0));
-      const [right, up, back] = [0, 1, 2].map((k) => new THREE.Vector3().setFromMatrixColumn(view, k));
+      const view = new THREE.Matrix4().lookAt(
+        direction,
+        new THREE.Vector3(),
+        new THREE.Vector3(0, 1, 0),
+      );
+      const [right, up, back] = [0, 1, 2].map((k) =>
+        new THREE.Vector3().setFromMatrixColumn(view, k),
+      );
       const tangent = Math.tan((this.camera.fov / 2) * DEGREE);
       const wide = tangent * (this.pane.clientWidth / Math.max(this.pane.clientHeight, 1));
       let distance = 2.5;
@@ -420,11 +454,7 @@
       const azimuth = (this.box ? -84 + 75 * long : -84) * DEGREE;
       const elevation = (this.box && this.planar ? 36 : this.box ? 20 - 13 * long : 12) * DEGREE;
       const flat = Math.cos(elevation);
-      return GNE.toView([
-        Math.cos(azimuth) * flat,
-        Math.sin(azimuth) * flat,
-        Math.sin(elevation),
-      ]);
+      return GNE.toView([Math.cos(azimuth) * flat, Math.sin(azimuth) * flat, Math.sin(elevation)]);
     }
 
     fit() {
@@ -466,7 +496,11 @@
       const target = this.controls.target.clone().add(point).sub(this.followPoint);
       const { direction, distance } = this.arm();
       const fleet = this.follow.kind === "fleet";
-      this.look(target, direction, fleet ? this.zoom * this.fitDistance(direction, target) : distance);
+      this.look(
+        target,
+        direction,
+        fleet ? this.zoom * this.fitDistance(direction, target) : distance,
+      );
       this.followPoint = point;
     }
 

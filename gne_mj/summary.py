@@ -1,0 +1,54 @@
+"""A report in words, for terminals and notebooks."""
+
+from typing import Any
+
+
+def summary(report: dict[str, Any]) -> dict[str, str]:
+    """What a person wants to know of one system's report, in the order of interest."""
+    worst, gap = report["worst_constraint"], report["worst_gap"]
+    settling, actuators = report["settling_time"], report["actuators"]
+    lyapunov, epsilon = report["lyapunov"], report["epsilon"]
+    distances = report["equilibrium"]
+    unknown = distances["final_distance_to_variational"] is None
+    rows = {
+        "status": f"{report['status']}: {report['message']}",
+        "least margin": "nothing was observed"
+        if worst is None
+        else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
+        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
+        "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
+        + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
+        "Lyapunov function": "not known of MJCF robots"
+        if not lyapunov["known"]
+        else ("never rose" if lyapunov["monotone"] else "rose")
+        + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
+        + f" (largest rise {lyapunov['largest_rise']:.2g}; "
+        + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
+        "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
+        f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
+    }
+    if gap is not None:
+        rows["widest gap"] = (
+            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
+            f" {gap['time']:.4g} s"
+        )
+    implicit = report["implicit"]
+    if implicit is not None:
+        rows["held inputs"] = (
+            f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
+            f" steps each; predicted outputs off by up to"
+            f" {implicit['largest_prediction_error']:.2g}"
+        )
+        for key, what in (
+            ("not_accurate", "not accurate (though inside)"),
+            ("periods_not_monotone", "periods without dy+/du > 0"),
+        ):
+            if implicit[key]:
+                rows["held inputs"] += f"; {implicit[key]} {what}"
+    if epsilon["measured"] is not None:
+        rows["epsilon"] = (
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
+            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
+            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
+        )
+    return rows
