@@ -151,13 +151,11 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
         used = _used(values[quantity.name].reshape(len(found), -1), high, low)
         if used is None:
             continue
-        if quantity.each == "agent":
-            groups = [[i] for i in range(game.agents)]
-        elif quantity.each == "constraint":
-            groups = [list(members) for members in game.in_constraint]
-        else:
-            groups = [list(range(game.agents))]
-        for column, agents in enumerate(groups):
+        if quantity.each != "constraint":
+            found = np.fmax(found, used)  # one column each, or one for all
+            continue
+        for column, members in enumerate(game.in_constraint):
+            agents = list(members)
             found[:, agents] = np.fmax(found[:, agents], used[:, column, None])
     return found
 

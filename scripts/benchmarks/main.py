@@ -12,6 +12,7 @@ import peer_diffrax
 import peer_mjx
 import solver
 import twin
+import view
 
 
 def main() -> None:
@@ -21,7 +22,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
     options = parser.parse_args()
     rows: list[dict[str, str]] = []
-    for group in (batch, fleet, solver, twin, peer_mjx, peer_diffrax, peer_cbfpy):
+    for group in (batch, fleet, solver, twin, view, peer_mjx, peer_diffrax, peer_cbfpy):
         rows.extend(group.rows(options.runs))
         if options.out:  # after each group, so that an interruption keeps what was measured
             options.out.write_text(table(rows, options.runs), encoding="utf-8")

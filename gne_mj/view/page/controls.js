@@ -1,6 +1,7 @@
 "use strict";
 // What users press: transport, tuning, keys, notices.
 (() => {
+  const MOST_PUSHED = 8; // agents, up to which each has push buttons of its own
   const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 
   const speedName = (speed) => (speed === null ? "max" : `×${speed}`);
@@ -61,7 +62,7 @@
       this.slider.disabled = !seekable;
       GNE.byId("time-track").title = seekable
         ? ""
-        : "While the simulation runs, time cannot be turned back; the slider works when the run has ended.";
+        : "Time cannot be turned back while the simulation runs; it can when the run has ended.";
       if (Number(this.slider.max) !== end) this.slider.max = end;
       this.slider.value = time;
       this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds of ${end}`);
@@ -203,54 +204,50 @@
       };
     }
 
-    pushes({ system, axes, unit, force, duration }, { agents, agent_name: noun }) {
-      const title = `Push with ${GNE.withUnit(force, unit)} for ${GNE.number(duration)} s`;
-      const buttons = (agentOf, about) =>
-        axes.flatMap((axis, k) =>
-          [-1, 1].map((sign) =>
-            GNE.element("button", {
-              type: "button",
-              class: "push",
-              text: axis === "y" ? (sign < 0 ? "↓" : "↑") : sign < 0 ? "←" : "→",
-              title: `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
-              "aria-label": `push ${about()} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`,
-              onclick: () =>
-                this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force }),
-            }),
-          ),
-        );
-      const box = GNE.element("div", { class: "pushes", role: "group", "aria-label": title });
-      box.append(GNE.element("p", { class: "small", text: title }));
-      if (agents <= 8) {
-        const list = GNE.element("div", { class: "push-list" });
-        for (let agent = 1; agent <= agents; agent++)
-          list.append(
-            GNE.element(
-              "span",
-              { class: "push-one" },
-              GNE.element("b", { text: agent }),
-              ...buttons(
-                () => agent,
-                () => `${noun} ${agent}`,
-              ),
-            ),
-          );
-        box.append(list);
-        return box;
+    pushes(push, system) {
+      const title = `Push with ${GNE.withUnit(push.force, push.unit)} for ${GNE.number(push.duration)} s`;
+      return GNE.element(
+        "div",
+        { class: "pushes", role: "group", "aria-label": title },
+        GNE.element("p", { class: "small", text: title }),
+        system.agents <= MOST_PUSHED ? this.pushList(push, system) : this.pushChoice(push, system),
+      );
+    }
+
+    /** Buttons for each agent. */
+    pushList(push, { agents, agent_name: noun }) {
+      const list = GNE.element("div", { class: "push-list" });
+      for (let agent = 1; agent <= agents; agent++) {
+        const buttons = this.arrows(push, () => agent, `${noun} ${agent}`);
+        const number = GNE.element("b", { text: agent });
+        list.append(GNE.element("span", { class: "push-one" }, number, ...buttons));
       }
+      return list;
+    }
+
+    /** Buttons for the agent that is chosen, when agents are many. */
+    pushChoice(push, { agents, agent_name: noun }) {
       const select = GNE.element("select", { "aria-label": `${noun} to push` });
       for (let agent = 1; agent <= agents; agent++)
         select.append(GNE.element("option", { value: agent, text: `${noun} ${agent}` }));
-      const chosen = () => Number(select.value);
-      box.append(
-        GNE.element(
-          "span",
-          { class: "push-one" },
-          select,
-          ...buttons(chosen, () => `the chosen ${noun}`),
-        ),
-      );
-      return box;
+      const buttons = this.arrows(push, () => Number(select.value), `the chosen ${noun}`);
+      return GNE.element("span", { class: "push-one" }, select, ...buttons);
+    }
+
+    arrows({ system, axes, force }, agentOf, whom) {
+      const arrow = (axis, k, sign) => {
+        const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
+        return GNE.element("button", {
+          type: "button",
+          class: "push",
+          text: (axis === "y" ? "↓↑" : "←→")[sign < 0 ? 0 : 1],
+          title: what,
+          "aria-label": what,
+          onclick: () =>
+            this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force }),
+        });
+      };
+      return axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow(axis, k, sign)));
     }
 
     follow(values) {

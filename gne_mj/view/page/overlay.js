@@ -47,7 +47,7 @@
 
     // ---- messages
 
-    /** Starts pulses for messages (links x [passed, lost]); of one link not more than the eye can follow. */
+    /** Starts pulses for messages (links x [passed, lost]), not more than the eye can follow. */
     messages(system, counts, now) {
       if (!this.pulsing || !counts || document.hidden) return;
       const every = Math.max(1, Math.ceil(system.links.length / MANY));

@@ -294,7 +294,8 @@
       const who = `${system.agent_name} ${agent + 1}`;
       if (system.drawn_as === "bars")
         return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
-      return `Pale copies: the others as ${who} takes them to be, displaced by (estimate − actual ${system.action.name}) × 1 s.`;
+      const wrong = `(estimate − actual ${system.action.name})`;
+      return `Pale copies: the others as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
     }
 
     highlight(which, plot) {
@@ -446,9 +447,20 @@
       GNE.byId("duration").textContent = GNE.number(this.meta.duration, 6);
       GNE.byId("pace").textContent = this.pace();
       const key = JSON.stringify(this.meta.systems.map((system) => this.stateOf(system)));
-      if (key === this.chipKey) return; // quiet, for those who listen to it
+      if (key === this.chipKey) return;
       this.chipKey = key;
       GNE.byId("chips").replaceChildren(...this.meta.systems.map((system) => this.chip(system)));
+      this.announce();
+    }
+
+    /** Tells a screen reader of changes of status; margins change too often for that. */
+    announce() {
+      const words = this.meta.systems.map(
+        (system) => `${system.name}: ${GNE.status(this.stateOf(system).status).words}`,
+      );
+      const text = words.join(", ");
+      const place = GNE.byId("announcement");
+      if (place.textContent !== text) place.textContent = text;
     }
 
     pace() {
@@ -570,6 +582,15 @@
       GNE.byId("ramp").style.background = GNE.rampGradient();
       this.wirePane();
       this.wireDivider();
+      // what was pressed by mouse does not keep the keys: space is to play and pause
+      const release = ({ target }) => {
+        const pressed = target.closest?.("button, summary, select");
+        if (pressed && !pressed.matches(":focus-visible")) pressed.blur();
+      };
+      document.addEventListener("change", release);
+      document.addEventListener("click", (event) => {
+        if (!event.target.closest("select")) release(event);
+      });
     }
 
     setFollow(value) {

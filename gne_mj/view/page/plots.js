@@ -107,7 +107,8 @@
       this.chips = GNE.element("div", { class: "plot-chips" });
       this.chart = GNE.element("div", { class: "chart" });
       const shown = spec.columns.length;
-      const several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
+      this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
+      this.note = GNE.element("span", { class: "plot-note", text: this.several });
       this.root = GNE.element(
         "figure",
         { class: "plot", "aria-label": `${spec.system.name}: ${spec.title} over time` },
@@ -117,7 +118,7 @@
           GNE.element("span", { class: "plot-system", text: spec.system.name }),
           GNE.element("span", { class: "plot-title", text: spec.title }),
           symbolOf(spec.symbol),
-          GNE.element("span", { class: "plot-note", text: several }),
+          this.note,
         ),
         this.chips,
         this.chart,
@@ -415,6 +416,8 @@
       if (!u) return;
       const decimals = GNE.decimals(this.plots.store.greatest(this.spec.array));
       const i = this.hovered ?? u.valToIdx(this.plots.now);
+      const hover = this.hovered === null ? "" : `at ${GNE.fixed(u.data[0][i] ?? null, 2)} s`;
+      this.note.textContent = [this.several, hover].filter(Boolean).join(" · ");
       const value = (k) => GNE.fixed(u.data[k + 1][i] ?? null, decimals);
       this.values.forEach((place, k) => (place.textContent = value(k)));
       if (this.values.length) return;

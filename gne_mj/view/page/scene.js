@@ -1,6 +1,6 @@
 "use strict";
-// The 3-D scene: meshcat's viewer, poses, tints, ground and camera. Points are [x, y, z] in MuJoCo's
-// coordinates (z up); meshcat turns its whole scene, so three.js sees (x, z, -y).
+// The 3-D scene: meshcat's viewer, poses, tints, ground and camera. Points are [x, y, z] in
+// MuJoCo's coordinates (z up); meshcat turns its whole scene, so three.js sees (x, z, -y).
 (() => {
   const THREE = MeshCat.THREE;
   const DEGREE = Math.PI / 180;
@@ -296,10 +296,7 @@
         const shares = instant.systems[system.name].share;
         this.tinted.get(system.name).forEach((meshes, agent) => {
           const [r, g, b] = GNE.ramp(shares ? shares[agent] : NaN);
-          for (const mesh of meshes) {
-            mesh.material.color.setRGB(r, g, b);
-            mesh.material.vertexColors = false;
-          }
+          for (const mesh of meshes) mesh.material.color.setRGB(r, g, b);
         });
       }
     }
@@ -342,7 +339,7 @@
       return Number.isFinite(low[0]) ? { low, high } : null;
     }
 
-    /** How far other bodies have swung out of the box; forgotten slowly, as the view must not breathe. */
+    /** How far bodies have swung out of the box; forgotten slowly: the view must not breathe. */
     noteSpill() {
       if (!this.box) return;
       const { time } = this.instant;
@@ -452,7 +449,10 @@
       const size = this.box ? this.box.high.map((v, k) => v - this.box.low[k]) : [0, 0];
       const long = Math.min(Math.max((size[0] - 40) / 60, 0), 1);
       const azimuth = (this.box ? -84 + 75 * long : -84) * DEGREE;
-      const elevation = (this.box && this.planar ? 36 : this.box ? 20 - 13 * long : 12) * DEGREE;
+      const rows = Math.max(0, ...this.bars.map((bars) => bars.rows));
+      const ofBars = rows > 1 ? 32 : 12;
+      const ofFleet = this.planar ? 36 : 20 - 13 * long;
+      const elevation = (this.box ? ofFleet : ofBars) * DEGREE;
       const flat = Math.cos(elevation);
       return GNE.toView([Math.cos(azimuth) * flat, Math.sin(azimuth) * flat, Math.sin(elevation)]);
     }
