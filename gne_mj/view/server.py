@@ -34,6 +34,7 @@ HOST = "127.0.0.1"
 BROWSERS = 16  # at once
 UNSHOWN = 2  # frames under way to a browser
 PATIENCE = 10.0  # s, for everything that could take for ever
+FAREWELL = 1.0  # s that closing waits for browsers
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline';"
     " img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none';"
@@ -95,7 +96,8 @@ class Server:
         self._bridge = _Bridge(self, self._socket)
         self._ready.set()
         await self._closing.wait()
-        self._bridge.stop()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._bridge.stop(), FAREWELL)
 
     @property
     def browsers(self) -> "list[Browser]":
@@ -318,7 +320,10 @@ class _Bridge(ZMQWebSocketBridge):
     def forward_to_websockets(self, frames: list[bytes]) -> None:
         self.tell(frames[2], None)
 
-    def stop(self) -> None:
+    async def stop(self) -> None:
         self.app.http.stop()
         for browser in list(self.websocket_pool):
             browser.close(1001, "the simulation has ended")
+        await self.app.http.close_all_connections()
+        while self.websocket_pool:  # until they have closed their side too
+            await asyncio.sleep(0.01)

@@ -205,7 +205,8 @@
     }
 
     pushes(push, system) {
-      const title = `Push with ${GNE.withUnit(push.force, push.unit)} for ${GNE.number(push.duration)} s`;
+      const force = GNE.withUnit(push.force, push.unit);
+      const title = `Push with ${force} for ${GNE.number(push.duration)} s`;
       return GNE.element(
         "div",
         { class: "pushes", role: "group", "aria-label": title },

@@ -122,7 +122,7 @@
         const p = scene.project([x, y, scene.floor]);
         if (!p || !this.free({ x: p.x - 26, y: p.y, w: 52, h: 18 })) continue;
         this.taken.push({ x: p.x - 26, y: p.y, w: 52, h: 18 });
-        context.fillText(`${GNE.number(x, 6)} m`, p.x, p.y + 4);
+        this.haloed(`${GNE.number(x, 6)} m`, p.x, p.y + 4);
       }
     }
 
@@ -317,13 +317,19 @@
       this.taken.push(box);
       context.textAlign = "left";
       context.textBaseline = "middle";
+      const colour = bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+      context.fillStyle = GNE.colour(colour);
+      this.haloed(text, left, p.y + shift);
+    }
+
+    /** Text that can be read on anything. */
+    haloed(text, x, y) {
+      const context = this.context;
       context.lineWidth = 3;
       context.lineJoin = "round";
       context.strokeStyle = GNE.colour("halo");
-      context.strokeText(text, left, p.y + shift);
-      const colour = bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
-      context.fillStyle = GNE.colour(colour);
-      context.fillText(text, left, p.y + shift);
+      context.strokeText(text, x, y);
+      context.fillText(text, x, y);
     }
 
     /** The agent whose label or head is near a point of the pane. */

@@ -422,9 +422,15 @@
       } else this.plots.writeValues();
       this.showHeader();
       this.showBanner();
+      this.showLegend();
       this.showTransport();
       // slow plots must not take more than a sixth of the time
       this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
+    }
+
+    showLegend() {
+      const shares = Object.values(this.instant?.systems || {}).map((own) => own.share || [NaN]);
+      GNE.byId("unknown").hidden = !shares.some((share) => share.some(Number.isNaN));
     }
 
     showTransport() {

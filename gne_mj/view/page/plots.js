@@ -18,6 +18,23 @@
     return made;
   };
 
+  /** Labels without what all of them say: "gap of agents 1 and 2" as "1–2". */
+  const shortOf = (labels) => {
+    if (labels.length < 2) return labels;
+    const [first] = labels;
+    let n = 0;
+    while (n < first.length && labels.every((each) => each[n] === first[n])) n++;
+    const common = first.slice(0, n).lastIndexOf(" ") + 1;
+    return labels.map((each) =>
+      each
+        .slice(common)
+        .replace(/\bagents? /g, "")
+        .replace(/ and /g, "–")
+        .replace(/ to /g, "→")
+        .replace(/_(\d)\b/g, (_, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit]),
+    );
+  };
+
   /** What to plot of a system: actions by axis, then quantities. */
   const specsOf = (system) => {
     const { action, agent_name: agent } = system;
@@ -61,12 +78,13 @@
   /** Each different bound with the entries that have it. */
   const boundsOf = ({ bound, lower_bound, labels }) => {
     const found = new Map();
+    const shorts = shortOf(labels);
     for (const values of [bound, lower_bound])
       (values || []).forEach((value, k) => {
         if (!Number.isFinite(value)) return;
         if (!found.has(value))
           found.set(value, { value, whose: [], lower: values === lower_bound });
-        found.get(value).whose.push(labels[k]);
+        found.get(value).whose.push(shorts[k]);
       });
     const all = [...found.values()];
     for (const each of all) {
@@ -84,6 +102,7 @@
       ...spec,
       total,
       columns: pick(spec.columns),
+      shorts: pick(shortOf(spec.labels)),
       labels: pick(spec.labels),
       agents: pick(spec.agents),
     };
@@ -152,7 +171,7 @@
         context.moveTo(0, 3);
         context.lineTo(28, 3);
         context.stroke();
-        const text = spec.total === 1 ? "" : label;
+        const text = spec.total === 1 ? "" : spec.shorts[k];
         const chip = GNE.element(
           "span",
           {

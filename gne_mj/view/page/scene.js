@@ -4,6 +4,7 @@
 (() => {
   const THREE = MeshCat.THREE;
   const DEGREE = Math.PI / 180;
+  const OWN = ["Background", "Cameras", "Lights", "Grid", "Axes"]; // meshcat's own objects
 
   GNE.toView = ([x, y, z]) => new THREE.Vector3(x, z, -y);
 
@@ -96,7 +97,7 @@
       const snap = (v) => Math.round(v / major) * major;
       const reach = Math.max(8, 4 * distance);
       const origin = [snap(target[0]), snap(target[1])];
-      this.mesh.position.set(origin[0], origin[1], floor - 0.004);
+      this.mesh.position.set(origin[0], origin[1], floor - 0.02); // below a model's own floor
       this.mesh.scale.setScalar(2 * reach + major);
       u.size.value = 2 * reach + major;
       [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
@@ -170,6 +171,7 @@
       this.ground.uniforms.colour.value.set(GNE.colour("grid"));
       this.ground.uniforms.strength.value = GNE.theme() === "dark" ? 0.75 : 0.85;
       for (const bars of this.bars) bars.restyle();
+      this.dimStatics();
       this.ghosts?.restyle();
       this.dirty();
     }
@@ -196,8 +198,7 @@
     /** Forgets a scene, as another one comes. */
     clear() {
       for (const path of Object.keys(this.viewer.scene_tree.children))
-        if (!["Background", "Cameras", "Lights", "Grid", "Axes"].includes(path))
-          this.viewer.delete_path([path]);
+        if (!OWN.includes(path)) this.viewer.delete_path([path]);
       for (const bars of this.bars) bars.remove();
       this.ghosts?.remove();
       this.batches.clear();
@@ -227,11 +228,36 @@
       if (!this.stale && (this.complete || before < this.nextLook)) return;
       this.objects = this.meta.items.map((path) => this.node(path)?.object);
       this.tinted = new Map(this.fleets.map((system) => [system.name, this.tintedOf(system)]));
+      this.statics = this.staticMeshes();
+      this.dimStatics();
       this.complete = !this.objects.includes(undefined);
       this.nextLook = before + 500;
       this.stale = false;
       this.ghosts.forget();
       this.batches.build(this.objects);
+    }
+
+    /** Meshes of what never moves: a model's floor, walls. */
+    staticMeshes() {
+      const moving = new Set(this.objects);
+      const found = [];
+      const collect = (object) => {
+        if (moving.has(object)) return;
+        if (object.isMesh && object.material.color) found.push(object);
+        object.children.forEach(collect);
+      };
+      for (const [name, node] of Object.entries(this.viewer.scene_tree.children))
+        if (!OWN.includes(name)) collect(node.object);
+      return found;
+    }
+
+    /** A white floor would outshine a dark page and all that stands on it. */
+    dimStatics() {
+      const part = GNE.theme() === "dark" ? 0.3 : 1;
+      for (const { material, userData } of this.statics || []) {
+        userData.colour ??= material.color.clone();
+        material.color.copy(userData.colour).multiplyScalar(part);
+      }
     }
 
     /** Meshes of each agent that take its colour. */
@@ -343,7 +369,7 @@
     noteSpill() {
       if (!this.box) return;
       const { time } = this.instant;
-      if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 6);
+      if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
       this.spillTime = time;
       const { low, high } = this.box;
       const { poses } = this.instant;
