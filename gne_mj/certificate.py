@@ -122,7 +122,7 @@ def certify_run(
 
 
 def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
-    """How a run that goes on stands: status and sentence, least margin so far, where and when.
+    """How a run that goes on stands: status, sentence, least margin so far, when it left.
 
     Args:
         system: what runs.
@@ -138,6 +138,7 @@ def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "margin": worst.get("margin"),
         "margin_name": worst.get("name"),
         "margin_time": worst.get("time"),
+        "exit_time": None if status == "running" else float(monitor[watch.EXIT_TIME]),
     }
 
 

@@ -31,6 +31,12 @@ class Page:
         server.broadcast = self.broadcasts.append
         server.welcome = lambda browser, messages: setattr(self, "welcomed", messages)
 
+    @property
+    def last_frame(self):
+        packs = [*self.frames, *self.broadcasts]
+        frames = [each for each in packs if unpack(each)[0]["kind"] == "frame"]
+        return max(frames, key=lambda each: (unpack(each)[0]["ended"], frames.index(each)))
+
     def ask(self, **message):
         self.session._receive(message, None)
         self.session._look(0.0)
@@ -104,7 +110,7 @@ def test_a_new_browser_is_told_everything():
     anchors = scene[0]["systems"][0]["anchors"]
     assert np.array_equal(arrays["poses"][anchors, 0], state[:, 3])
     assert arrays["channels/estimate"].shape == (10, 10)
-    assert page.told[-1]["kind"] == "controls"
+    assert [message["kind"] for message in page.told] == ["controls", "interventions"]
 
 
 def test_numbers_change_while_it_runs_and_hold_after_a_restart():
@@ -114,13 +120,14 @@ def test_numbers_change_while_it_runs_and_hold_after_a_restart():
         page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.5)
         assert session.simulation.systems[0].rho == 0.5
         assert session.simulation.time == pytest.approx(0.2)
-        assert page.told[-1]["values"]["systems.robots.game.reference_velocity"] == 2.5
+        values = [m["values"] for m in page.told if m["kind"] == "controls"][-1]
+        assert values["systems.robots.game.reference_velocity"] == 2.5
         first = to_the_end(session)
         assert [done["what"] for done in first.interventions] == [
             "systems.robots.barrier.rho = 0.5",
             "systems.robots.game.reference_velocity = 2.5",
         ]
-        assert unpack(page.frames[-1])[0]["ended"]
+        assert unpack(page.last_frame)[0]["ended"]
         page.ask(do="restart")
         assert not unpack(session._frame())[0]["ended"]
         second = to_the_end(session)
@@ -279,7 +286,7 @@ def test_the_wall_clock_sets_the_pace(monkeypatch):
             now[0] += 0.02
             session._turn()
         assert session.simulation.time == pytest.approx(2.0, abs=0.05)
-        assert unpack(page.frames[-1])[0]["pace"] == pytest.approx(2.0, rel=0.1)
+        assert unpack(page.last_frame)[0]["pace"] == pytest.approx(2.0, rel=0.1)
         page.ask(do="pause")
         now[0] += 10.0
         paused = session.simulation.time
@@ -296,7 +303,7 @@ def test_an_exit_is_told_with_its_words():
                "simulation.duration": 3.0}  # fmt: skip
     with watched(changes=changes) as (session, page):
         trajectory = to_the_end(session)
-    state = unpack(page.frames[-1])[0]["state"]["robots"]
+    state = unpack(page.last_frame)[0]["state"]["robots"]
     assert trajectory.status == state["status"] == "left_feasible_set"
     assert "was violated" in state["message"]
     assert state["exit_time"] == trajectory.reports["robots"]["exit"]["time"]

@@ -118,6 +118,11 @@ def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
         for key, value in summary(report).items():
             print(f"  {key:20} {value}")
         _warn(name, report)
+    if trajectory.interventions:
+        print("\nwhile it ran")
+        for done in trajectory.interventions:
+            when = f"at {done['time']:.4g} s"
+            print(f"  {when:20} {done['what']}")
     if out is not None:
         print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
 

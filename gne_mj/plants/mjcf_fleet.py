@@ -218,6 +218,8 @@ class MjcfPlant(Plant):
 
 def _world(robots: tuple[RobotFile, ...]) -> Any:
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
+    floor, across = world.geom("floor"), 0.5 * SPACING * (len(robots) - 1)
+    floor.pos[1], floor.size[1] = across, floor.size[1] + across
     for i, robot in enumerate(robots):
         try:
             spec = mujoco.MjSpec.from_file(str(robot.path))

@@ -30,7 +30,7 @@ def html_page(trajectory: Trajectory, title: str | None = None) -> str:
 
     Args:
         trajectory: of a scenario, which it holds.
-        title: of the page; the scenario's description if left out.
+        title: of the page; the systems' names if left out.
 
     Raises:
         InvalidInput: see :func:`gne_mj.view.replay.replay_pack`.

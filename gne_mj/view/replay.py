@@ -27,7 +27,7 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
 
     Args:
         trajectory: of a scenario, which it holds.
-        title: of the page; the scenario's description if left out.
+        title: of the page; the systems' names if left out.
 
     Raises:
         InvalidInput: it holds no scenario, or files of the user's that the scenario names are gone.
@@ -43,7 +43,7 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
     datasets = {stage.system.name: trajectory[stage.system.name] for stage in stages}
     time = _times(list(datasets.values()))
     duration = float(time[-1]) if len(time) else 0.0
-    scene = Scene(stages, title or scenario.description or ", ".join(datasets), duration)
+    scene = Scene(stages, title or ", ".join(datasets), duration)
     values = {name: _values(data, time) for name, data in datasets.items()}
     arrays: Arrays = {"time": time, **scene.arrays(values)}
     for stage in stages:

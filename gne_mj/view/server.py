@@ -104,6 +104,11 @@ class Server:
         """Those that are connected, and have been welcomed."""
         return [each for each in list(self._bridge.websocket_pool) if each.welcomed]
 
+    @property
+    def dropped(self) -> int:
+        """Frames that browsers now connected were not sent, having some to show yet."""
+        return sum(browser.dropped for browser in self.browsers)
+
     def send(self, command: Any) -> None:
         """Draw one of meshcat's commands, now and for browsers to come.
 

@@ -28,6 +28,8 @@ from gne_mj.view.stage import Stage
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.03  # of the time at most goes into frames while a run is as fast as it can
 SLOWEST = 0.5  # s between frames, at worst
+HISTORY = 1.0  # s between histories, while frames are far apart
+ROWS = 3000  # of a history at most
 PIECE = 0.05  # s of computing between looks at what the page asks for
 FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
 
@@ -54,6 +56,8 @@ class Session:
         self._tables = scenario.model_dump(mode="json", exclude_none=True)
         self._changes: dict[str, Any] = {}
         self._title, self._pacer = title, Pacer(speed)
+        self._ended: Trajectory | None = None
+        self._missed = 0
         self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
         self._playing = True
         self._controls = {control.key: control for control in controls_of(scenario)}
@@ -82,7 +86,8 @@ class Session:
             self._turn()
         trajectory = self.simulation.trajectory(interrupted=not self.simulation.ended)
         self.server.replay = replay_pack(trajectory, self._title)
-        self._publish(trajectory)
+        self._ended = trajectory
+        self.server.broadcast(self._frame())  # no browser may miss it
         return trajectory
 
     def linger(self, stop: threading.Event) -> None:
@@ -98,9 +103,9 @@ class Session:
         simulation = scenario.simulation_object()
         self.simulation, self._scenario = simulation, scenario
         self._messages_from = 0
-        self._ended: Trajectory | None = None
+        self._ended = None
         self._pacer.restart(simulation.time)
-        self._next_frame = 0.0
+        self._next_frame = self._frame_time = self._history_due = 0.0
 
     def _turn(self) -> None:
         """Answer the page, move on for a moment, show it."""
@@ -191,6 +196,7 @@ class Session:
         self._begin(load_scenario(self._tables, self._changes))
         self._playing = True
         self.server.broadcast(self._history())
+        self._tell_interventions()
 
     def _set_speed(self, value: Any) -> None:
         if value is not None:
@@ -225,6 +231,7 @@ class Session:
                 built, state=present.state, memory=present.memory[: len(built.memory)].copy()
             )
             self.simulation.change(built, f"{control.key} = {value:g}")
+            self._tell_interventions()
         self._scenario = scenario
         self._changes[changed] = given
 
@@ -242,6 +249,11 @@ class Session:
         channel = int(game.data.offsets[agent - 1]) + axis
         if not self.simulation.ended:
             self.simulation.push(str(name), channel, force, about["duration"])
+            self._tell_interventions()
+
+    def _tell_interventions(self, browser: Browser | None = None) -> None:
+        done = self.simulation.interventions
+        self.server.tell({"kind": "interventions", "done": done}, browser)
 
     def _welcome(self, browser: Browser) -> None:
         scene = {
@@ -252,6 +264,7 @@ class Session:
         }
         self.server.welcome(browser, [pack(scene, {}), self._history(), self._frame()])
         self.server.tell({"kind": "controls", "values": self._values}, browser)
+        self._tell_interventions(browser)
 
     def _notice(self, text: str, browser: Browser) -> None:
         self.server.tell({"kind": "notice", "level": "error", "text": text}, browser)
@@ -259,8 +272,8 @@ class Session:
     def _history(self) -> bytes:
         """What was recorded so far, for the plots."""
         recorded = {name: run.recorded() for name, run in self.simulation.runs.items()}
-        longest = max(recorded.values(), key=lambda found: len(found[0]))
-        time = longest[0]
+        time, _ = max(recorded.values(), key=lambda found: len(found[0]))
+        time = time[:: max(1, len(time) // ROWS)]
         values = {}
         for name, (own, variables) in recorded.items():
             rows = np.clip(np.searchsorted(own, time), 0, max(len(own) - 1, 0))
@@ -270,16 +283,21 @@ class Session:
             arrays |= self._scene.arrays(values)
         return pack({"kind": "history"}, arrays)
 
-    def _publish(self, trajectory: Trajectory | None = None) -> None:
+    def _publish(self) -> None:
         """Offer a frame to whoever looks; the next one comes when this one's cost allows."""
-        if trajectory is not None:
-            self._ended = trajectory
-        started = real_time.perf_counter()
-        self._pacer.saw(self.simulation.time)
+        started, time = real_time.perf_counter(), self.simulation.time
+        self._pacer.saw(time)
         self.server.publish(self._frame())
         cost = real_time.perf_counter() - started
+        least = FRAME if self._playing else SLOWEST
         fast = self._playing and self._pacer.speed is None
-        self._next_frame = started + min(SLOWEST, max(FRAME, cost / SHARE if fast else 2 * cost))
+        self._next_frame = started + min(SLOWEST, max(least, cost / SHARE if fast else 2 * cost))
+        passed, self._frame_time = time - self._frame_time, time
+        missed, self._missed = self.server.dropped - self._missed, self.server.dropped
+        # where frames are too few to draw plots of, these are of what is recorded
+        if (missed or passed > self.simulation.clock.sample_period) and started > self._history_due:
+            self.server.publish(self._history())
+            self._history_due = started + HISTORY
 
     def _frame(self) -> bytes:
         """The present instant."""

@@ -30,7 +30,7 @@
       const pack = GNE.decodePack(bytes);
       this.callbacks.pack(pack);
       // the server sends no more frames than are taken, so that a slow page is never behind
-      if (pack.meta.kind === "frame") this.send({ do: "shown" });
+      if (pack.meta.kind !== "scene") this.send({ do: "shown" });
     }
 
     get open() {

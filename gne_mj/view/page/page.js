@@ -190,6 +190,7 @@
     hear(message) {
       if (message.kind === "notice") GNE.toast(message.text, message.level);
       else if (message.kind === "controls") this.tuning.follow(message.values);
+      else if (message.kind === "interventions") this.plots.interventions = message.done;
     }
 
     // ---- a scene

@@ -134,6 +134,11 @@
 
     prepareViewer() {
       const viewer = this.viewer;
+      const set = viewer.set_object.bind(viewer);
+      viewer.set_object = (path, object) => {
+        set(path, object);
+        this.stale = true; // one with a texture comes only when its image is loaded
+      };
       const resize = viewer.set_3d_pane_size.bind(viewer);
       // meshcat takes the window's height, which is not ours
       viewer.set_3d_pane_size = () => {
