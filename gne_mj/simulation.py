@@ -252,7 +252,7 @@ class SystemRun:
 
     def recorded(self) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
         """Sample times so far in s, and what a trajectory has of them, by the variables' names."""
-        parts = joined(self._recorded)
+        parts = self._recorded = joined(self._recorded)  # so that the next time is quick
         if not parts:
             return np.zeros(0), {}
         return np.concatenate([part.time for part in parts]), {

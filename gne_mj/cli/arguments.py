@@ -34,7 +34,9 @@ FORMAT = Annotated[
 INDEX = Annotated[int | None, typer.Option("--index", help="Number of the batch's run, from 0.")]
 PORT = Annotated[
     int | None,
-    typer.Option("--port", min=1, max=65535, help="Of the page, on 127.0.0.1; any free one."),
+    typer.Option(
+        "--port", min=1, max=65535, help="Of the page, on 127.0.0.1; if left out any free one."
+    ),
 ]
 JSON = Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")]
 

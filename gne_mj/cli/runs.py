@@ -1,7 +1,7 @@
 """Commands that run scenarios, draw stored runs and list what is shipped."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,9 @@ from gne_mj.cli.arguments import FORMAT, INDEX, JSON, OUT, PORT, SET, WHERE, for
 from gne_mj.cli.output import tell
 from gne_mj.cli.simulating import simulate, source_of, stored
 from gne_mj.cli.views import watch
+
+if TYPE_CHECKING:
+    from gne_mj.trajectory import Trajectory
 
 
 @app.command()
@@ -37,8 +40,9 @@ def run(
 ) -> None:
     """Run a scenario; keep the trajectory and a JSON report in --out.
 
-    A batch's run that is run alone takes the same steps to the last bit. With --view the command
-    goes on showing the run after its end, until Ctrl-C.
+    A batch's run that is run alone takes the same steps to the last bit.
+
+    With --view the run is shown on after its end, until Ctrl-C.
     """
     from gne_mj.errors import InvalidInput
 
@@ -65,16 +69,25 @@ def paper(
     ] = Path("results/paper"),
     as_json: JSON = False,
 ) -> None:
-    """Run the paper's two experiments beside each other and draw its four figures.
+    """Run the paper's two experiments beside each other; draw its four figures and a replay.
 
     Results of an earlier `paper` in the same folder are replaced; other files there stay.
     """
-    trajectory = simulate("paper", set_, out, quiet=as_json, replace=True, figures=("png",))
+    trajectory = simulate("paper", set_, out, quiet=as_json, replace=True, illustrate=_illustrate)
     tell(trajectory, as_json, out)
     if not as_json:
         for figure in sorted(out.glob("*.png")):
             print(f"figure      {figure}")
+        print(f"replay      {out / 'replay.html'}")
     raise typer.Exit(0 if trajectory.holds else 1)
+
+
+def _illustrate(trajectory: "Trajectory", folder: Path) -> None:
+    from gne_mj import plots
+    from gne_mj.view import write_html
+
+    plots.save(trajectory, folder)
+    write_html(trajectory, folder / "replay.html", "paper")
 
 
 @app.command()

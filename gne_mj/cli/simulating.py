@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,9 +49,17 @@ def simulate(
     *,
     quiet: bool,
     replace: bool = False,
-    figures: tuple[str, ...] = (),
+    illustrate: "Callable[[Trajectory, Path], None] | None" = None,
 ) -> "Trajectory":
-    """Run a scenario to its end, with progress, and keep it and ``figures`` in a folder."""
+    """Run a scenario to its end, with progress, and keep it in a folder.
+
+    Args:
+        scenario, changes: what to run, with what --set changes.
+        out: where to keep it, if anywhere.
+        quiet: show no progress.
+        replace: results of `paper` there may be replaced.
+        illustrate: writes pictures beside the trajectory.
+    """
     from gne_mj.simulation import interruption
 
     simulation = load(scenario, changes, quiet=quiet)
@@ -64,10 +72,8 @@ def simulate(
         trajectory = simulation.run(show)
         if folder is not None:
             keep(trajectory, folder)
-            if figures:
-                from gne_mj import plots
-
-                plots.save(trajectory, folder, figures)
+            if illustrate is not None:
+                illustrate(trajectory, folder)
     return trajectory
 
 
