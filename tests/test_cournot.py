@@ -109,6 +109,7 @@ def test_constants_of_monotonicity():
     assert (mu, theta_1) == (pytest.approx(1.0), pytest.approx(11.0))
 
 
+@pytest.mark.slow  # of this game a loop is compiled, as below
 def test_the_shipped_scenario_has_the_defaults_and_converges():
     shipped = load_scenario("cournot").systems["firms"].game.build(10)
     assert np.array_equal(shipped.parameters, cournot_game(10).parameters)
@@ -121,6 +122,7 @@ def test_the_shipped_scenario_has_the_defaults_and_converges():
     assert np.allclose(final, 600 - (6000 - COST.sum()) / 11 - COST, atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_closed_loop_equals_an_independent_one():
     y = np.array([8.0, 90.0, 20.0, 75.0, 30.0, 60.0, 40.0, 50.0, 95.0, 10.0])
     oracle = reference.CournotGame(COST, 600.0, np.full(10, 7.0), np.full(10, 100.0))

@@ -379,7 +379,7 @@ def test_mistakes_are_named(changes, words):
         assert word in message
 
 
-@pytest.mark.parametrize("kind", ["integrator", "pi-cascade"])
+@pytest.mark.parametrize("kind", [pytest.param("integrator", marks=pytest.mark.slow), "pi-cascade"])
 def test_other_agents_have_as_many_channels_as_the_action_has_entries(kind):
     tables = {
         "simulation": {"duration": 0.5, "timestep": 0.01},

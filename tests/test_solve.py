@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from test_cli import gne
+from commands import gne_here as gne
 
 import reference
 from gne_mj import solve as solving

@@ -61,8 +61,11 @@ def outcome(law, index, engine="mujoco"):
     return int(loop.monitor[watch.EXIT]), float(np.max(gaps / delta))
 
 
-def test_every_gap_stays_inside_its_bound_at_every_step():
-    for index in range(RUNS):
+@pytest.mark.parametrize(
+    "runs", [range(40), pytest.param(range(40, RUNS), marks=pytest.mark.slow)], ids=["few", "more"]
+)
+def test_every_gap_stays_inside_its_bound_at_every_step(runs):
+    for index in runs:
         code, worst = outcome(FullInformation(), index, "mujoco")
         assert code == watch.INSIDE, index
         assert worst < 1.0, index
@@ -78,6 +81,7 @@ def test_a_barrier_of_the_wrong_sign_is_caught():
     assert left >= 20
 
 
+@pytest.mark.slow  # compiles that wrong law
 def test_a_missing_follower_term_is_caught():
     """It seldom leaves the set, but its gaps differ from the right law's by far more than 1e-9."""
     differences = [
