@@ -38,7 +38,8 @@ def test_paper_draws_its_four_figures(drawn):
         "channels",
     }
     names = {path.name for path in folder.iterdir()}
-    assert names == {f"{name}.png" for name in FIGURES} | {"trajectory.zarr", "report.json"}
+    kept = {"trajectory.zarr", "report.json", "replay.html"}
+    assert names == {f"{name}.png" for name in FIGURES} | kept
 
 
 def test_paper_replaces_its_own_results_only(drawn, tmp_path):
