@@ -136,7 +136,7 @@ class Simulation:
             duration: in s, at least one step.
 
         Raises:
-            EngineError: the system does not run in MuJoCo.
+            EngineError: the system does not run in MuJoCo, or the output is no joint's velocity.
         """
         self._runs[system].push(channel, force, max(1, self.clock.steps(duration)))
         self._note(f"systems.{system}: output {channel + 1} pushed by {force:g} for {duration:g} s")
@@ -271,7 +271,7 @@ class SystemRun:
         """See :meth:`Simulation.push`."""
         forces = np.zeros(self.system.game.actions)
         forces[channel] = force
-        self.loop.push(forces)
+        self.loop.push(forces)  # first, since it may refuse
         self._pushed_until = self.clock.steps(self.loop.time) + steps
 
     def _release(self) -> None:

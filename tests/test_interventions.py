@@ -1,6 +1,7 @@
 """What a user does to a run that goes on: numbers changed, agents pushed, looks in between."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from gne_mj.system import Clock
 from gne_mj.trajectory import Trajectory
 
 CLOCK = Clock(duration=4.0, timestep=0.01, control_period=0.01, sample_period=0.1)
+EXAMPLES = Path(__file__).parent.parent / "examples"
 OSNR = {"simulation.duration": 1.0, "recording.period": 0.1}
 
 
@@ -172,10 +174,16 @@ def test_only_robots_in_mujoco_are_pushed():
     assert simulation.interventions == []
 
 
-def test_all_joints_of_own_robots_are_recorded():
-    from pathlib import Path
+def test_an_output_that_is_no_joints_is_not_pushed():
+    simulation = load_scenario(EXAMPLES / "robot" / "sensor.toml").simulation_object()
+    name = simulation.systems[0].name
+    with pytest.raises(EngineError, match="a sensor's, not a joint's"):
+        simulation.push(name, 0, 1.0, 0.1)
+    assert simulation.interventions == []
 
-    scenario = Path(__file__).parent.parent / "examples" / "robot" / "scenario.toml"
+
+def test_all_joints_of_own_robots_are_recorded():
+    scenario = EXAMPLES / "robot" / "scenario.toml"
     simulation = load_scenario(scenario, {"simulation.duration": 0.5}).simulation_object()
     (run,) = simulation.runs.values()
     model = run.loop.plant.model

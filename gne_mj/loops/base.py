@@ -107,7 +107,7 @@ class ClosedLoop(ABC):
         """Forces (m,) on the agents' outputs besides their inputs, from now until changed.
 
         Raises:
-            EngineError: this engine knows none.
+            EngineError: this engine, or this output, knows none.
         """
         raise EngineError("only robots in MuJoCo can be pushed while they run")
 

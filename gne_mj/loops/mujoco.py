@@ -326,6 +326,10 @@ class MujocoLoop(ClosedLoop):
     def push(self, force: NDArray[np.float64]) -> None:
         """See the base class; forces are MuJoCo's qfrc_applied at the outputs' joints."""
         at = self.plant.output_joints
+        if np.any(force[at < 0]):
+            raise EngineError(
+                "this robot's output is a sensor's, not a joint's: nothing to push at"
+            )
         self.plant.data.qfrc_applied[at[at >= 0]] = force[at >= 0]
 
     def _recorder(self, rows: int, every: int) -> Recorder:
