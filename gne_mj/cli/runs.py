@@ -48,10 +48,8 @@ def run(
 
     source = source_of(scenario, from_, index)
     if view:
-        trajectory = watch(
-            source, set_, out, as_json,
-            title=scenario or f"run {index} of {from_}", speed=speed, port=port,
-        )  # fmt: skip
+        title = Path(scenario).stem if scenario else f"run {index} of {from_}"
+        trajectory = watch(source, set_, out, as_json, title=title, speed=speed, port=port)
     else:
         for key, value in (("--speed", speed), ("--port", port)):
             if value is not None:
