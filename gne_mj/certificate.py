@@ -139,6 +139,7 @@ def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "margin_name": worst.get("name"),
         "margin_time": worst.get("time"),
         "exit_time": None if status == "running" else float(monitor[watch.EXIT_TIME]),
+        "exit_agents": [] if status == "running" else _concerned(system, monitor),
     }
 
 
@@ -221,10 +222,20 @@ def _exit_report(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]
         "constraint": system.game.constraint_names[constraint] if known else None,
         "value": float(monitor[watch.EXIT_VALUE]),
         "estimates_of_agent": agent or None,
+        "agents": _concerned(system, monitor),
         "information": system.law.information,
         "mode": system.mode,
         "last_input": monitor[at : at + m].tolist(),
     }
+
+
+def _concerned(system: System, monitor: NDArray[np.float64]) -> list[int]:
+    """The agents, from 1, that an exit is of: in the constraint, or the one with the estimates."""
+    if monitor[watch.EXIT] == watch.DIVERGED:
+        return []
+    agent = int(monitor[watch.EXIT_AGENT])
+    members = system.game.in_constraint[int(monitor[watch.EXIT_CONSTRAINT])]
+    return [agent + 1] if agent >= 0 else sorted(i + 1 for i in members)
 
 
 def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:

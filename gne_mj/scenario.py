@@ -142,6 +142,8 @@ def _first(error: ValidationError) -> InvalidInput:
     """The first of pydantic's complaints as one sentence."""
     details = error.errors()
     detail = details[0]
+    if not detail["loc"]:
+        return InvalidInput("scenario", list(detail["input"]), detail["msg"])
     if detail["loc"][-1] in ("float", "str") and isinstance(detail["input"], list):
         # of "one number, a list of them or a list of lists" the user meant what goes deepest
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]

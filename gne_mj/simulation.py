@@ -55,7 +55,8 @@ class Simulation:
         source: the scenario as JSON, kept with the results.
 
     Attributes:
-        interventions: what :meth:`change` and :meth:`push` did, each with its time in s.
+        interventions: what :meth:`change` and :meth:`push` did, each with its "time" in s, its
+            "system", and "what" in words.
 
     >>> simulation = Simulation([system], clock)
     >>> snapshot = simulation.step()["robots"]    # one integration step
@@ -113,18 +114,20 @@ class Simulation:
         for run in self._runs.values():
             run.advance(steps)
 
-    def change(self, system: System, what: str) -> None:
+    def change(self, system: System, what: str, **about: Any) -> None:
         """Go on with other numbers in one of the systems, as of the next step.
 
         Args:
             system: of the same name, game, law, agents and engine; its start is not used.
             what: the change in words, kept with the results.
+            about: what else to keep of it, as JSON has it. A later one of the same time, system and
+                "key" takes its place.
 
         Raises:
             InvalidInput: a step that the new numbers do not allow; nothing has changed then.
         """
         self._runs[system.name].change(system)
-        self._note(what)
+        self._note(system.name, what, about)
 
     def push(self, system: str, channel: int, force: float, duration: float) -> None:
         """Push one of a system's outputs for a while, as of the next step.
@@ -132,17 +135,30 @@ class Simulation:
         Args:
             system: its name.
             channel: which output, from 0.
-            force: in N (N m at a hinge), besides the input; it takes an earlier push's place.
+            force: in N (N m at a hinge), besides the input and other pushes.
             duration: in s, at least one step.
 
         Raises:
             EngineError: the system does not run in MuJoCo, or the output is no joint's velocity.
         """
-        self._runs[system].push(channel, force, max(1, self.clock.steps(duration)))
-        self._note(f"systems.{system}: output {channel + 1} pushed by {force:g} for {duration:g} s")
+        run = self._runs[system]
+        if not run.inside:
+            raise InvalidInput("push", system, "it must not have left its set")
+        run.push(channel, force, max(1, self.clock.steps(duration)))
+        game = run.system.game
+        agent, axis = int(game.agent_of_action[channel]) + 1, game.axis_of_action[channel]
+        along = f" along {axis}" if max(game.sizes) > 1 else ""
+        about = {"agent": agent, "channel": channel + 1, "force": force, "duration": duration}
+        what = f"{game.agent_name} {agent} pushed{along} by {force:g} for {duration:g} s"
+        self._note(system, what, about)
 
-    def _note(self, what: str) -> None:
-        self.interventions.append({"time": self.time, "what": what})
+    def _note(self, system: str, what: str, about: Mapping[str, Any]) -> None:
+        note = {"time": self.time, "system": system, "what": what, **about}
+        same = ("time", "system", "key")
+        last = self.interventions[-1] if self.interventions else {}
+        if "key" in note and [note[k] for k in same] == [last.get(k) for k in same]:
+            self.interventions.pop()  # a slider on its way
+        self.interventions.append(note)
 
     def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run to the clock's end, recording; Ctrl-C ends it early and keeps what was done.
@@ -170,10 +186,10 @@ class Simulation:
         Args:
             interrupted: the user stopped the run.
         """
-        intervened = bool(self.interventions)
+        touched = {done["system"] for done in self.interventions}
         return Trajectory.from_parts(
             {
-                name: run.part(self.tolerance, interrupted, intervened)
+                name: run.part(self.tolerance, interrupted, name in touched)
                 for name, run in self._runs.items()
             },
             seed=self.seed,
@@ -197,7 +213,7 @@ class SystemRun:
         self.loop = system.closed_loop(clock)
         self.wall_time = 0.0
         self._due: int | None = None  # the step at which the next row is recorded; None: at once
-        self._pushed_until: int | None = None
+        self._pushes: list[tuple[int, float, int]] = []  # output, force, until which step
         self._recorded: list[Part] = []
 
     @property
@@ -223,9 +239,10 @@ class SystemRun:
         now = self.clock.steps(self.loop.time)
         end = now + steps
         while now < end and self.inside:
-            if self._pushed_until is not None and now >= self._pushed_until:
-                self._release()
-            now = self._piece(now, min(end, self._pushed_until or end))
+            if any(until <= now for *_, until in self._pushes):
+                self._pushes = [push for push in self._pushes if push[2] > now]
+                self.loop.push(self._pushed(self._pushes))
+            now = self._piece(now, min([end, *(until for *_, until in self._pushes)]))
         self.wall_time += real_time.perf_counter() - started
 
     def _piece(self, now: int, end: int) -> int:
@@ -269,14 +286,17 @@ class SystemRun:
 
     def push(self, channel: int, force: float, steps: int) -> None:
         """See :meth:`Simulation.push`."""
-        forces = np.zeros(self.system.game.actions)
-        forces[channel] = force
-        self.loop.push(forces)  # first, since it may refuse
-        self._pushed_until = self.clock.steps(self.loop.time) + steps
+        until = self.clock.steps(self.loop.time) + steps
+        pushes = [*self._pushes, (channel, force, until)]
+        self.loop.push(self._pushed(pushes))  # first, since it may refuse
+        self._pushes = pushes
 
-    def _release(self) -> None:
-        self.loop.push(np.zeros(self.system.game.actions))
-        self._pushed_until = None
+    def _pushed(self, pushes: Sequence[tuple[int, float, int]]) -> NDArray[np.float64]:
+        """(m,) forces of all of them together."""
+        forces = np.zeros(self.system.game.actions)
+        for channel, force, _ in pushes:
+            forces[channel] += force
+        return forces
 
     def part(
         self, tolerance: float, interrupted: bool, intervened: bool

@@ -275,7 +275,10 @@ def variables_of(
         variables["acting_input"] = (
             ("time", axis),
             samples.acts,
-            {**variables["input"][2], "long_name": "input with pushes, as it moved the plant"},
+            {
+                **variables["input"][2],
+                "long_name": "input with the faults' pushes, as it moved the plant",
+            },
         )
     if samples.configuration.shape[1]:
         variables["configuration"] = (

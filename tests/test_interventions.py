@@ -130,7 +130,7 @@ def test_each_part_of_a_run_is_told_by_its_own_numbers(tmp_path):
     velocity = data["action"].to_numpy()[:, 0]
     reference = np.where(data["time"] < 1.0, 3.0, 2.0)
     assert np.array_equal(first, velocity - reference)
-    assert trajectory.interventions == [{"time": 1.0, "what": "v_0 = 2"}]
+    assert trajectory.interventions == [{"time": 1.0, "system": "robots", "what": "v_0 = 2"}]
 
     trajectory.save(tmp_path / "run.zarr")
     loaded = Trajectory.load(tmp_path / "run.zarr")
@@ -165,6 +165,57 @@ def test_a_push_is_the_fault_of_the_same_force(channel):
     report = pushed.trajectory().reports["robots"]
     assert not report["lyapunov"]["claimed"]
     assert pushed.interventions[0]["time"] == 0.5
+
+
+def test_pushes_add_up_and_each_lasts_its_time():
+    faults = (
+        Push(agents=(1,), start=0.5, end=0.7, force=4.0),
+        Push(agents=(1,), start=0.6, end=0.8, force=-1.0),
+        Push(agents=(3,), start=0.6, end=0.7, force=2.0),
+    )
+    struck = Simulation([robots("mujoco", faults=faults)], CLOCK)
+    struck.advance(200)
+    pushed = Simulation([robots("mujoco")], CLOCK)
+    pushed.advance(50)
+    pushed.push("robots", 1, 4.0, 0.2)
+    pushed.advance(10)
+    pushed.push("robots", 1, -1.0, 0.2)
+    pushed.push("robots", 3, 2.0, 0.1)
+    pushed.advance(140)
+    one, other = (s.runs["robots"].loop.present().state for s in (struck, pushed))
+    assert np.allclose(one, other, rtol=0, atol=1e-13)
+    assert [done["agent"] for done in pushed.interventions] == [2, 2, 4]
+
+
+def test_what_is_done_to_one_system_takes_no_claim_from_another():
+    scenario = load_scenario("velocity-sync", {"simulation.duration": 1.0})
+    tables = scenario.model_dump(mode="json", exclude_none=True)
+    tables["systems"]["others"] = tables["systems"]["robots"]
+    simulation = load_scenario(tables).simulation_object()
+    simulation.advance(100)
+    simulation.push("robots", 0, 1.0, 0.1)
+    reports = simulation.run().reports
+    assert not reports["robots"]["lyapunov"]["claimed"]
+    assert reports["others"]["lyapunov"]["claimed"]
+
+
+def test_a_slider_on_its_way_is_one_change():
+    simulation = Simulation([robots()], CLOCK)
+    simulation.advance(10)
+    for rho in (0.2, 0.3, 0.123456789):
+        simulation.change(robots(rho=rho), f"rho = {rho!r}", key="rho", value=rho)
+    simulation.advance(10)
+    simulation.change(robots(rho=0.5), "rho = 0.5", key="rho", value=0.5)
+    assert [done["value"] for done in simulation.interventions] == [0.123456789, 0.5]
+
+
+def test_robots_that_have_left_are_not_pushed():
+    law = {"controller.mode": "sampled", "simulation.control_period": 1.0}
+    simulation = load_scenario("velocity-sync", law).simulation_object()
+    simulation.run()
+    with pytest.raises(InvalidInput, match="must not have left"):
+        simulation.push("robots", 0, 1.0, 0.1)
+    assert simulation.trajectory().reports["robots"]["exit"]["agents"] == [3, 4]
 
 
 def test_only_robots_in_mujoco_are_pushed():

@@ -22,9 +22,29 @@ from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
 from gne_mj.view import html_page, replay_pack, write_html
 from gne_mj.view.html import page_file
+from gne_mj.view.notebook import notebook_html
 from gne_mj.view.pack import MAGIC, pack, packed_small, unpack
 from gne_mj.view.stage import Stage, shares
 
+BASED = """<mujoco><worldbody>
+  <body name="base"><geom size="0.1"/>
+    <body name="cart"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+  </body></worldbody>
+  <actuator><motor name="force" joint="slide"/></actuator>
+  <sensor><actuatorvel name="speed" actuator="force"/></sensor></mujoco>
+"""
+OF_BASED = """
+[systems.fleet.game]
+type = "velocity-synchronization"
+[systems.fleet.agents]
+type = "mjcf-robot"
+count = 2
+file = "based.xml"
+output = "speed"
+input = "force"
+[systems.fleet.controller]
+mode = "sampled"
+"""
 ROOT = Path(__file__).parent.parent
 SHORT = {"simulation.duration": 1.0}
 
@@ -197,6 +217,24 @@ def test_a_replay_of_own_robots_moves_all_their_joints():
             if path in meta["items"]:
                 pose = poses_of(found)[sample, meta["items"].index(path)]
                 assert np.allclose(pose[:3], plant.data.xpos[body], atol=1e-12)
+
+
+def test_robots_of_which_no_body_moves_first_are_drawn_by_one_that_does(tmp_path):
+    (tmp_path / "based.xml").write_text(BASED, encoding="utf-8")
+    (tmp_path / "scenario.toml").write_text(OF_BASED, encoding="utf-8")
+    trajectory = gne_mj.run(tmp_path / "scenario.toml", {"simulation.duration": 0.1})
+    meta, _ = unpack(replay_pack(trajectory))
+    anchors = meta["systems"][0]["anchors"]
+    assert [meta["items"][i] for i in anchors] == [f"meshcat/fleet/robot_{i}/cart" for i in (1, 2)]
+    more = BASED.replace('<body name="cart">', '<body name="more"><joint name="j"/>'
+                         '<geom size="0.1"/></body><body name="cart">')  # fmt: skip
+    (tmp_path / "based.xml").write_text(more, encoding="utf-8")
+    with pytest.raises(InvalidInput, match="the robots' files have changed"):
+        replay_pack(trajectory)
+    (tmp_path / "based.xml").unlink()
+    html = notebook_html(trajectory)
+    assert "<table>" in html
+    assert "There is no replay" in html
 
 
 def test_systems_that_end_early_stay_and_their_lines_stop():

@@ -13,7 +13,7 @@ from tornado.websocket import websocket_connect
 
 from gne_mj.errors import InvalidInput
 from gne_mj.view.pack import pack
-from gne_mj.view.server import UNSHOWN, Server
+from gne_mj.view.server import CONNECTIONS, UNSHOWN, Server
 
 
 @pytest.fixture
@@ -101,10 +101,31 @@ def test_nothing_else_is(static, name):
     assert get(static.url + name).code in (400, 404)
 
 
+def test_connections_are_limited(static):
+    idle = [socket.create_connection(("127.0.0.1", static.port)) for _ in range(3 * CONNECTIONS)]
+    time.sleep(0.2)
+    closed = 0
+    for one in idle:
+        one.settimeout(0.02)
+        try:
+            closed += one.recv(1) == b""
+        except TimeoutError:
+            pass
+        except ConnectionError:
+            closed += 1
+    for one in idle:
+        one.close()
+    assert closed == 2 * CONNECTIONS
+    time.sleep(0.2)
+    assert get(static.url).code == 200
+
+
 def test_without_the_secret_there_is_nothing(static):
     root = f"http://127.0.0.1:{static.port}/"
     for path in ("", "replay", "page.js", "x" * len(static.secret) + "/"):
-        assert get(root + path).code == 404
+        answer = get(root + path)
+        assert answer.code == 404
+        assert answer.headers["Server"] == "gne-mj"
     other = Server("another", replay=b"")
     other.close()
     assert urlparse(other.url).path != urlparse(static.url).path
@@ -134,7 +155,7 @@ def test_another_host_cannot_connect(live):
 def test_what_is_no_message_is_nothing(live):
     async def talk():
         one = await connect(live.server)
-        for text in ("", "no json", "[1]", "7", '{"do": "pause"}'):
+        for text in ("", "no json", "[1]", "7", "[" * 4000, '{"do": "pause"}'):
             await one.write_message(text)
         await one.write_message(b"\x00\x01", binary=True)
         await wait_for(lambda: {"do": "pause"} in live.messages)

@@ -56,7 +56,10 @@ def watched(scenario="velocity-sync", changes=ODE, speed=None):
 
 
 def to_the_end(session):
-    return session.run(threading.Event())
+    """The run to its end, which is then shown, as the command does."""
+    trajectory = session.run(threading.Event())
+    session.show(trajectory)
+    return trajectory
 
 
 @pytest.mark.parametrize(
@@ -129,7 +132,6 @@ def test_numbers_change_while_it_runs_and_hold_after_a_restart():
         ]
         assert unpack(page.last_frame)[0]["ended"]
         page.ask(do="restart")
-        assert not unpack(session._frame())[0]["ended"]
         second = to_the_end(session)
     assert second.interventions == []
     expected = gne_mj.run(
@@ -184,6 +186,99 @@ def test_a_value_that_cannot_be_changes_nothing(key, value, words):
         assert session.simulation.interventions == []
         page.ask(do="restart")
         assert session.simulation.systems[0].rho == 0.1
+
+
+def test_what_counts_is_where_the_outputs_are_now():
+    # at the start v_0 = 5 would be outside, y_1 being 1, and v_0 = -1 inside
+    with watched(changes={**ODE, "simulation.duration": 100.0}) as (session, page):
+        session._move(15_000)
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=-1.0)
+        assert "Refused" in page.errors[-1]
+        assert "g = 7" in page.errors[-1]  # (3 + 1)^2 - 9
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=5.0)
+        assert len(page.errors) == 1
+        assert session.simulation.systems[0].game.parameters[0] == 5.0
+        page.ask(do="restart")
+        assert "initial velocity" in page.errors[-1]  # and the run goes on
+        session._move(10)
+        assert session.simulation.time > 30.0
+
+
+def test_a_restart_ends_the_run_and_its_trajectory_is_kept():
+    with watched(changes={"simulation.duration": 1000.0}) as (session, page):
+        session._move(100)
+        page.ask(do="push", system="robots", agent=1)
+        session._receive({"do": "restart"}, None)
+        first = session.run(threading.Event())
+        assert first.status == "interrupted"
+        assert [done["agent"] for done in first.interventions] == [1]
+        session.show(first)
+        assert session.server.replay is None  # the next one goes on at once
+        stop = threading.Event()
+        page.ask(do="pause")
+        session._begin(session._next)
+        assert session.simulation.time == 0.0
+        stop.set()
+        assert session.run(stop).interventions == []
+
+
+def test_after_the_end_it_says_that_nothing_moves():
+    with watched(changes={"simulation.duration": 0.1}) as (session, page):
+        to_the_end(session)
+        page.ask(do="push", system="robots", agent=1)
+        assert "its run has ended" in page.errors[-1]
+        page.ask(do="set", key="systems.robots.barrier.rho", value=0.5)
+        assert "holds from the next start on" in page.errors[-1]
+        page.ask(do="restart")
+        to_the_end(session)
+        assert session.simulation.systems[0].rho == 0.5
+
+
+def test_a_users_own_game_is_not_read_again_for_a_slider(tmp_path):
+    for name in ("scenario.toml", "charging_plain.py", "charging_fast.py"):
+        text = (EXAMPLES / "game" / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    with watched(tmp_path / "scenario.toml", {"simulation.duration": 1.0}) as (session, page):
+        session._move(10)
+        game = session.simulation.systems[0].game
+        for name in ("charging_plain.py", "charging_fast.py"):
+            (tmp_path / name).write_text("raise RuntimeError", encoding="utf-8")
+        page.ask(do="set", key=next(iter(session._controls)), value=0.05)
+        assert page.errors == []
+        assert session.simulation.systems[0].game is game
+        assert session.simulation.systems[0].rho == 0.05
+        trajectory = session.run(threading.Event())
+        session.show(trajectory)  # neither for the replay
+        assert page.errors == []
+        assert session.server.replay
+
+
+def test_a_system_that_has_left_is_shown_no_further():
+    changes = {"robots.controller.mode": "sampled", "simulation.control_period": 1.0,
+               "simulation.duration": 10.0}  # fmt: skip
+    with watched("paper", changes) as (session, page):
+        session._move(2500)
+        meta, frame = unpack(session._frame())
+        assert meta["state"]["robots"]["status"] == "left_feasible_set"
+        assert meta["state"]["robots"]["exit_agents"]
+        assert np.all(np.isnan(frame["robots/action"]))
+        assert not np.any(np.isnan(frame["channels/action"]))
+        page.ask(do="connect")
+        _, history = unpack(page.welcomed[1])
+        gone = history["time"] > session.simulation.runs["robots"].loop.time
+        assert np.array_equal(np.isnan(history["robots/action"][:, 0]), gone)
+        page.ask(do="push", system="robots", agent=1)
+        assert "must not have left" in page.errors[-1]
+
+
+@pytest.mark.parametrize("message", [{"do": "speed", "value": 10**400},
+                                     {"do": "set", "key": "systems.robots.barrier.rho",
+                                      "value": 10**400}])  # fmt: skip
+def test_numbers_beyond_all_bounds_are_refused(message):
+    with watched() as (_session, page):
+        page.ask(**message)
+        assert "it must be a finite number" in page.errors[-1]
+        assert len(page.errors[-1]) < 200
 
 
 def test_a_push_acts_on_the_robot_it_names():

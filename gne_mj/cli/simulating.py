@@ -84,6 +84,11 @@ def keep(trajectory: "Trajectory", folder: Path) -> None:
     (folder / "report.json").write_text(report + "\n", encoding="utf-8")
 
 
+def is_batch(folder: Path) -> bool:
+    """Whether a folder is one that `batch` wrote."""
+    return (folder / "manifest.json").is_file()
+
+
 def stored(folder: Path) -> "Trajectory":
     """The trajectory that a run wrote into a folder."""
     from gne_mj.errors import InvalidInput
@@ -91,10 +96,11 @@ def stored(folder: Path) -> "Trajectory":
 
     store = folder / "trajectory.zarr"
     if not store.is_dir():
-        raise InvalidInput("RUN", str(folder), "it must be a folder with a trajectory.zarr")
+        batch = "; of a batch say which run, by --index" if is_batch(folder) else ""
+        raise InvalidInput("RUN", str(folder), f"it must be a folder with a trajectory.zarr{batch}")
     try:
         return Trajectory.load(store)
-    except (OSError, KeyError):
+    except (OSError, KeyError, ValueError, RuntimeError):
         raise InvalidInput(
             "RUN", str(folder), "its trajectory.zarr must be one that a run wrote"
         ) from None

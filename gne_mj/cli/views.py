@@ -1,8 +1,11 @@
 """Commands that show a run in a browser."""
 
 import os
+import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +14,7 @@ import typer
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import INDEX, PORT, settings
 from gne_mj.cli.output import PREPARING, results, tell, working
-from gne_mj.cli.simulating import keep, simulate, source_of, stored
+from gne_mj.cli.simulating import is_batch, keep, simulate, source_of, stored
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
@@ -37,18 +40,25 @@ def view(
 
     if html is not None and port is not None:
         raise InvalidInput("--port", port, "it is of no use with --html")
-    if html is not None and not html.parent.is_dir():
-        raise InvalidInput("--html", str(html), "its folder must exist")
+    if html is not None and (html.is_dir() or not html.parent.is_dir()):
+        raise InvalidInput("--html", str(html), "it must be a file, in a folder that exists")
+    title = run_folder.resolve().name
     if index is None:
-        trajectory, title = stored(run_folder), run_folder.name
+        trajectory = stored(run_folder)
+    elif is_batch(run_folder):
+        trajectory = simulate(source_of(None, run_folder, index), None, None, quiet=False)
+        title = f"{title}, run {index}"
     else:
-        source = source_of(None, run_folder, index)
-        trajectory = simulate(source, None, None, quiet=False)
-        title = f"{run_folder.name}, run {index}"
+        raise InvalidInput("--index", index, "it goes with a folder that `batch` wrote")
     if html is not None:
         from gne_mj.view import write_html
 
-        print(write_html(trajectory, html, title))
+        try:
+            print(write_html(trajectory, html, title))
+        except OSError as error:
+            raise InvalidInput(
+                "--html", str(html), f"it cannot be written: {error.strerror}"
+            ) from None
         return
     _show(trajectory, title, port)
 
@@ -63,7 +73,9 @@ def watch(
     speed: str | None,
     port: int | None,
 ) -> "Trajectory":
-    """Run a scenario on a live page until Ctrl-C; what is kept and told is its first run.
+    """Run a scenario on a live page until Ctrl-C; what is kept and told is the first run.
+
+    A viewer's restart ends that run, as Ctrl-C does.
 
     Args:
         source, changes: what to run, with what --set changes.
@@ -77,21 +89,23 @@ def watch(
     from gne_mj.simulation import interruption
 
     factor = _speed(speed)
-    with interruption() as stop:
+    with interruption() as stop, ExitStack() as page:
         with results(out, False) as folder:
             with working(as_json, PREPARING):
                 from gne_mj.view import Session
 
                 scenario = load_scenario(source, settings(changes))
                 session = Session(scenario, title, speed=factor, port=port or 0)
-            _announce(session.server.url)
+            page.callback(session.server.close)
+            page.enter_context(_announced(session.server.url))
             trajectory = session.run(stop)
             if folder is not None:
                 keep(trajectory, folder)
         tell(trajectory, as_json, out)
         sys.stdout.flush()  # whoever reads it need not wait for the page's end
-        session.linger(stop)
-        session.server.close()
+        if not stop.is_set():
+            session.show(trajectory)
+            session.linger(stop)
     return trajectory
 
 
@@ -103,9 +117,9 @@ def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
             from gne_mj.view import serve
 
             server = serve(trajectory, title, port=port or 0)
-        _announce(server.url)
-        while not stop.wait(1.0):
-            pass
+        with _announced(server.url):
+            while not stop.wait(1.0):
+                pass
         server.close()
 
 
@@ -127,12 +141,25 @@ def _speed(given: str | None) -> float | None:
     return speed
 
 
-def _announce(url: str) -> None:
-    """Say where the page is, and open it where somebody sits in front of a screen."""
-    print(f"view        {url}   (Ctrl-C ends)", file=sys.stderr, flush=True)
-    if sys.stderr.isatty() and (
-        sys.platform == "darwin" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
-        import webbrowser
+@contextmanager
+def _announced(url: str) -> Iterator[None]:
+    """Say where the page is, and open it where somebody sits in front of a screen.
 
-        webbrowser.open(url)
+    The browser is given a file of the user's own that leads there: what is on a command line all
+    users of the machine can read, and the address holds the page's secret.
+    """
+    print(f"view        {url}   (Ctrl-C ends)", file=sys.stderr, flush=True)
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if not (sys.stderr.isatty() and (screen or sys.platform == "darwin")):
+        yield
+        return
+    with tempfile.NamedTemporaryFile("w", prefix="gne-mj-", suffix=".html") as file:
+        file.write(f'<meta http-equiv="refresh" content="0; url={url}">')
+        file.flush()
+        # A process of its own: some browsers stay in the foreground, or write to the terminal.
+        subprocess.Popen(
+            [sys.executable, "-m", "webbrowser", Path(file.name).as_uri()],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        yield

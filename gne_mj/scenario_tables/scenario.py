@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
 from gne_mj.errors import InvalidInput, nearest
+from gne_mj.loops.base import Present
 from gne_mj.margins import with_margin
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
@@ -151,8 +152,14 @@ class SystemTable(Table):
         given = isinstance(table, Mapping) and "information" not in table
         return {"information": "full", **table} if given else table
 
-    def build(self, name: str, simulation: "SimulationTable") -> System:
-        """The system, with the simulation's integrator unless it names its own."""
+    def build(self, name: str, simulation: "SimulationTable", at: Present | None = None) -> System:
+        """The system, with the simulation's integrator unless it names its own.
+
+        Args:
+            name: of the system.
+            simulation: the clock's table.
+            at: where it starts, in place of the initial table; its memory may be longer.
+        """
         count, integrator = self.agents.count, self.plant.integrator or simulation.integrator
         period = simulation.control_period or simulation.timestep
         try:
@@ -169,13 +176,22 @@ class SystemTable(Table):
                     steps,
                 )  # fmt: skip
             law = self.controller.build(game)
-            state = self.initial.build(agents, game.sizes, lambda: self.game.default_start(count))
-            filtered = self.initial.filtered
-            memory = law.initial_memory(
-                state[:, agents.kind.OUTPUT],
-                self.initial.estimate,
-                None if filtered is None else per_action("initial.filtered", filtered, game.sizes),
-            )
+            if at is None:
+                state = self.initial.build(
+                    agents, game.sizes, lambda: self.game.default_start(count)
+                )
+                filtered = self.initial.filtered
+                memory = law.initial_memory(
+                    state[:, agents.kind.OUTPUT],
+                    self.initial.estimate,
+                    None
+                    if filtered is None
+                    else per_action("initial.filtered", filtered, game.sizes),
+                )
+            else:
+                state = at.state
+                length = len(law.initial_memory(state[:, agents.kind.OUTPUT]))
+                memory = at.memory[:length].copy()
             faults = tuple(fault.build() for fault in self.faults)
             schedule = self.barrier.build(1e-9)
         except InvalidInput as error:
@@ -233,9 +249,11 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _names(self) -> "Scenario":
         for name in self.systems:
-            if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
                 raise PydanticCustomError(
-                    "name", "a system's name has letters, digits, '-' and '_' only"
+                    "name",
+                    "a system's name has letters, digits, '-' and '_' only, and begins with one of"
+                    " the first two",
                 )
         return self
 

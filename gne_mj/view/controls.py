@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
+import numpy as np
+
 from gne_mj.scenario import Scenario
 from gne_mj.view.stage import Stage
 
@@ -34,6 +37,11 @@ class Control:
     low: float
     high: float
     logarithmic: bool
+
+    @property
+    def table(self) -> str:
+        """Which of the system's tables the number is in."""
+        return self.key.split(".")[2]
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page."""
@@ -85,19 +93,29 @@ def pushes_of(stages: list[Stage]) -> list[dict[str, Any]]:
     found = []
     for stage in stages:
         system = stage.system
-        if system.engine != "mujoco":
+        if system.engine != "mujoco" or stage.fleet is None:
             continue
         axes = max(system.game.sizes)
         found.append(
             {
                 "system": system.name,
                 "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
-                "unit": "N",
+                "unit": _push_unit(stage),
                 "force": PUSH_FORCE,
                 "duration": PUSH_DURATION,
             }
         )
     return found
+
+
+def _push_unit(stage: Stage) -> str:
+    """Of forces at the outputs' joints."""
+    assert stage.fleet is not None
+    plant = stage.fleet.plant
+    joints = plant.output_joints[plant.output_joints >= 0]
+    kinds = plant.model.jnt_type[plant.model.dof_jntid[joints]]
+    hinges = kinds == mujoco.mjtJoint.mjJNT_HINGE
+    return "N m" if np.all(hinges) and len(hinges) else "N or N m" if np.any(hinges) else "N"
 
 
 def _positive(key: str, label: str, system: str, unit: str, value: float) -> Control:

@@ -41,7 +41,14 @@ class Fleet:
     def qpos(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
         """(T, nq) joint positions at the samples of a trajectory's variables."""
         if isinstance(self.plant, MjcfPlant):
-            return values["configuration"]
+            recorded, now = values["configuration"], self.plant.model.nq
+            if recorded.shape[1] != now:
+                raise InvalidInput(
+                    "agents.file",
+                    f"{now} joint positions",
+                    f"the run has recorded {recorded.shape[1]}: the robots' files have changed",
+                )
+            return recorded
         state, at = values["state"], self.plant.places.T
         extension, _, _, position = np.moveaxis(state, -1, 0)
         found = np.zeros((len(state), self.plant.model.nq))
@@ -110,7 +117,12 @@ def fleet_of(
         plant: the robots, if they are in MuJoCo already.
     """
     plant = plant or _plant(system, clock)
-    return None if plant is None else Fleet(plant, system.name, system.game.agents)
+    if plant is None:
+        return None
+    try:
+        return Fleet(plant, system.name, system.game.agents)
+    except KeyError:  # of some agent nothing moves
+        return None
 
 
 def _plant(system: System, clock: Clock) -> MujocoPlant | MjcfPlant | None:
@@ -125,5 +137,8 @@ def _plant(system: System, clock: Clock) -> MujocoPlant | MjcfPlant | None:
 
 
 def _first_body(model: mujoco.MjModel, prefix: str) -> int:
-    names = [model.body(body).name for body in range(model.nbody)]
-    return next(body for body, name in enumerate(names) if name.startswith(prefix))
+    """The first of a robot's bodies that moves; KeyError if none does."""
+    for body in np.flatnonzero(model.body_weldid).tolist():
+        if model.body(body).name.startswith(prefix):
+            return int(body)
+    raise KeyError(prefix)

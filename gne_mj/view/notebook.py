@@ -2,6 +2,7 @@
 
 from html import escape
 
+from gne_mj.errors import GneError
 from gne_mj.summary import summary
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.html import html_page
@@ -12,13 +13,16 @@ HEIGHT = 560  # pixels of the replay
 def notebook_html(trajectory: Trajectory) -> str:
     """What IPython shows of a trajectory: a table for each system and, below, the replay.
 
-    All of it is in the notebook: it needs no server, and still works in one that was sent on. A
-    trajectory that holds no scenario has no replay.
+    All of it is in the notebook: it needs no server, and still works in one that was sent on. Where
+    there is no scenario to draw robots from, or their files are gone, a sentence says so.
     """
     tables = "".join(_table(name, report) for name, report in trajectory.reports.items())
     found = f'<div style="display:flex;flex-wrap:wrap;gap:2em">{tables}</div>'
-    if trajectory.tree.attrs["scenario"]:
+    try:
         page = escape(html_page(trajectory), quote=True)
+    except GneError as error:
+        found += f"<p>There is no replay: {escape(str(error))}</p>"
+    else:
         found += (
             f'<iframe title="replay" sandbox="allow-scripts" srcdoc="{page}"'
             f' style="width:100%;height:{HEIGHT}px;border:1px solid #8888;margin-top:1em">'

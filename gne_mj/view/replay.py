@@ -40,16 +40,24 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
     scenario = load_scenario(json.loads(source))
     clock = scenario.clock()
     stages = [Stage(system, clock) for system in scenario.system_objects()]
-    datasets = {stage.system.name: trajectory[stage.system.name] for stage in stages}
+    names = ", ".join(stage.system.name for stage in stages)
+    return scene_pack(Scene(stages, title or names, clock.duration), trajectory)
+
+
+def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
+    """The pack of a trajectory of a scene's systems.
+
+    Raises:
+        InvalidInput: its robots have other joints than the scene's.
+    """
+    datasets = {stage.system.name: trajectory[stage.system.name] for stage in scene.stages}
     time = _times(list(datasets.values()))
-    duration = float(time[-1]) if len(time) else 0.0
-    scene = Scene(stages, title or ", ".join(datasets), duration)
     values = {name: _values(data, time) for name, data in datasets.items()}
     arrays: Arrays = {"time": time, **scene.arrays(values)}
-    for stage in stages:
+    for stage in scene.stages:
         ended = float(datasets[stage.system.name]["time"][-1])
-        _cut(arrays, stage.system.name, time > ended + 1e-9)
-        arrays |= _messages(stage, time)
+        cut(arrays, stage.system.name, time > ended + 1e-9)
+        arrays |= _messages(stage, np.minimum(time, ended))
     poses = scene.poses(values).reshape(len(time), -1)
     varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
     arrays["pose_base"] = poses[0]
@@ -78,6 +86,7 @@ def outcome(report: dict[str, Any]) -> dict[str, Any]:
         "margin_name": None if worst is None else worst["name"],
         "margin_time": None if worst is None else worst["time"],
         "exit_time": None if left is None else left["time"],
+        "exit_agents": [] if left is None else left.get("agents", []),
     }
 
 
@@ -123,8 +132,8 @@ def _values(data: "xarray.Dataset", time: NDArray[np.float64]) -> dict[str, NDAr
     return found
 
 
-def _cut(arrays: Arrays, name: str, gone: NDArray[np.bool_]) -> None:
-    """No lines after a system's end."""
+def cut(arrays: Arrays, name: str, gone: NDArray[np.bool_]) -> None:
+    """No lines of a system at the samples (T,) after its end."""
     for key, array in arrays.items():
         if key.startswith((f"{name}/action", f"{name}/quantity/")) and np.any(gone):
             arrays[key] = array.copy()

@@ -31,7 +31,7 @@ with warnings.catch_warnings():  # it imports a module of pyzmq that pyzmq warns
     from meshcat.servers.zmqserver import WebSocketHandler, ZMQWebSocketBridge
 
 HOST = "127.0.0.1"
-BROWSERS = 16  # at once
+BROWSERS, CONNECTIONS = 16, 64  # at once
 UNSHOWN = 2  # frames under way to a browser
 PATIENCE = 10.0  # s, for everything that could take for ever
 FAREWELL = 1.0  # s that closing waits for browsers
@@ -189,6 +189,17 @@ class _File(_Guarded):
             self.write(data)
 
 
+class _Nothing(_Guarded):
+    """What there is at every other address."""
+
+    def initialize(self, server: Server) -> None:
+        self.server = server
+
+    def prepare(self) -> None:
+        super().prepare()
+        raise tornado.web.HTTPError(404)
+
+
 class Browser(_Guarded, WebSocketHandler):
     """The connection of one browser with a live page."""
 
@@ -244,7 +255,7 @@ class Browser(_Guarded, WebSocketHandler):
         """What a browser asks for; what is no JSON object is nothing."""
         try:
             asked = json.loads(message)
-        except ValueError:
+        except (ValueError, RecursionError):
             return
         if not isinstance(asked, dict):
             return
@@ -262,6 +273,16 @@ class Browser(_Guarded, WebSocketHandler):
             self.server.received(message, self)
 
 
+class _Http(HTTPServer):
+    """Closes connections beyond so many at once, before they can use up the process's files."""
+
+    def _handle_connection(self, connection: socket.socket, address: Any) -> None:
+        if len(self._connections) >= CONNECTIONS:
+            connection.close()
+        else:
+            super()._handle_connection(connection, address)
+
+
 class _Application(tornado.web.Application):
     """Listens where it is bound already, whatever port it is told."""
 
@@ -273,6 +294,8 @@ class _Application(tornado.web.Application):
             routes.insert(0, (f"{folder}(socket)", Browser, own))
         super().__init__(
             routes,
+            default_handler_class=_Nothing,
+            default_handler_args={"server": server},
             log_function=lambda handler: None,
             websocket_ping_interval=PATIENCE,
             websocket_ping_timeout=PATIENCE,
@@ -281,9 +304,9 @@ class _Application(tornado.web.Application):
         self._listening = listening
 
     def listen(self, port: int, *_: Any, **__: Any) -> HTTPServer:
-        http = HTTPServer(
+        http = _Http(
             self,
-            idle_connection_timeout=6 * PATIENCE,
+            idle_connection_timeout=PATIENCE,
             body_timeout=PATIENCE,
             max_body_size=4096,
             max_header_size=16384,

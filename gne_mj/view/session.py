@@ -5,6 +5,7 @@ import queue
 import threading
 import time as real_time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -16,11 +17,12 @@ from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
 from gne_mj.loops.base import Present, Samples
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
+from gne_mj.system import System
 from gne_mj.trajectory import Trajectory, variables_of
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
-from gne_mj.view.replay import outcome, replay_pack
+from gne_mj.view.replay import cut, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
 from gne_mj.view.stage import Stage
@@ -57,9 +59,9 @@ class Session:
         self._changes: dict[str, Any] = {}
         self._title, self._pacer = title, Pacer(speed)
         self._ended: Trajectory | None = None
+        self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
         self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
-        self._playing = True
         self._controls = {control.key: control for control in controls_of(scenario)}
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
@@ -74,36 +76,58 @@ class Session:
 
     @property
     def visualizer(self) -> Visualizer:
-        """A ``meshcat.Visualizer`` of the page, to draw something of one's own besides."""
+        """A ``meshcat.Visualizer`` of the page, to draw something of one's own besides.
+
+        It can set and delete objects, transforms and properties; what asks a browser for an answer
+        (images, waiting for it) is not there.
+        """
         return Visualizer(window=self.server)
 
     def _receive(self, message: dict[str, Any], browser: Browser) -> None:
         self._asked.put((message, browser))  # in the server's thread
 
     def run(self, stop: threading.Event) -> Trajectory:
-        """Until the run has ended or ``stop`` is set; returns what it recorded."""
-        while not stop.is_set() and not self.simulation.ended:
+        """Until the run has ended, viewers start another one or ``stop`` is set.
+
+        Returns:
+            What it recorded. The page shows the run's end when it is told to (:meth:`show`), so
+            that a caller can keep the trajectory before anything else.
+        """
+        if self._next is not None:
+            self._begin(self._next)
+            self.server.broadcast(self._history())
+            self._tell_interventions()
+        while not stop.is_set() and not self.simulation.ended and self._next is None:
             self._turn()
-        trajectory = self.simulation.trajectory(interrupted=not self.simulation.ended)
-        self.server.replay = replay_pack(trajectory, self._title)
+        return self.simulation.trajectory(interrupted=not self.simulation.ended)
+
+    def show(self, trajectory: Trajectory) -> None:
+        """Let viewers replay the run that has ended."""
+        if self._next is not None:
+            return
+        try:
+            self.server.replay = scene_pack(self._scene, trajectory)
+        except GneError as error:
+            self._notice(str(error))
+            return
         self._ended = trajectory
         self.server.broadcast(self._frame())  # no browser may miss it
-        return trajectory
 
     def linger(self, stop: threading.Event) -> None:
         """Show the run that has ended, and further ones if viewers restart, until ``stop``."""
         while not stop.is_set():
-            if self.simulation.ended:
+            if self.simulation.ended and self._next is None:
                 self._look(0.1)
             else:
-                self.run(stop)
+                self.show(self.run(stop))
 
     def _begin(self, scenario: Scenario) -> None:
         """A new run, at the scenario's start."""
         simulation = scenario.simulation_object()
         self.simulation, self._scenario = simulation, scenario
         self._messages_from = 0
-        self._ended = None
+        self._next = self._ended = None
+        self._playing = True
         self._pacer.restart(simulation.time)
         self._next_frame = self._frame_time = self._history_due = 0.0
 
@@ -160,6 +184,8 @@ class Session:
                 self._do(message, browser)
             except GneError as error:
                 self._notice(_complaint(error), browser)
+            except Exception as error:  # no message may end a run
+                self._notice(f"This failed: {type(error).__name__}: {error}", browser)
         if asked:
             self._next_frame = 0.0  # show at once what it did
 
@@ -193,10 +219,14 @@ class Session:
         return clock.steps(clock.control_period if held else clock.sample_period)
 
     def _restart(self) -> None:
-        self._begin(load_scenario(self._tables, self._changes))
-        self._playing = True
-        self.server.broadcast(self._history())
-        self._tell_interventions()
+        """Let :meth:`run` return; the next one begins from the start, with the present sliders."""
+        scenario = load_scenario(self._tables, self._changes)
+        try:
+            scenario.system_objects()
+        except InfeasibleStart as error:  # the run goes on
+            self._notice(str(error))
+            return
+        self._next = scenario
 
     def _set_speed(self, value: Any) -> None:
         if value is not None:
@@ -213,8 +243,9 @@ class Session:
             raise InvalidInput("key", key, "this scenario has no such slider")
         try:
             number = _number(key, value)
-            self._change(control, number)
-            self._values[control.key] = number
+            if number != self._values[control.key]:
+                self._change(control, number)
+                self._values[control.key] = number
         finally:
             self.server.tell({"kind": "controls", "values": self._values})
 
@@ -224,14 +255,12 @@ class Session:
         scenario = load_scenario(tables, {changed: given})
         run = self.simulation.runs[control.system]
         if run.inside and not self.simulation.ended:
-            built = scenario.systems[control.system].build(control.system, scenario.simulation)
-            present = run.loop.present()
-            # what a system refuses at a start it refuses here and now
-            built = replace(
-                built, state=present.state, memory=present.memory[: len(built.memory)].copy()
-            )
-            self.simulation.change(built, f"{control.key} = {value:g}")
+            system = _changed(run, scenario, control, value)
+            what = f"{control.key} = {value!r}"
+            self.simulation.change(system, what, key=control.key, value=value)
             self._tell_interventions()
+        else:
+            self._notice("This holds from the next start on: the run has ended.", level="info")
         self._scenario = scenario
         self._changes[changed] = given
 
@@ -247,9 +276,10 @@ class Session:
             raise InvalidInput("push", axis, f"agent {agent} has {game.sizes[agent - 1]} axes")
         force = _number("push", message.get("force", about["force"]))
         channel = int(game.data.offsets[agent - 1]) + axis
-        if not self.simulation.ended:
-            self.simulation.push(str(name), channel, force, about["duration"])
-            self._tell_interventions()
+        if self.simulation.ended:
+            raise InvalidInput("push", name, "its run has ended; restart it")
+        self.simulation.push(str(name), channel, force, about["duration"])
+        self._tell_interventions()
 
     def _tell_interventions(self, browser: Browser | None = None) -> None:
         done = self.simulation.interventions
@@ -266,8 +296,8 @@ class Session:
         self.server.tell({"kind": "controls", "values": self._values}, browser)
         self._tell_interventions(browser)
 
-    def _notice(self, text: str, browser: Browser) -> None:
-        self.server.tell({"kind": "notice", "level": "error", "text": text}, browser)
+    def _notice(self, text: str, browser: Browser | None = None, *, level: str = "error") -> None:
+        self.server.tell({"kind": "notice", "level": level, "text": text}, browser)
 
     def _history(self) -> bytes:
         """What was recorded so far, for the plots."""
@@ -281,6 +311,8 @@ class Session:
         arrays = {"time": time}
         if len(time):
             arrays |= self._scene.arrays(values)
+            for name, (own, _) in recorded.items():
+                cut(arrays, name, time > own[-1] + 1e-9)
         return pack({"kind": "history"}, arrays)
 
     def _publish(self) -> None:
@@ -303,14 +335,18 @@ class Session:
         """The present instant."""
         simulation = self.simulation
         values = {name: _now(run) for name, run in simulation.runs.items()}
-        arrays = {
-            name: array[0] if array.ndim else array
-            for name, array in self._scene.arrays(values).items()
-        }
+        rows = self._scene.arrays(values)
+        for name, run in simulation.runs.items():
+            gone = simulation.time > run.loop.time + 1e-9
+            cut(rows, name, np.array([gone]))
+        arrays = {name: row[0] for name, row in rows.items()}
         arrays["poses"] = self._scene.poses(values)[0]
         step = simulation.clock.steps(simulation.time)
         for stage in self._scene.stages:
-            arrays |= stage.messages(self._messages_from, step)
+            own = simulation.runs[stage.system.name].loop.time
+            arrays |= stage.messages(
+                self._messages_from, max(self._messages_from, simulation.clock.steps(own))
+            )
         self._messages_from = step
         meta = {
             "kind": "frame",
@@ -344,10 +380,30 @@ def _now(run: SystemRun) -> dict[str, np.ndarray]:
     return {name: values for name, (_, values, _) in variables_of(run.system, time, row).items()}
 
 
+def _changed(run: SystemRun, scenario: Scenario, control: Control, value: float) -> System:
+    """A run's system from its present state on, with the number that a slider changes.
+
+    What the number is not of stays the same object: a game or law of the user's own is not read
+    again.
+    """
+    table, present = scenario.systems[control.system], run.loop.present()
+    if control.table == "game":
+        return table.build(control.system, scenario.simulation, present)
+    memory = present.memory[: len(run.system.memory)].copy()
+    here = replace(run.system, state=present.state, memory=memory)
+    if control.table == "barrier":
+        return replace(here, rho=value)
+    return replace(here, law=table.controller.build(here.game))
+
+
 def _number(key: Any, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InvalidInput(str(key), value, "it must be a finite number")
-    return float(value)
+    number = math.nan
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        with suppress(OverflowError):
+            number = float(value)
+    if not math.isfinite(number):
+        raise InvalidInput(str(key), str(value)[:40], "it must be a finite number")
+    return number
 
 
 def _complaint(error: GneError) -> str:

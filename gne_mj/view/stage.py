@@ -49,7 +49,6 @@ class Stage:
             "information": system.law.information,
             "mode": system.mode,
             "engine": system.engine,
-            "rho": system.rho,
             "drawn_as": "bars" if self.fleet is None else "fleet",
             "action": {
                 "name": game.action_name,
