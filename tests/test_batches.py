@@ -110,7 +110,8 @@ def test_a_failing_function_of_ones_own_is_told(tmp_path):
     (tmp_path / "charging_plain.py").write_text(text)
     scenario = (ROOT / "examples" / "game" / "scenario.toml").read_text()
     (tmp_path / "s.toml").write_text(scenario.replace("charging_fast", "charging_plain"))
-    plan = make_plan(tmp_path / "s.toml", {"simulation.duration": 20.0}, starts=3)
+    changes = {"simulation.duration": 20.0, "agents": {"type": "integrator", "count": 6}}
+    plan = make_plan(tmp_path / "s.toml", changes, starts=3)
     with pytest.raises(UserCodeError, match="mine"):
         Runner(plan, 2).run(0)
 

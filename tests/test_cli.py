@@ -112,7 +112,8 @@ def test_nothing_is_written_unless_asked(tmp_path, monkeypatch):
 @pytest.mark.parametrize("as_json", [False, True], ids=["words", "json"])
 def test_leaving_the_set_fails_and_keeps_the_results(tmp_path, as_json):
     out = tmp_path / "run"
-    done = gne("run", "velocity-sync", *LEAVING, "--out", out, *(["--json"] if as_json else []))
+    command = gne_here if as_json else gne
+    done = command("run", "velocity-sync", *LEAVING, "--out", out, *(["--json"] if as_json else []))
     assert done.returncode == 1
     report = json.loads((out / "report.json").read_text())
     assert report["status"] == "left_feasible_set"

@@ -158,7 +158,13 @@ def test_fully_distributed_is_the_formula(kind, count, graph):
             assert_same(rates[others], estimates_rate[others])
 
 
-@pytest.mark.parametrize(("kind", "count", "graph"), NETWORKS)
+@pytest.mark.parametrize(
+    ("kind", "count", "graph"),
+    [  # for the channels a loop is compiled that no other test uses
+        pytest.param(*network, marks=[pytest.mark.slow] if network[0] == "osnr" else [])
+        for network in NETWORKS
+    ],
+)
 def test_partial_information_is_the_formula(kind, count, graph):
     now = case(kind, count)
     law = PartialInformation(graphs.NAMED[graph](count), COUPLING, TAU)

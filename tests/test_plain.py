@@ -170,7 +170,13 @@ def ode_system(game, plain, mode="continuous"):
 
 
 @pytest.mark.parametrize("mode", ["continuous", "sampled"])
-@pytest.mark.parametrize("kernels", [coupled_game, BARE], ids=["kernels", "plain game"])
+@pytest.mark.parametrize(
+    "kernels",
+    [
+        pytest.param(coupled_game, id="kernels", marks=pytest.mark.slow),
+        pytest.param(BARE, id="plain"),
+    ],
+)
 def test_a_plain_law(kernels, mode):
     game = coupled(kernels)
     got, inputs, *_ = run_loop(ode_system(game, law(game), mode), 0.01, 50, 0.02)

@@ -88,7 +88,7 @@ both = pytest.mark.parametrize("engine", [pytest.param("mujoco", marks=pytest.ma
 
 
 @both
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))])
 def test_rk4_equals_a_plain_rk4(engine, seed):
     state, h, steps = interior(np.random.default_rng(seed), used=0.8), 0.005, 2000
     expected = reference.rk4_fixed(expected_rate(), state[:, :3].ravel(), h, steps)
@@ -143,11 +143,12 @@ def test_rk4_is_of_fourth_order_in_mujoco():
     assert errors[-1] < 1e-6
 
 
-def test_right_hand_sides_at_random_interior_states():
+@pytest.mark.parametrize("count", [10, pytest.param(50, marks=pytest.mark.slow)])
+def test_right_hand_sides_at_random_interior_states(count):
     """MuJoCo's accelerations and the ODE's rates against the slow ones, to rounding."""
     rng = np.random.default_rng(7)
     rate = expected_rate()
-    for _ in range(50):
+    for _ in range(count):
         state = interior(rng)
         expected = rate(0.0, state[:, :3].ravel()).reshape(8, 3)
         running = system(state, "mujoco", integrator="euler").closed_loop(clock(0.001))
