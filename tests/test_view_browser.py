@@ -39,7 +39,7 @@ def session(scenario="velocity-sync", changes=None, speed=1.0):
     live, stop = Session(loaded, "live", speed=speed), threading.Event()
 
     def work():
-        live.run(stop)
+        live.show(live.run(stop))
         live.linger(stop)
 
     thread = threading.Thread(target=work)
@@ -188,6 +188,34 @@ def test_an_exit_is_shown_in_words_and_in_red(page, recorded):
         quiet(recorded, *origins(server))
     finally:
         server.close()
+
+
+def test_agents_in_a_violated_constraint_are_red_without_any_share(page, recorded):
+    changes = {"controller.mode": "sampled", "simulation.timestep": 0.01,
+               "simulation.control_period": 0.3}  # fmt: skip
+    trajectory = gne_mj.run("cournot", changes)
+    assert trajectory.status == "left_feasible_set"
+    agents = trajectory.reports["firms"]["exit"]["agents"]
+    server = serve(trajectory)
+    try:
+        opened(page, server.url)
+        tint = "agent => window.gne.tint(agent, 'firms')"
+        before = {page.evaluate(tint, agent) for agent in range(10)}
+        assert len(before) == 1  # nothing known, nobody outside
+        page.evaluate("window.gne.seek(1e9)")
+        red = [agent + 1 for agent in range(10) if page.evaluate(tint, agent) not in before]
+        assert red == agents
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
+
+
+def test_one_browser_too_many_is_told_so(page, monkeypatch):
+    monkeypatch.setattr("gne_mj.view.server.BROWSERS", 0)
+    with session() as live:
+        page.goto(live.server.url)
+        page.locator("#lost").wait_for(state="visible")
+        assert "there are 0 browsers already" in page.locator("#lost").inner_text()
 
 
 def test_a_notebook_shows_the_replay(page, recorded, paper):

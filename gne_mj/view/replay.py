@@ -57,6 +57,9 @@ def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
     for stage in scene.stages:
         ended = float(datasets[stage.system.name]["time"][-1])
         cut(arrays, stage.system.name, time > ended + 1e-9)
+        left = outcome(trajectory.reports[stage.system.name])
+        if left["exit_agents"]:
+            mark_outside(arrays, stage.system.name, left["exit_agents"], time >= ended - 1e-9)
         arrays |= _messages(stage, np.minimum(time, ended))
     poses = scene.poses(values).reshape(len(time), -1)
     varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
@@ -138,6 +141,18 @@ def cut(arrays: Arrays, name: str, gone: NDArray[np.bool_]) -> None:
         if key.startswith((f"{name}/action", f"{name}/quantity/")) and np.any(gone):
             arrays[key] = array.copy()
             arrays[key][gone] = np.nan
+
+
+def mark_outside(arrays: Arrays, name: str, agents: Sequence[int], rows: NDArray[np.bool_]) -> None:
+    """Of these agents, from 1, more than the bound is used at these samples (T,).
+
+    The state of the step in which an exit was seen is that of its start, which is inside, and of a
+    game without quantities no share is known.
+    """
+    share = arrays[f"{name}/share"]
+    for agent in agents:
+        inside = rows & ~(share[:, agent - 1] > 1.0)
+        share[inside, agent - 1] = np.inf
 
 
 def _messages(stage: Stage, time: NDArray[np.float64]) -> Arrays:

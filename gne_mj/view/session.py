@@ -22,7 +22,7 @@ from gne_mj.trajectory import Trajectory, variables_of
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
-from gne_mj.view.replay import cut, outcome, scene_pack
+from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
 from gne_mj.view.stage import Stage
@@ -339,6 +339,8 @@ class Session:
         for name, run in simulation.runs.items():
             gone = simulation.time > run.loop.time + 1e-9
             cut(rows, name, np.array([gone]))
+            if agents := self._state(name)["exit_agents"]:
+                mark_outside(rows, name, agents, np.array([True]))
         arrays = {name: row[0] for name, row in rows.items()}
         arrays["poses"] = self._scene.poses(values)[0]
         step = simulation.clock.steps(simulation.time)

@@ -114,17 +114,6 @@
           ),
         );
       }
-      const general = controls.filter(
-        ({ system }) => !meta.systems.some(({ name }) => name === system),
-      );
-      if (general.length)
-        this.body.append(
-          GNE.element(
-            "div",
-            { class: "tuning-row" },
-            ...general.map((control) => this.slider(control)),
-          ),
-        );
     }
 
     slider(control) {
@@ -157,23 +146,28 @@
       };
       let typing = false;
       let touched = -Infinity;
+      let held = value;
       const set = this.atMost(12, (v) => this.send({ do: "set", key, value: v }));
       range.oninput = () => {
         touched = performance.now();
         const v = Number(fromPlace(Number(range.value)).toPrecision(3));
-        show(v);
+        show((held = v));
         set(v);
       };
       number.oninput = () => (typing = true);
-      number.onblur = () => (typing = false);
+      number.onblur = () => {
+        typing = false;
+        show(held); // nothing, or half a number, was left there
+      };
       number.onchange = () => {
         typing = false;
         const v = Number(number.value);
-        if (number.value !== "" && Number.isFinite(v)) set(v);
+        if (number.value !== "" && Number.isFinite(v)) set((held = v));
       };
       show(value);
       let told;
       const follow = (v) => {
+        held = v;
         // echoes of a moment ago must not pull the slider back under the hand
         clearTimeout(told);
         const wait = touched + 400 - performance.now();

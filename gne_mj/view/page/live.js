@@ -2,9 +2,10 @@
 // The wire to a running simulation.
 (() => {
   const AGAIN = 2000; // ms until the next try
+  const FULL = 1013; // the server's code for a browser too many
 
   GNE.Live = class {
-    /** callbacks: pack(pack), command(bytes), message(object), opened(), lost(). */
+    /** callbacks: pack(pack), command(bytes), message(object), opened(), lost(why). */
     constructor(callbacks) {
       this.callbacks = callbacks;
       this.connect();
@@ -17,8 +18,12 @@
       this.socket.binaryType = "arraybuffer";
       this.socket.onopen = () => this.callbacks.opened();
       this.socket.onmessage = ({ data }) => this.receive(data);
-      this.socket.onclose = () => {
-        this.callbacks.lost();
+      this.socket.onclose = ({ code, reason }) => {
+        this.callbacks.lost(
+          code === FULL
+            ? `this page is not connected: ${reason}`
+            : "connection lost: the simulation has ended or the server is gone",
+        );
         setTimeout(() => this.connect(), AGAIN);
       };
     }

@@ -127,9 +127,9 @@ const GNE = {};
   /** Kind of status (ok, going, bad, unknown), and its symbol and words. */
   GNE.status = (word) => {
     let kind = "unknown";
-    if (/^(converged|completed|finished)/.test(word)) kind = "ok";
-    else if (/left|diverged|infeasible|fail|error/.test(word)) kind = "bad";
-    else if (/running|paused|ready|start/.test(word)) kind = "going";
+    if (/^(converged|completed)$/.test(word)) kind = "ok";
+    else if (/left|diverged/.test(word)) kind = "bad";
+    else if (word === "running") kind = "going";
     return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
   };
 

@@ -230,7 +230,7 @@
       const number = String(agent + 1);
       const out = share > 1;
       const digits = out && share < 1.1 ? 1 : 0; // not "100 %" of what is outside
-      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : "";
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : out ? "outside" : "";
       for (const text of percent ? [percent, ""] : [""]) {
         const box = this.pillBox(p, number, out ? `⚠ ${text}` : text);
         if (!this.free(box) && !this.isHighlighted(system, agent)) continue;

@@ -90,7 +90,7 @@
       this.tuning = new GNE.Tuning((message) => this.link.send(message));
       this.link = new GNE.Live({
         opened: () => this.opened(),
-        lost: () => this.lost(),
+        lost: (why) => this.lost(why),
         command: (bytes) => this.scene.command(bytes),
         pack: (pack) => this.receive(pack),
         message: (message) => this.hear(message),
@@ -105,8 +105,9 @@
       this.connected = true;
     }
 
-    lost() {
+    lost(why) {
       GNE.byId("lost").hidden = false;
+      GNE.byId("lost-text").textContent = why;
       this.connected = false;
       if (!this.replaying) this.playing = false;
       this.slowDue = 0;
@@ -483,19 +484,8 @@
     /** {status, message, margin, margin_name, margin_time} of a system, as of now. */
     stateOf({ name }) {
       if (!this.replaying) return this.frame?.state[name] || { status: "waiting" };
-      const outcome = this.replay.meta.outcome?.[name] || { status: "" };
-      if (!(outcome.margin_time > this.time)) return outcome;
-      return { ...outcome, ...this.leastMargin(name) };
-    }
-
-    /** Least margin among the samples up to now; the whole run's least is still to come. */
-    leastMargin(name) {
-      const data = this.replay.arrays[`${name}/margin`]?.data;
-      if (!data) return { margin: NaN };
-      const last = this.replay.at(this.time).i;
-      let best = 0;
-      for (let i = 1; i <= last; i++) if (data[i] < data[best]) best = i;
-      return { margin: data[best], margin_name: "", margin_time: this.replay.time[best] };
+      // of the whole run, also while an earlier time is shown
+      return this.replay.meta.outcome?.[name] || { status: "" };
     }
 
     chip(system) {
@@ -507,7 +497,6 @@
         `information: ${system.information}`,
         `mode: ${system.mode}`,
         `engine: ${system.engine}`,
-        `ρ = ${GNE.number(system.rho)}`,
       ];
       return GNE.element(
         "div",
@@ -524,7 +513,8 @@
     marginText({ margin, margin_name: name, margin_time: time }) {
       if (!Number.isFinite(margin)) return "no margin known";
       const when = Number.isFinite(time) ? ` at ${GNE.fixed(time, time < 10 ? 2 : 1)} s` : "";
-      return `least margin ${GNE.number(margin)}${name ? ` · ${name}` : ""}${when}`;
+      const of = this.replaying ? "the run's least margin" : "least margin so far";
+      return `${of} ${GNE.number(margin)}${name ? ` · ${name}` : ""}${when}`;
     }
 
     showBanner() {

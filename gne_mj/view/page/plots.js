@@ -223,7 +223,7 @@
     make(width, height) {
       this.height = height;
       this.uplot?.destroy();
-      this.focused = null;
+      this.focused = this.timeLine = null;
       this.uplot = new uPlot(this.options(width, height), this.data(), this.chart);
       this.timeLine = GNE.element("div", { class: "time-line" });
       this.exitLine = GNE.element(
@@ -286,6 +286,7 @@
         },
         hooks: {
           drawAxes: [(u) => this.drawBounds(u)],
+          draw: [() => this.setTime(this.plots.now)], // the axis is another one only by now
           setCursor: [(u) => this.hover(u)],
           setSeries: [(_, k, how) => this.focusedByMouse(k, how)],
         },
@@ -407,12 +408,11 @@
 
     refresh() {
       this.uplot?.setData(this.data(), true);
-      this.setTime(this.plots.now);
       this.writeValues();
     }
 
     setTime(t) {
-      if (!this.uplot) return;
+      if (!this.timeLine) return;
       const place = (line, time) => {
         const x = Math.round(this.uplot.valToPos(time, "x"));
         if (line.at === x) return; // painting anew costs more than all else here

@@ -32,6 +32,14 @@
     remove() {},
   });
 
+  const dispose = ({ geometry, material }) => {
+    geometry?.dispose();
+    for (const each of [material].flat()) {
+      each?.map?.dispose();
+      each?.dispose();
+    }
+  };
+
   const GROUND_VERTEX = `
     varying vec2 at;
     uniform float size;
@@ -202,8 +210,11 @@
 
     /** Forgets a scene, as another one comes. */
     clear() {
-      for (const path of Object.keys(this.viewer.scene_tree.children))
-        if (!OWN.includes(path)) this.viewer.delete_path([path]);
+      for (const [path, node] of Object.entries(this.viewer.scene_tree.children)) {
+        if (OWN.includes(path)) continue;
+        node.object.traverse(dispose); // meshcat itself forgets what is inside groups
+        this.viewer.delete_path([path]);
+      }
       for (const bars of this.bars) bars.remove();
       this.ghosts?.remove();
       this.batches.clear();
