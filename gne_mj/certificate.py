@@ -128,19 +128,21 @@ def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         system: what runs.
         monitor: the loop's flat array of what was seen at every step.
     """
-    status, message = "running", ""
-    if monitor[watch.EXIT] != watch.INSIDE:
-        status, message = _exit(system, monitor)
     worst = _worst_constraint(system, monitor) or {}
-    return {
-        "status": status,
-        "message": message,
+    now: dict[str, Any] = {
+        "status": "running",
+        "message": "",
         "margin": worst.get("margin"),
         "margin_name": worst.get("name"),
         "margin_time": worst.get("time"),
-        "exit_time": None if status == "running" else float(monitor[watch.EXIT_TIME]),
-        "exit_agents": [] if status == "running" else _concerned(system, monitor),
+        "exit_time": None,
+        "exit_agents": [],
     }
+    if monitor[watch.EXIT] != watch.INSIDE:
+        now["status"], now["message"] = _exit(system, monitor)
+        now["exit_time"] = float(monitor[watch.EXIT_TIME])
+        now["exit_agents"] = _concerned(system, monitor)
+    return now
 
 
 def _status(

@@ -267,9 +267,15 @@ class SystemRun:
         self._due = now + samples * every
         return now + samples * stride
 
-    def recorded(self) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
-        """Sample times so far in s, and what a trajectory has of them, by the variables' names."""
-        parts = self._recorded = joined(self._recorded)  # so that the next time is quick
+    def recorded(self, most: int) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
+        """Sample times so far in s, and what a trajectory has of them, by the variables' names.
+
+        Args:
+            most: samples; of more only every so many-th is there.
+        """
+        self._recorded = joined(self._recorded)  # so that the next time is quick
+        every = 1 + sum(len(part.time) for part in self._recorded) // (most + 1)
+        parts = [part.thinned(every) for part in self._recorded]
         if not parts:
             return np.zeros(0), {}
         return np.concatenate([part.time for part in parts]), {

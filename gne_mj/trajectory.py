@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
 from gne_mj.verdicts import SUCCESSES
@@ -48,6 +49,10 @@ class Part:
     system: System
     time: NDArray[np.float64]
     samples: Samples
+
+    def thinned(self, every: int) -> "Part":
+        """Every so many-th sample."""
+        return Part(self.system, self.time[::every], self.samples.thinned(every))
 
 
 def joined(parts: Sequence[Part]) -> list[Part]:
@@ -192,6 +197,16 @@ def axis_of(system: System) -> str:
     return "agent" if system.game.actions == system.game.agents else "action"
 
 
+def estimates_of(
+    game: Game, y: NDArray[np.float64], memory: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(samples, N, m) what agents take the actions to be, of actions (samples, m) and memories."""
+    m, owner = game.actions, game.agent_of_action
+    estimates = memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
+    estimates[:, owner, np.arange(m)] = y  # an agent's own block is its action, not an estimate
+    return estimates
+
+
 def variables_of(
     system: System, time: NDArray[np.float64], samples: Samples
 ) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
@@ -251,13 +266,9 @@ def variables_of(
         )
     elif samples.memory.shape[1]:
         m = game.actions
-        estimates = samples.memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
-        owner = game.agent_of_action
-        for r in range(m):  # an agent's own block is its action, not an estimate
-            estimates[:, owner[r], r] = y[:, r]
         variables["estimate"] = (
             ("time", "estimating_agent", axis),
-            estimates,
+            estimates_of(game, y, samples.memory),
             {**unit, "long_name": "what each agent takes the actions to be"},
         )
         if system.law.information == "distributed":

@@ -82,7 +82,7 @@ def worst_constraints(
     at = int(watch.worst_at(p))
     worst, when = monitors[:, at : at + p].copy(), monitors[:, at + p : at + 2 * p].copy()
     worst[monitors[:, watch.STARTED] == 0.0] = -np.inf
-    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET):
+    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET).tolist():
         index, value = int(monitors[run, watch.EXIT_CONSTRAINT]), monitors[run, watch.EXIT_VALUE]
         if value > worst[run, index]:
             worst[run, index], when[run, index] = value, monitors[run, watch.EXIT_TIME]

@@ -44,11 +44,24 @@ def test_pieces_and_looks_change_no_bit(engine):
         for run in simulation.runs.values():
             before = run.loop.monitor.copy()
             run.loop.present()
-            run.recorded()
+            run.recorded(1000)
             assert np.array_equal(before, run.loop.monitor)
     assert simulation.ended
     assert same(simulation.trajectory(), whole)
     assert simulation.trajectory().reports["robots"]["steps"] == 400
+
+
+def test_what_is_recorded_is_thinned_evenly():
+    simulation = Simulation([robots()], CLOCK)
+    (run,) = simulation.runs.values()
+    assert len(run.recorded(10)[0]) == 0
+    simulation.advance(395)
+    whole, variables = run.recorded(40)
+    assert np.allclose(whole, 0.1 * np.arange(40))
+    for most, every in ((39, 2), (20, 2), (13, 3), (1, 21)):
+        time, thinned = run.recorded(most)
+        assert np.array_equal(time, whole[::every])
+        assert np.array_equal(thinned["action"], variables["action"][::every])
 
 
 def test_a_run_that_goes_on_after_it_was_looked_at_is_the_same():

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from gne_mj.plants.fleet import compile_model, compose
-from gne_mj.view.mirror import Mirror, rotations, transforms, turning_z_to
+from gne_mj.view.mirror import Mirror, rotations, transforms, turn_z_to
 from gne_mj.view.shapes import Group, Part, capsule, coil, material
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "robot"
@@ -511,14 +511,14 @@ def test_quaternions_take_z_to_any_direction(x, y, z):
         return
     direction = np.array([[x, y, z]]) / length
     direction /= np.linalg.norm(direction)
-    quaternion = turning_z_to(direction)
+    quaternion = np.array([turn_z_to(*direction[0])])
     assert_allclose(np.linalg.norm(quaternion), 1, rtol=1e-14)
     assert_allclose(rotations(quaternion)[0] @ [0, 0, 1], direction[0], atol=1e-14)
 
 
 def test_quaternions_of_nearby_directions_are_near():
     # about the horizontal, where a fleet's springs lie
-    low, high = turning_z_to(np.array([[1, 0, -1e-17], [1, 0, 1e-17]]))
+    low, high = turn_z_to(1.0, 0.0, -1e-17), turn_z_to(1.0, 0.0, 1e-17)
     assert_allclose(low, high, atol=1e-15)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import MessageLoss, Silence, for_native
+from gne_mj.games import velocity_game
 from gne_mj.loops import faults as native
+from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
@@ -98,6 +101,24 @@ def test_shares_of_a_total_are_everybodys():
     y = np.full((2, 10), 0.2)
     found = shares(game, {"action": y, "total_power": np.array([2.0, 2.75])})
     assert np.allclose(found, np.array([[0.8], [1.1]]) * np.ones(10))
+
+
+@pytest.mark.parametrize(
+    ("high", "low", "values", "expected"),
+    [
+        (2.0, None, [1.0, -4.0, 2.5], [0.5, -2.0, 1.25]),
+        (None, -2.0, [1.0, -1.0, -3.0], [-0.5, 0.5, 1.5]),
+        (None, 0.0, [1.0, 0.0, 2.0], [np.nan] * 3),  # no part of the way to 0 is known
+        (4.0, 2.0, [3.0, 2.0, 4.5], [0.0, 1.0, 1.5]),
+        (None, None, [1.0, 2.0, 3.0], [np.nan] * 3),
+    ],
+)
+def test_shares_go_by_the_bounds_there_are(high, low, values, expected):
+    quantity = Quantity("it", "it", "", lambda y: y, each="agent", bound=high, lower_bound=low)
+    game = velocity_game(3, 3.0, 3.0)
+    game = replace(game, quantities=(quantity,))
+    row = np.array([values])
+    assert np.allclose(shares(game, {"action": row, "it": row}), [expected], equal_nan=True)
 
 
 def test_shares_of_edges_are_the_greatest_of_an_agents():

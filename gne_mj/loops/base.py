@@ -43,6 +43,10 @@ class Samples:
         names = [each.name for each in fields(cls)]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
+    def thinned(self, every: int) -> "Samples":
+        """Every so many-th row."""
+        return Samples(*(getattr(self, each.name)[::every] for each in fields(self)))
+
     def first(self, rows: int) -> "Samples":
         """So many rows; all but some of the last ones if negative."""
         return Samples(*(getattr(self, each.name)[:rows] for each in fields(self)))

@@ -49,11 +49,11 @@ class Fleet:
                     f"the run has recorded {recorded.shape[1]}: the robots' files have changed",
                 )
             return recorded
-        state, at = values["state"], self.plant.places.T
-        extension, _, _, position = np.moveaxis(state, -1, 0)
+        state, at = values["state"], self.plant.places
+        extension, position = state[:, :, 0], state[:, :, 3]
         found = np.zeros((len(state), self.plant.model.nq))
-        found[:, at[MAIN_Q]] = position
-        found[:, at[APPENDAGE_Q]] = position - extension
+        found[:, at[:, MAIN_Q]] = position
+        found[:, at[:, APPENDAGE_Q]] = position - extension
         return found
 
     @property

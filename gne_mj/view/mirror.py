@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.native import compiled, kernel
 from gne_mj.view.shapes import (
     Group,
     Json,
@@ -87,7 +88,12 @@ class Mirror:
         self._joints, self._joint_rows = self._fixed_tendons()
         self._spatial = bool(np.any(segments[~self._is_fixed()]))
 
+        self._wraps, self._wrapped = b"", (first[:0], first[:0])
+
         world, *self.items = self._paths(prefix)
+        self._rest = np.zeros((len(self.items), 8))
+        self._rest[:, QUATERNION.start] = 1.0
+        self._rest[: len(self._bodies), LENGTH] = 1.0
         paths = np.full(model.nbody, world, dtype=object)
         paths[self._bodies] = self.items[: len(self._bodies)]
         parts: dict[str, list[Part]] = {}
@@ -131,20 +137,17 @@ class Mirror:
         """
         model, data = self.model, self._data
         data.qpos[:] = qpos
-        mocap = self._mocap if mocap is None else np.asarray(mocap, dtype=np.float64)
-        data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
+        if model.nmocap:
+            mocap = self._mocap if mocap is None else np.asarray(mocap, dtype=np.float64)
+            data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
         mujoco.mj_kinematics(model, data)
-        poses = np.zeros((len(self.items), 8))
-        poses[:, QUATERNION.start] = 1.0
-        bodies = poses[: len(self._bodies)]
-        bodies[:, POSITION] = data.xpos[self._bodies]
-        bodies[:, QUATERNION] = data.xquat[self._bodies]
-        bodies[:, LENGTH] = 1.0
+        poses = self._rest.copy()
+        _place(poses, self._bodies, data.xpos, data.xquat)
         if len(self._joints):
-            anchors = data.xanchor[self._joints]
-            _stretch(poses, self._joint_rows, anchors[:, 0], anchors[:, 1], least=APART)
+            _stretch(poses, self._joint_rows, data.xanchor, *self._joints.T, APART)
         if self._spatial:
-            _stretch(poses, *self._spatial_segments())
+            rows, starts = self._spatial_segments()
+            _stretch(poses, rows, data.wrap_xpos.reshape(-1, 3), starts, starts + 1, 0.0)
         return poses
 
     def draw(self, visualizer: Any) -> None:
@@ -252,18 +255,21 @@ class Mirror:
             rows.append(self._first[tendon] + np.arange(len(places)))
         return np.concatenate(joints), np.concatenate(rows)
 
-    def _spatial_segments(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Rows of poses, starts and ends (m) of the segments that spatial tendons have now."""
+    def _spatial_segments(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Rows of poses, and the wrap points that the segments of spatial tendons begin at now."""
         model, data = self.model, self._data
         mujoco.mj_tendon(model, data)  # its Jacobians, not needed here, would want mj_comPos
+        wraps = data.ten_wrapnum.tobytes() + data.wrap_obj.tobytes()
+        if wraps == self._wraps:  # as ever, but where a tendon meets or leaves a geom
+            return self._wrapped
         tendon = np.repeat(np.arange(model.ntendon), data.ten_wrapnum)
-        points = data.wrap_xpos.reshape(-1, 3)[: len(tendon)]
         whole = data.wrap_obj.ravel()[: len(tendon)] != -2  # at a pulley
         whole &= self._segments[tendon] > 0
         starts = np.flatnonzero(whole[:-1] & whole[1:] & (tendon[:-1] == tendon[1:]))
         owner = tendon[starts]
         rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        return self._first[owner] + rank, points[starts], points[starts + 1]
+        self._wraps, self._wrapped = wraps, (self._first[owner] + rank, starts)
+        return self._wrapped
 
     def _springs(self) -> set[int]:
         """Spatial tendons with a stiffness, from one site straight to another."""
@@ -305,34 +311,46 @@ def _shown(model: mujoco.MjModel, what: str) -> list[int]:
     return np.flatnonzero((group < GROUPS) & (_colours(model, rgba, matid)[:, 3] > 0)).tolist()
 
 
-def _stretch(
-    poses: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    *,
-    least: float = 0.0,
-) -> None:
-    """Lay segments from (n, 3) to (n, 3); one shorter than ``least`` (m) is hidden."""
-    length = np.linalg.norm(end - start, axis=1)
-    direction = (end - start) / np.maximum(length, np.finfo(float).tiny)[:, None]
-    poses[rows, POSITION] = start
-    poses[rows, QUATERNION] = turning_z_to(direction)
-    poses[rows, LENGTH] = np.where(length >= least, length, 0.0)
+@compiled
+def _place(poses, bodies, xpos, xquat):
+    """Put bodies, the first rows of poses, where MuJoCo has them."""
+    for row in range(len(bodies)):
+        body = bodies[row]
+        for k in range(3):
+            poses[row, k] = xpos[body, k]
+        for k in range(4):
+            poses[row, 3 + k] = xquat[body, k]
 
 
-def turning_z_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 4) quaternions w x y z that take z the shortest way to unit vectors (n, 3); zeros: none.
+@compiled
+def _stretch(poses, rows, points, starts, ends, least):
+    """Lay segments from points to points, given by their numbers; hide those shorter than least."""
+    for n in range(len(rows)):
+        row, start, end = rows[n], starts[n], ends[n]
+        x = points[end, 0] - points[start, 0]
+        y = points[end, 1] - points[start, 1]
+        z = points[end, 2] - points[start, 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        for k in range(3):
+            poses[row, k] = points[start, k]
+        if length > 0.0:
+            w, i, j, k = turn_z_to(x / length, y / length, z / length)
+            poses[row, 3], poses[row, 4], poses[row, 5], poses[row, 6] = w, i, j, k
+        poses[row, 7] = length if length >= least else 0.0
 
-    They depend continuously on the direction but at -z, where no choice would.
+
+@kernel
+def turn_z_to(x, y, z):
+    """The quaternion w x y z that takes z the shortest way to a unit vector.
+
+    It depends continuously on the direction but at -z, where no choice would.
     """
-    x, y, z = direction.T
     across = x * x + y * y
-    # 1 + z, which loses all digits near -z where it is written so
-    w = np.where(z >= 0, 1 + z, across / (1 + np.abs(z)))
-    quaternion = np.column_stack([w, -y, x, np.zeros_like(w)])
-    quaternion[(z < 0) & (across < 1e-30)] = 0.0, 1.0, 0.0, 0.0
-    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    w = 1.0 + z if z >= 0.0 else across / (1.0 - z)  # 1 + z would lose all digits near -z
+    size = np.sqrt(w * w + across)
+    if size <= 1e-15:
+        return 0.0, 1.0, 0.0, 0.0
+    return w / size, -y / size, x / size, 0.0
 
 
 def rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -60,7 +60,7 @@ class Scene:
         if not found:
             samples = len(next(iter(values.values()))["action"])
             return np.zeros((samples, 0, 8))
-        return np.concatenate(found, axis=1)
+        return found[0] if len(found) == 1 else np.concatenate(found, axis=1)
 
     def arrays(self, values: Mapping[str, Values]) -> Arrays:
         """What the page draws besides at samples, of all systems."""

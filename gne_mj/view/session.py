@@ -11,27 +11,27 @@ from typing import Any
 
 import numpy as np
 from meshcat import Visualizer
+from numpy.typing import NDArray
 
 from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
-from gne_mj.loops.base import Present, Samples
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System
-from gne_mj.trajectory import Trajectory, variables_of
+from gne_mj.trajectory import Trajectory, estimates_of
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
 from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
-from gne_mj.view.stage import Stage
+from gne_mj.view.stage import ESTIMATING, Stage
 
 FRAME = 1 / 60  # s between frames, at best
-SHARE = 0.03  # of the time at most goes into frames while a run is as fast as it can
+SHARE = 0.02  # of the time at most goes into frames while a run is as fast as it can
 SLOWEST = 0.5  # s between frames, at worst
 HISTORY = 1.0  # s between histories, while frames are far apart
-ROWS = 3000  # of a history at most
+ENTRIES, LEAST_ROWS = 100_000, 200  # actions in a history, but at least so many samples of them
 PIECE = 0.05  # s of computing between looks at what the page asks for
 FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
 
@@ -301,9 +301,10 @@ class Session:
 
     def _history(self) -> bytes:
         """What was recorded so far, for the plots."""
-        recorded = {name: run.recorded() for name, run in self.simulation.runs.items()}
+        columns = sum(system.game.actions for system in self.simulation.systems)
+        most = max(LEAST_ROWS, ENTRIES // columns)
+        recorded = {name: run.recorded(most) for name, run in self.simulation.runs.items()}
         time, _ = max(recorded.values(), key=lambda found: len(found[0]))
-        time = time[:: max(1, len(time) // ROWS)]
         values = {}
         for name, (own, variables) in recorded.items():
             rows = np.clip(np.searchsorted(own, time), 0, max(len(own) - 1, 0))
@@ -328,22 +329,25 @@ class Session:
         missed, self._missed = self.server.dropped - self._missed, self.server.dropped
         # where frames are too few to draw plots of, these are of what is recorded
         if (missed or passed > self.simulation.clock.sample_period) and started > self._history_due:
+            started = real_time.perf_counter()
             self.server.publish(self._history())
-            self._history_due = started + HISTORY
+            cost = real_time.perf_counter() - started
+            self._history_due = started + max(HISTORY, cost / SHARE)
 
     def _frame(self) -> bytes:
         """The present instant."""
         simulation = self.simulation
         values = {name: _now(run) for name, run in simulation.runs.items()}
         rows = self._scene.arrays(values)
+        states = {name: self._state(name) for name in simulation.runs}
+        time = simulation.time
         for name, run in simulation.runs.items():
-            gone = simulation.time > run.loop.time + 1e-9
-            cut(rows, name, np.array([gone]))
-            if agents := self._state(name)["exit_agents"]:
-                mark_outside(rows, name, agents, np.array([True]))
+            if not run.inside:
+                cut(rows, name, np.array([time > run.loop.time + 1e-9]))
+                mark_outside(rows, name, states[name]["exit_agents"], np.array([True]))
         arrays = {name: row[0] for name, row in rows.items()}
         arrays["poses"] = self._scene.poses(values)[0]
-        step = simulation.clock.steps(simulation.time)
+        step = simulation.clock.steps(time)
         for stage in self._scene.stages:
             own = simulation.runs[stage.system.name].loop.time
             arrays |= stage.messages(
@@ -352,12 +356,12 @@ class Session:
         self._messages_from = step
         meta = {
             "kind": "frame",
-            "time": simulation.time,
+            "time": time,
             "playing": self._playing and not simulation.ended,
             "speed": self._pacer.speed,
             "pace": self._pacer.measured,
             "ended": self._ended is not None,
-            "state": {name: self._state(name) for name in simulation.runs},
+            "state": states,
         }
         return pack(meta, arrays)
 
@@ -369,17 +373,22 @@ class Session:
         return status_now(run.system, run.loop.monitor)
 
 
-def _now(run: SystemRun) -> dict[str, np.ndarray]:
-    """The variables of one instant, with one row."""
-    present: Present = run.loop.present()
-    nothing = np.zeros((1, 0))
-    inputs = np.zeros((1, run.system.game.actions))
-    row = Samples(
-        present.state[None], inputs, present.memory[None], nothing, nothing,
-        present.configuration[None],
-    )  # fmt: skip
-    time = np.array([run.loop.time])
-    return {name: values for name, (_, values, _) in variables_of(run.system, time, row).items()}
+def _now(run: SystemRun) -> dict[str, NDArray[np.float64]]:
+    """The variables of one instant that a scene asks for, each with one row."""
+    system, present = run.system, run.loop.present()
+    game = system.game
+    y = present.state[None, :, system.agents.kind.OUTPUT]
+    values = {
+        "action": y,
+        "state": present.state[None],
+        "configuration": present.configuration[None],
+        "constraint": game.constraints(y),
+    }
+    for quantity in game.quantities:
+        values[quantity.name] = quantity.at(y, game.entries(quantity))
+    if system.law.information in ESTIMATING:
+        values["estimate"] = estimates_of(game, y, present.memory[None])
+    return values
 
 
 def _changed(run: SystemRun, scenario: Scenario, control: Control, value: float) -> System:

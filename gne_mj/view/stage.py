@@ -1,7 +1,7 @@
 """What a page shows of one system: words about it once, arrays of numbers from what is recorded."""
 
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, System
 from gne_mj.view.fleet import fleet_of
+
+ESTIMATING = ("partial", "distributed")  # information structures with estimates
 
 Arrays = dict[str, NDArray[Any]]
 Values = Mapping[str, NDArray[np.float64]]
@@ -73,7 +75,7 @@ class Stage:
     @property
     def has_estimates(self) -> bool:
         """Whether agents hold estimates of each other's actions."""
-        return self.system.law.information in ("partial", "distributed")
+        return self.system.law.information in ESTIMATING
 
     def arrays(self, values: Values) -> Arrays:
         """What the page draws at the samples of a trajectory's variables, by array name.
@@ -143,13 +145,9 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
     """
     found = np.full((len(values["action"]), game.agents), np.nan)
     for quantity in game.quantities:
-        entries = game.entries(quantity)
-        bounds = quantity.bounds(entries)
-        high = bounds.get(f"{quantity.name}_bound")
-        low = bounds.get(f"{quantity.name}_lower_bound")
-        used = _used(values[quantity.name].reshape(len(found), -1), high, low)
-        if used is None:
-            continue
+        middle, up, down = _range(game, quantity)
+        away = values[quantity.name].reshape(len(found), -1) - middle
+        used = np.fmax(away / up, away / down)
         if quantity.each != "constraint":
             found = np.fmax(found, used)  # one column each, or one for all
             continue
@@ -159,20 +157,20 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
     return found
 
 
-def _used(
-    values: NDArray[np.float64],
-    high: NDArray[np.float64] | None,
-    low: NDArray[np.float64] | None,
-) -> NDArray[np.float64] | None:
-    """Values (T, n) as a part of the way from the middle, or from 0, to their bounds."""
-    if high is not None and low is not None:
-        return np.abs(values - 0.5 * (high + low)) / (0.5 * (high - low))
-    bound = high if high is not None else low
-    if bound is None:
-        return None
-    bound = bound.reshape(-1) if high is not None else -bound.reshape(-1)
-    sign = 1.0 if high is not None else -1.0
-    return np.where(bound > 0, sign * values / np.where(bound > 0, bound, 1.0), np.nan)
+@lru_cache
+def _range(game: Game, quantity: Quantity) -> tuple[NDArray[np.float64], ...]:
+    """From where it is how far up, and down, to a quantity's bounds, each for its entries (n,).
+
+    From the middle of two bounds, or from 0 to the one that there is; nan where none says anything.
+    """
+    entries = game.entries(quantity)
+    bounds = quantity.bounds(entries)
+    nothing = np.full(entries, np.nan).reshape(-1)
+    high = bounds.get(f"{quantity.name}_bound", nothing).reshape(-1)
+    low = bounds.get(f"{quantity.name}_lower_bound", nothing).reshape(-1)
+    middle = np.where(np.isnan(high + low), 0.0, 0.5 * (high + low))
+    up, down = high - middle, low - middle
+    return middle, np.where(up > 0, up, np.nan), np.where(down < 0, down, np.nan)
 
 
 def _quantity(game: Game, quantity: Quantity) -> dict[str, Any]:
