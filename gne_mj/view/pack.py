@@ -57,14 +57,14 @@ def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled:
     entries, pieces, offset = [], [], 0
     for name, array in arrays.items():
         code = f"{array.dtype.kind}{array.dtype.itemsize}"
-        raw = np.ascontiguousarray(array, dtype=_DTYPES[code]).reshape(-1).view(np.uint8)
+        piece = array.astype(_DTYPES[code], copy=False).tobytes()
         mixed = shuffled and array.dtype.itemsize > 1
         if mixed:
-            raw = np.ascontiguousarray(raw.reshape(-1, array.dtype.itemsize).T)
+            of_entries = np.frombuffer(piece, dtype=np.uint8).reshape(-1, array.dtype.itemsize)
+            piece = of_entries.T.tobytes()
         entries.append(
             {"name": name, "dtype": code, "shape": array.shape, "offset": offset, "shuffled": mixed}
         )
-        piece = raw.tobytes()
         pieces.append(piece + bytes(_aligned(len(piece)) - len(piece)))
         offset += len(pieces[-1])
     header = json.dumps({"meta": meta, "arrays": entries}, allow_nan=False).encode()

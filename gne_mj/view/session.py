@@ -28,7 +28,7 @@ from gne_mj.view.server import Browser, Server
 from gne_mj.view.stage import ESTIMATING, Stage
 
 FRAME = 1 / 60  # s between frames, at best
-SHARE = 0.02  # of the time at most goes into frames while a run is as fast as it can
+SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can
 SLOWEST = 0.5  # s between frames, at worst
 HISTORY = 1.0  # s between histories, while frames are far apart
 ENTRIES, LEAST_ROWS = 100_000, 200  # actions in a history, but at least so many samples of them

@@ -79,7 +79,7 @@ def watched(count: int) -> Iterator[Session]:
 
 
 def frame_time(session: Session) -> Callable[[], float]:
-    """Median ms of processor time that a frame takes of the simulation's and the server's thread."""
+    """Median ms of processor time that a frame takes of both threads."""
     making: list[float] = []
     sending: list[float] = []
 
