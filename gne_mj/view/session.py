@@ -57,7 +57,7 @@ class Session:
     ) -> None:
         self._tables = scenario.model_dump(mode="json", exclude_none=True)
         self._changes: dict[str, Any] = {}
-        self._title, self._pacer = title, Pacer(speed)
+        self._pacer = Pacer(speed)
         self._ended: Trajectory | None = None
         self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
@@ -260,7 +260,7 @@ class Session:
             self.simulation.change(system, what, key=control.key, value=value)
             self._tell_interventions()
         else:
-            self._notice("This holds from the next start on: the run has ended.", level="info")
+            self._notice("This holds from the next start on: its run has ended.", level="info")
         self._scenario = scenario
         self._changes[changed] = given
 
