@@ -117,7 +117,7 @@ def test_the_slider_drives_scene_and_plots(page, served, paper):
     data = paper["robots"].interp(time=now)
     place = position(page, "meshcat/robots/robot_5/main")
     assert np.allclose(place[0], data["position"][4], atol=CLOSE)
-    assert page.locator("#time").inner_text() == f"{now:.2f}"
+    until(page, "text => document.getElementById('time').textContent === text", arg=f"{now:.2f}")
 
 
 def test_plots_have_the_bounds_and_all_lines(page, served):
@@ -145,7 +145,7 @@ def test_keys_and_buttons_drive_a_replay(page, recorded, served):
     page.keyboard.press("Space")
     until(page, "window.gne.time() > 1.1")
     page.keyboard.press("Space")
-    assert not page.evaluate("window.gne.state().playing")
+    until(page, "!window.gne.state().playing")
     page.keyboard.press("r")
     until(page, "window.gne.time() === 0")
     before = page.evaluate("window.gne.state().theme")
@@ -242,9 +242,11 @@ def test_live_robots_are_where_the_simulation_has_them(page, recorded):
         until(page, "t => window.gne.time() > t + 0.04", arg=paused)
         assert live.simulation.time == pytest.approx(paused + 0.05)
         state = live.simulation.runs["robots"].loop.present().state
-        for agent in range(5):
-            place = position(page, f"meshcat/robots/robot_{agent + 1}/main")
-            assert np.allclose(place[0], state[agent, 3], atol=CLOSE)
+        for agent in range(5):  # as soon as that frame is drawn
+            there = "([item, x]) => Math.abs(window.gne.position(item)[0] - x) < 1e-6"
+            until(
+                page, there, arg=[f"meshcat/robots/robot_{agent + 1}/main", float(state[agent, 3])]
+            )
         until(page, "window.gne.plots[0].samples > 10")
         page.keyboard.press("Space")
         until(page, "window.gne.state().playing")
@@ -300,7 +302,7 @@ def test_a_run_that_has_ended_becomes_its_replay(page, recorded):
     with session(changes={"simulation.duration": 1.0}, speed=5.0) as live:
         opened(page, live.server.url)
         until(page, "window.gne.state().replaying")
-        assert not page.locator("#time-slider").is_disabled()
+        until(page, "!document.getElementById('time-slider').disabled")
         seek(page, 0.5)
         place = position(page, "meshcat/robots/robot_2/main")
         expected = gne_mj.run("velocity-sync", {"simulation.duration": 1.0})["robots"]

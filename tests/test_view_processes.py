@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from urllib.error import HTTPError
 from urllib.parse import urlparse
 from urllib.request import urlopen
 
@@ -130,7 +131,14 @@ def test_a_page_outlives_its_run_until_ctrl_c(start):
     while not report.endswith("\n}\n"):
         report += process.stdout.readline()
     assert json.loads(report)["status"] == "completed"
-    assert urlopen(url + "replay", timeout=5).read()
+    end = time.monotonic() + 10
+    while True:
+        try:
+            assert urlopen(url + "replay", timeout=5).read()
+            break
+        except HTTPError:  # it is made after the report
+            assert time.monotonic() < end
+            time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     assert_gone(process, url)
     assert process.returncode == 0
