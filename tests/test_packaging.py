@@ -14,6 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # Folders at the top of the checkout, and where their files are in the wheel.
 PLACES = {"gne_mj": "gne_mj", "controllers": "gne_mj/controllers", "models": "gne_mj/models"}
+SUFFIXES = {".py", ".xml", ".toml", ".json", ".html", ".js", ".css", ".txt"}
 LINKS = [ROOT / "gne_mj" / "controllers", ROOT / "gne_mj" / "models"]
 
 
@@ -23,7 +24,7 @@ def _shipped_sources() -> list[str]:
         f"{place}/{file.relative_to(ROOT / folder).as_posix()}"
         for folder, place in PLACES.items()
         for file in (ROOT / folder).rglob("*")
-        if file.suffix in {".py", ".xml", ".toml", ".json"} or file.name == "py.typed"
+        if file.suffix in SUFFIXES or file.name == "py.typed"
         if not any(link in file.parents for link in LINKS)
     ]
 
@@ -55,7 +56,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], list[str
 
 def test_every_package_is_listed() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
-    folders = {name.rpartition("/")[0] for name in _shipped_sources()}
+    modules = [name for name in _shipped_sources() if name.endswith(".py")]
+    folders = {name.rpartition("/")[0] for name in modules}
     assert {folder.replace("/", ".") for folder in folders} == set(settings["packages"])
 
 
