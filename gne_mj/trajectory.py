@@ -25,6 +25,8 @@ from gne_mj.verdicts import SUCCESSES
 if TYPE_CHECKING:
     import xarray
 
+ESTIMATING = ("partial", "distributed")  # information structures whose laws hold estimates
+
 # From bad to good: a run's status is the worst of its systems'.
 _ORDER = (
     "diverged",
@@ -264,7 +266,7 @@ def variables_of(
             samples.memory,
             {"long_name": "the law's memory"},
         )
-    elif samples.memory.shape[1]:
+    elif system.law.information in ESTIMATING:
         m = game.actions
         variables["estimate"] = (
             ("time", "estimating_agent", axis),

@@ -298,6 +298,24 @@ def live_wait(condition, patience=10.0):
     raise AssertionError("it never came true")
 
 
+def test_messages_run_along_their_links_and_can_be_switched_off(page, recorded):
+    changes = {
+        "controller": {"information": "partial", "graph": "ring", "mode": "sampled"},
+        "simulation.control_period": 0.02,
+        "faults": [{"type": "message-loss", "probability": 0.5}],
+    }
+    with session(changes=changes) as live:
+        opened(page, live.server.url)
+        until(page, "window.gne.state().pulses > 0")
+        page.keyboard.press("c")
+        until(page, "window.gne.state().pulses === 0")
+        page.keyboard.press("c")
+        until(page, "window.gne.state().pulses > 0")
+        page.keyboard.press("g")
+        until(page, "window.gne.state().ghosts !== null")
+        quiet(recorded, *origins(live.server))
+
+
 def test_a_run_that_has_ended_becomes_its_replay(page, recorded):
     with session(changes={"simulation.duration": 1.0}, speed=5.0) as live:
         opened(page, live.server.url)

@@ -247,6 +247,10 @@ def test_robots_of_which_no_body_moves_first_are_drawn_by_one_that_does(tmp_path
     meta, _ = unpack(replay_pack(trajectory))
     anchors = meta["systems"][0]["anchors"]
     assert [meta["items"][i] for i in anchors] == [f"meshcat/fleet/robot_{i}/cart" for i in (1, 2)]
+    old = gne_mj.Trajectory(trajectory.tree.copy(deep=True))
+    del old.tree["fleet"]["configuration"]
+    with pytest.raises(InvalidInput, match="an older version"):
+        replay_pack(old)
     more = BASED.replace('<body name="cart">', '<body name="more"><joint name="j"/>'
                          '<geom size="0.1"/></body><body name="cart">')  # fmt: skip
     (tmp_path / "based.xml").write_text(more, encoding="utf-8")

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gne_mj
+from gne_mj.certificate import status_now
 from gne_mj.scenario import load_scenario
 from gne_mj.view import Session
 from gne_mj.view.controls import controls_of
@@ -401,6 +402,8 @@ def test_an_exit_is_told_with_its_words():
     state = unpack(page.last_frame)[0]["state"]["robots"]
     assert trajectory.status == state["status"] == "left_feasible_set"
     assert "was violated" in state["message"]
+    (run,) = session.simulation.runs.values()
+    assert status_now(run.system, run.loop.monitor) == state  # live and at the end the same words
     assert state["exit_time"] == trajectory.reports["robots"]["exit"]["time"]
 
 

@@ -39,8 +39,17 @@ class Fleet:
         )
 
     def qpos(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """(T, nq) joint positions at the samples of a trajectory's variables."""
+        """(T, nq) joint positions in m or rad at the samples of a trajectory's variables.
+
+        Raises:
+            InvalidInput: they are not known, or are of other joints than the robots have.
+        """
         if isinstance(self.plant, MjcfPlant):
+            if "configuration" not in values:
+                raise InvalidInput(
+                    "trajectory", "without 'configuration'", "an older version has recorded it,"
+                    " without all of its robots' joints; run it again",
+                )  # fmt: skip
             recorded, now = values["configuration"], self.plant.model.nq
             if recorded.shape[1] != now:
                 raise InvalidInput(

@@ -18,14 +18,14 @@ from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System
-from gne_mj.trajectory import Trajectory, estimates_of
+from gne_mj.trajectory import ESTIMATING, Trajectory, estimates_of
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
 from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
-from gne_mj.view.stage import ESTIMATING, Stage
+from gne_mj.view.stage import Stage
 
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can

@@ -14,9 +14,8 @@ from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, System
+from gne_mj.trajectory import ESTIMATING
 from gne_mj.view.fleet import fleet_of
-
-ESTIMATING = ("partial", "distributed")  # information structures with estimates
 
 Arrays = dict[str, NDArray[Any]]
 Values = Mapping[str, NDArray[np.float64]]

@@ -96,6 +96,7 @@
       this.taken = [];
       this.marks = [];
       if (this.show.links) this.links(now);
+      else this.pulses = []; // or they would keep pictures coming
       for (const system of this.meta.systems)
         if (system.drawn_as === "bars") this.barTexts(system, instant);
         else if (this.show.labels) this.labels(system, instant);
