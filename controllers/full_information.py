@@ -18,6 +18,7 @@ class FullInformation(Law):
     """Gradient feedback of the penalised costs, all actions measured."""
 
     information: ClassVar[str] = "full"
+    guarded: ClassVar[bool] = True
 
     @property
     def kernels(self) -> ModuleType:

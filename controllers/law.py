@@ -47,11 +47,15 @@ class Law(ABC):
         information: name of the information structure; "custom" if it is none of the paper's.
         graph: over which agents communicate; None if they need not.
         propagates: whether its memory can be propagated, as mode sampled needs.
+        guarded: whether the barrier's whole gradient at the measured outputs is part of the input,
+            so that outputs which are measured and driven as they should be cannot leave the set in
+            continuous time, whatever the agents do.
     """
 
     information: ClassVar[str] = "custom"
     graph: Graph | None = None
     propagates: bool = True
+    guarded: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -74,6 +78,7 @@ class Law(ABC):
         numbers[settings.RHO] = rho
         numbers[settings.RATE] = self.estimate_rate
         numbers[settings.LINKS] = 0.0
+        numbers[settings.GUARDED] = float(self.guarded)
         return numbers
 
     def initial_memory(

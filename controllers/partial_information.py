@@ -43,6 +43,7 @@ class PartialInformation(Law):
     """
 
     information: ClassVar[str] = "partial"
+    guarded: ClassVar[bool] = True
     graph: Graph = field()  # hides the base class's default
     coupling: float = 1.0
     time_constant: float = 1.0

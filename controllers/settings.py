@@ -7,7 +7,8 @@ COUPLING = 3  # c, on the Laplacian in the action of [eq:nonlinearPIFeedback]
 TIME_CONSTANT = 4  # tau of the estimates under partial information, in s
 RATE = 5  # estimates follow d/dt = -RATE times their disagreement, in 1/s
 LINKS = 6  # where in the memory what was last heard over each link begins; 0: rows are read
-COUNT = 7
+GUARDED = 7  # 1: the whole barrier is at measured outputs, which hence stay inside
+COUNT = 8
 
 # Entries of a loop's ``work.now``: the penalty at this time; the first constraint whose g + t is
 # not negative at what the law sees (-1 for none), with that value; the step up to which faults

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from gne_mj import verdicts
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
+from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import SolverError
 from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
+from gne_mj.loops.division import PIECES
 from gne_mj.system import System
 from gne_mj.theory import Theorem
 from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
@@ -36,10 +38,14 @@ class Certificate:
             met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         exit: where the run left, the law and the input that led there; None if it did not.
+        division: mode continuous with a fixed step: how many steps were divided near the boundary
+            (:mod:`gne_mj.loops.division`), and the shortest piece in s, None if none was; None in
+            other modes.
         implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, how far
             outputs were from their prediction at control instants, periods in which dy+/du was not
             positive; None in other modes.
-        steps, end_time, wall_time: integration steps taken, simulated and real time.
+        steps, end_time, wall_time: integration steps taken, pieces of divided ones counted;
+            simulated and real time.
     """
 
     status: str
@@ -52,6 +58,7 @@ class Certificate:
     lyapunov: dict[str, Any]
     actuators: dict[str, Any]
     exit: dict[str, Any] | None
+    division: dict[str, Any] | None
     implicit: dict[str, Any] | None
     steps: int
     end_time: float
@@ -114,6 +121,7 @@ def certify_run(
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
         exit=_exit_report(system, monitor),
+        division=_division(system, monitor),
         implicit=_implicit(system, monitor),
         steps=int(monitor[watch.STEPS]),
         end_time=float(time[-1]),
@@ -184,6 +192,12 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     if code == watch.DIVERGED:
         return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
     constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
+    if code == watch.STEP_TOO_SMALL:
+        return (
+            EXITS[code],
+            f"1/{PIECES} of the timestep is still too long next to constraint '{constraint}' {at}"
+            f" (g = {value:.6g}): {_instead(system)} can go on there",
+        )
     if monitor[watch.EXIT_BETWEEN] > 0:
         at += ", between two control instants"
     if code == watch.LEFT_SET:
@@ -238,6 +252,23 @@ def _concerned(system: System, monitor: NDArray[np.float64]) -> list[int]:
     agent = int(monitor[watch.EXIT_AGENT])
     members = system.game.in_constraint[int(monitor[watch.EXIT_CONSTRAINT])]
     return [agent + 1] if agent >= 0 else sorted(i + 1 for i in members)
+
+
+def _instead(system: System) -> str:
+    """What does where steps cannot be divided finely enough."""
+    ways = ["mode 'implicit'", "a larger rho", "a smaller timestep"]
+    if isinstance(system.law, FullyDistributed) and system.engine == "ode":
+        ways.insert(0, "integrator 'rosenbrock'")
+    return f"{', '.join(ways[:-1])} or {ways[-1]}"
+
+
+def _division(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+    if system.mode != "continuous" or system.integrator == "rosenbrock":
+        return None
+    return {
+        "divided_steps": int(monitor[watch.DIVIDED]),
+        "smallest_step": float(monitor[watch.SMALLEST_STEP]) or None,
+    }
 
 
 def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:

@@ -32,6 +32,12 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
             f" {gap['time']:.4g} s"
         )
+    division = report["division"]
+    if division is not None and division["divided_steps"]:
+        rows["divided steps"] = (
+            f"{division['divided_steps']}, near the boundary, down to"
+            f" {division['smallest_step']:.3g} s"
+        )
     implicit = report["implicit"]
     if implicit is not None:
         rows["held inputs"] = (

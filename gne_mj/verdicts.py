@@ -16,6 +16,7 @@ EXITS = {
     watch.LEFT_SET: "left_feasible_set",
     watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
     watch.DIVERGED: "diverged",
+    watch.STEP_TOO_SMALL: "step_too_small",
 }
 STATUS = "<U28"  # dtype that holds every status, infeasible_start too
 SETTLED = 0.02  # of the initial distance

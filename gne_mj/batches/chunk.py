@@ -125,7 +125,7 @@ class Runner:
         if key not in self._structures:
             assert combination.system is not None
             self._structures[key] = Structure(
-                combination.system, combination.clock, self.threads, self.plan.chunk
+                combination.system, combination.clock, self.threads
             )
             while len(self._structures) > _STRUCTURES:
                 self._structures.popitem(last=False)

@@ -26,13 +26,12 @@ class Structure:
     Args:
         system, clock: of any of the runs.
         threads: how many native threads.
-        room: the most runs of one call.
 
     Attributes:
         loop: runs them.
     """
 
-    def __init__(self, system: System, clock: Clock, threads: int, room: int) -> None:
+    def __init__(self, system: System, clock: Clock, threads: int) -> None:
         self._plant: MujocoPlant | MjcfPlant | None = None
         self._native = system.integrator != "rosenbrock"
         self.loop: BatchLoop
@@ -49,7 +48,7 @@ class Structure:
             self._plant = system.mujoco_plant(clock, decorated=False)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
             alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
-            self.loop = MujocoBatch(self._plant, *kernels, faulty, 1 if alone else threads, room)
+            self.loop = MujocoBatch(self._plant, *kernels, faulty, 1 if alone else threads)
 
     def table(self, system: System, setup: Setup) -> Table | None:
         """The table of a run; None where each run has a loop of its own."""

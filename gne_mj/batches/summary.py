@@ -123,6 +123,18 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
             {**unit, "long_name": "y*"},
         ),
     }
+    if system.mode == "continuous" and system.integrator != "rosenbrock":
+        smallest = monitors[:, watch.SMALLEST_STEP]
+        found["divided_steps"] = (
+            ("run",),
+            monitors[:, watch.DIVIDED].copy(),
+            {"long_name": "integration steps divided near the boundary"},
+        )
+        found["smallest_step"] = (
+            ("run",),
+            where(smallest > 0, smallest),
+            {"long_name": "shortest piece of a divided step", **second},
+        )
     if system.mode == "implicit":
         for name, entry in (
             ("solutions", watch.SOLUTIONS),

@@ -7,6 +7,16 @@ not use costs nothing.
 from gne_mj.native import copy, kernel
 
 
+# Whether the law's action follows from the present state alone, whichever step comes next
+KNOWN_AHEAD = True
+
+
+@kernel
+def measured(problem):
+    """Whether the law has the outputs as they are."""
+    return True
+
+
 @kernel
 def begin(agent, problem, clock, step, stage, state, memory, work):
     """Nothing happens but that the outputs are what the law's memory is held at."""

@@ -20,6 +20,8 @@ PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
 # period in s; which random numbers
 TARGET, START, END, SIZE, SHAPE, PERIOD, STREAM = range(FAULT_COLUMNS)
 STEADY, SINE, SQUARE, RANDOM = range(4)
+# Whether the law's action follows from the present state alone, whichever step comes next
+KNOWN_AHEAD = False
 # Entries of ``Faults.numbers``; delays in control periods
 SEED, SENSOR_DELAY, MESSAGE_DELAY, NUMBERS = range(4)
 
@@ -64,6 +66,13 @@ def spread(faults, row, count):
 def count_of(clock, step):
     """Which control period a step belongs to (which step, in mode continuous)."""
     return step if clock.mode == 0 else step // clock.period
+
+
+@kernel
+def measured(problem):
+    """Whether the law has the outputs as they are: no noise, no bias, no delay."""
+    faults = problem.faults
+    return faults.pointer[NOISE] == faults.pointer[BIAS + 1] and faults.numbers[SENSOR_DELAY] == 0.0
 
 
 @kernel

@@ -9,6 +9,7 @@ from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import NOW, PENALTY, RHO, SHELL, SHELL_VALUE
 from gne_mj.game import GameData
 from gne_mj.graph import GraphData
+from gne_mj.loops import division
 from gne_mj.loops import monitor as watch
 from gne_mj.native import kernel
 
@@ -53,6 +54,7 @@ class Problem(NamedTuple):
     schedule: np.ndarray = np.zeros(4)  # of the penalty; all zero: settings[RHO] for all time
     order: Order = NO_ORDER
     faults: Faults = NO_FAULTS
+    size: np.ndarray = np.zeros(1)  # (1 + p,) division.typical_sizes; read in mode continuous only
 
 
 class Work(NamedTuple):
@@ -71,6 +73,7 @@ class Work(NamedTuple):
     seen: np.ndarray  # (m,) outputs as the law sees them
     acts: np.ndarray  # (m,) inputs with pushes, which move the plant
     history: np.ndarray  # past states and inputs, where sensors are late
+    division: np.ndarray  # of steps, mode continuous: see gne_mj.loops.division
     solver: np.ndarray  # of mode implicit
 
 
@@ -88,7 +91,8 @@ NO_SIZES = Sizes()
 def work_sizes(actions, constraints, agents, history, solver):
     """Lengths of the arrays of :class:`Work`, in its order."""
     m, p = actions, constraints
-    return p, p, m, m, m, m, m, 1, scratch_length(agents), NOW, m, m, history, solver
+    divided = division.length(m, p)
+    return p, p, m, m, m, m, m, 1, scratch_length(agents), NOW, m, m, history, divided, solver
 
 
 def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> Work:

@@ -29,7 +29,7 @@ PROPAGATOR = GRAPH + len(GraphData._fields)
 SCHEDULE = PROPAGATOR + 3
 ORDER = SCHEDULE + 1
 FAULTS = ORDER + len(Order._fields)
-SETTINGS, LIMIT, EQUILIBRIUM, PARAMETERS, REST, STEP, CLOCK = range(FAULTS + 3, FAULTS + 10)
+SETTINGS, LIMIT, EQUILIBRIUM, SIZE, PARAMETERS, REST, STEP, CLOCK = range(FAULTS + 3, FAULTS + 11)
 # Entries of STEP: what a loop is made of
 (
     ACTIONS, CONSTRAINTS, AGENTS, STATES, MEMORY, EVALUATIONS, PERIOD, MODE, HISTORY, SOLVER,
@@ -92,6 +92,7 @@ def table_arrays(
         problem.settings,
         problem.limit,
         problem.equilibrium,
+        problem.size,
         np.ascontiguousarray(parameters),
         np.ascontiguousarray(setup.rest),
         np.array(steps, dtype=np.int64),
@@ -147,6 +148,7 @@ def problem_in(table):
             integers(table, ORDER + 4),
         ),
         faults_in(table),
+        floats(table, SIZE),
     )
 
 
@@ -184,7 +186,7 @@ def parts_of(room, start, steps):
     monitor = room[start + MONITOR : at]
     u = room[at : at + m]
     at += m
-    n0, n1, n2, n3, n4, n5, n6, n7, n8, n9, n10, n11, n12, n13 = work_sizes(
+    n0, n1, n2, n3, n4, n5, n6, n7, n8, n9, n10, n11, n12, n13, n14 = work_sizes(
         m, p, agents, steps[HISTORY], steps[SOLVER]
     )
     a1 = at + n0
@@ -200,7 +202,8 @@ def parts_of(room, start, steps):
     a11 = a10 + n10
     a12 = a11 + n11
     a13 = a12 + n12
-    end = a13 + n13
+    a14 = a13 + n13
+    end = a14 + n14
     work = Work(
         room[at:a1],
         room[a1:a2],
@@ -215,6 +218,7 @@ def parts_of(room, start, steps):
         room[a10:a11],
         room[a11:a12],
         room[a12:a13],
-        room[a13:end],
+        room[a13:a14],
+        room[a14:end],
     )
     return monitor, u, work, room[end:]

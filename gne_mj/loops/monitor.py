@@ -16,7 +16,7 @@ EXIT_AGENT = 3  # whose estimate left; -1 for the true profile
 EXIT_CONSTRAINT = 4
 EXIT_VALUE = 5
 EXIT_STAGE = 6  # 0: at a step's start; more: at a later stage of a step, EXIT_TIME being its time
-STEPS = 7
+STEPS = 7  # pieces of divided steps included
 TIME = 8  # of the last observation
 STORAGE = 9  # V at the last observation
 STORAGE_START = 10
@@ -37,9 +37,13 @@ PREDICTION = 23  # greatest |y - predicted y| at a control instant
 PREDICTION_TIME = 24
 NOT_MONOTONE = 25  # periods with dy+/du not positive in some channel
 NOT_MONOTONE_TIME = 26
-HEADER = 27
+# Mode continuous, see gne_mj.loops.division
+DIVIDED = 27  # steps that were divided
+SMALLEST_STEP = 28  # length in s of the shortest piece of one; 0 if none was divided
+HEADER = 29
 
-INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED = 0, 1, 2, 3
+# STEP_TOO_SMALL: the boundary is so near that even the finest pieces of a step do not do
+INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL = 0, 1, 2, 3, 4
 
 
 @kernel
@@ -70,6 +74,13 @@ def leave(monitor, code, time, agent, constraint, value, stage):
         monitor[EXIT_CONSTRAINT] = constraint
         monitor[EXIT_VALUE] = value
         monitor[EXIT_STAGE] = stage
+
+
+@kernel
+def forget_exit(monitor):
+    """Take a latched exit back: the piece of a step that it was seen in is not taken."""
+    for entry in range(EXIT, EXIT_STAGE + 1):
+        monitor[entry] = 0.0
 
 
 @kernel

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
 from gne_mj.game import Game
-from gne_mj.loops import explicit, faultless
+from gne_mj.loops import division, explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import NO_SIZES, Sizes
@@ -58,6 +58,7 @@ from gne_mj.plants.native_mujoco import (
     callbacks,
     field,
     offsets,
+    set_number,
     step_address,
     table_of,
 )
@@ -75,6 +76,24 @@ def split(rest, steps):
     return rest[:size], rest[size : 2 * size], rest[2 * size :]
 
 
+@kernel
+def save(kept, row):
+    """Copy arrays into a row, one behind the other."""
+    at = 0
+    for part in kept:
+        copy(part, row[at : at + len(part)])
+        at += len(part)
+
+
+@kernel
+def restore(row, kept):
+    """The way back."""
+    at = 0
+    for part in kept:
+        copy(row[at : at + len(part)], part)
+        at += len(part)
+
+
 @cache
 def build(
     at: Offsets,
@@ -84,7 +103,7 @@ def build(
     acting: ModuleType,
     faults: ModuleType,
 ) -> tuple[Any, ...]:
-    """The callbacks for control and memory, the native loop and its last observation.
+    """The callbacks for control and memory, and the native loop.
 
     Args:
         at: where MuJoCo keeps what.
@@ -116,13 +135,13 @@ def build(
         userdata[start + STAGE_NOW] = 0 if last else stage + 1
         if stage > 0 and mode != CONTINUOUS:
             return
-        problem, clock = problem_in(table), clock_in(table)
-        h = clock.h
-        time = step * h
+        problem, clock, divided = problem_in(table), clock_in(table), work.division
+        time, length = division.begins(divided, step, clock.h), division.piece(divided, clock.h)
         if stage > 0:
-            time += h if stage == 3 else 0.5 * h
+            time += length if stage == 3 else 0.5 * length
             state = later
-        fleet.gather(at, struct, table, state)
+        if stage > 0 or divided[division.KNOWN] == division.NOTHING:
+            fleet.gather(at, struct, table, state)
         channels = channels_in(table, m, states)
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
         context = (at, address_of(model), struct, table)
@@ -131,9 +150,11 @@ def build(
             stage, storage, state, memory, u, monitor, work,
         )  # fmt: skip
         block = np.int64(userdata[start + RECORDER])
-        if good and stage == 0 and block > 0:
+        if good and stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
             qpos = field(struct, at.qpos, sizes[NQ])
             record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
+        if good and mode == CONTINUOUS:
+            division.note(stage, problem, work)
         places = integers(table, PLACES)
         acts = faults.push(problem, clock, step, work.u, work.acts)
         for r in range(m):
@@ -154,60 +175,75 @@ def build(
         law.rate(problem_in(table), seen, memory, rates)
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
-    def advance(mj_step, model, data, qpos, qvel, act, before, count):
-        """So many steps; an exit sets qpos, qvel and act back to the start of the step it is of."""
-        _ = source
-        table = table_of(at, model, data)
-        sizes, steps = integers(table, SIZES), integers(table, STEP)
-        userdata = field(data, at.userdata, sizes[NUSERDATA])
-        monitor = parts_of(userdata, sizes[ROOM], steps)[0]
-        nq, nv = len(qpos), len(qvel)
-        for done in range(count):
-            copy(qpos, before[:nq])
-            copy(qvel, before[nq : nq + nv])
-            copy(act, before[nq + nv :])
-            call(mj_step, model, data)
-            if monitor[watch.EXIT] != watch.INSIDE:
-                copy(before[:nq], qpos)
-                copy(before[nq : nq + nv], qvel)
-                copy(before[nq + nv :], act)
-                return done
-        return count
+    def advance(mj_step, model, data, kept, saved, count):
+        """So many steps; an exit sets what MuJoCo moves back to the start of the step it is of.
 
-    def finish(model, data):
+        Args:
+            mj_step, model, data: addresses.
+            kept: views of all that a step of MuJoCo starts from.
+            saved: (2, their entries), for the starts of a piece of a step and of the step.
+            count: steps.
+        """
         _ = source
         table = table_of(at, model, data)
         sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m = steps[ACTIONS]
         userdata = field(data, at.userdata, sizes[NUSERDATA])
-        monitor, u, work, rest = parts_of(userdata, sizes[ROOM], steps)
-        state, _later, memory = split(rest, steps)
-        step = np.int64(userdata[sizes[ROOM] + STEP_NOW])
-        if steps[MODE] == CONTINUOUS:
-            memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
-        fleet.gather(at, data, table, state)
-        channels = channels_in(table, m, states)
-        # the agents' storage as the ODE loop has it: the fleet's own figures are of the last step
-        storage = 0.0
-        for r in range(m):
-            x = state[r * states : (r + 1) * states]
-            storage += agent.storage(channels.parameters[r], x, channels.rest[r])
-        problem, clock, context = problem_in(table), clock_in(table), (at, model, data, table)
-        good = look(
-            acting, faults, plant, context, agent, law, game, problem, channels, clock,
-            step * clock.h, step, 0, storage, state, memory, u, monitor, work,
-        )  # fmt: skip
-        block = np.int64(userdata[sizes[ROOM] + RECORDER])
-        if good and block > 0:
-            qpos = field(data, at.qpos, sizes[NQ])
-            record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
-        return good
+        start, moving = sizes[ROOM], steps[MODE] == CONTINUOUS
+        monitor, u, work, rest = parts_of(userdata, start, steps)
+        state, channels = split(rest, steps)[0], channels_in(table, steps[ACTIONS], states)
+        memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
+        problem, clock, divided = problem_in(table), clock_in(table), work.division
+        step, done, h = np.int64(userdata[start + STEP_NOW]), 0, clock.h
+        divided[division.KNOWN] = division.NOTHING
+        while done < count:
+            save(kept, saved[0])
+            if not moving:
+                call(mj_step, model, data)
+                if monitor[watch.EXIT] != watch.INSIDE:
+                    restore(saved[0], kept)
+                    break
+                done += 1
+                continue
+            if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
+                copy(saved[0], saved[1])
+            length = division.piece(divided, h)
+            set_number(model, at.timestep, length)
+            set_number(data, at.time, division.begins(divided, step, h))
+            call(mj_step, model, data)
+            good = monitor[watch.EXIT] == watch.INSIDE
+            if not good and monitor[watch.EXIT_STAGE] == 0.0:
+                restore(saved[0], kept)
+                break
+            if good:
+                fleet.refresh(model, data, table)
+                fleet.gather(at, data, table, state)
+                good = look(
+                    explicit, faults, plant, (at, model, data, table), agent, law, game, problem,
+                    channels, clock, division.ends(divided, step, h), step, division.END, 0.0,
+                    state, memory, u, monitor, work,
+                )  # fmt: skip
+            which = division.judge(steps[EVALUATIONS], length, problem, work) if good else 0
+            if good and which < 0:
+                if division.go_on(divided, h, monitor):
+                    step, done = step + 1, done + 1
+            else:
+                restore(saved[0], kept)
+                if divided[division.POSITION] == 0.0:
+                    copy(saved[0], saved[1])
+                if not division.halve(divided, monitor):
+                    division.give_up(faults, step, h, which, problem, work, monitor)
+                    restore(saved[1], kept)
+                    break
+            userdata[start + STEP_NOW] = step
+            userdata[start + STAGE_NOW] = 0.0
+        divided[division.KNOWN] = division.NOTHING
+        set_number(model, at.timestep, h)
+        return done
 
     return (
         callback(CALLBACK, control),
         callback(ACTIVATION, remember),
         compiled(advance),
-        compiled(finish),
     )
 
 
@@ -259,7 +295,7 @@ class MujocoLoop(ClosedLoop):
         faults: ModuleType = faultless,
     ) -> None:
         self.plant = plant
-        self._control, self._remember, self._advance, self._finish = build(
+        self._control, self._remember, self._advance = build(
             offsets(), plant.kernels, law, game, acting, faults
         )
         self._table = mujoco_table(plant, setup, plant.agents, len(memory))
@@ -268,8 +304,9 @@ class MujocoLoop(ClosedLoop):
         self._start = int(plant.table_arrays[SIZES][ROOM])
         self._memory = put_start(data, self._start, self._table, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
-        self._act = self._memory if moved else self._memory[:0]  # moved by the integrator
-        self._before = np.zeros(plant.model.nq + plant.model.nv + len(self._act))
+        self._remembers = moved  # by MuJoCo's integrator
+        self._kept = kept_of(data)
+        self._saved = np.zeros((2, sum(part.size for part in self._kept)))
         self.monitor, self._u, *_ = parts_of(data.userdata, self._start, sizes)
 
     @property
@@ -289,11 +326,11 @@ class MujocoLoop(ClosedLoop):
         data, first = self.plant.data, self._step
         recorder = self._recorder(samples, every)
         data.userdata[self._start + STAGE_NOW] = 0.0
-        remember = self._remember if len(self._act) else None
+        remember = self._remember if self._remembers else None
         with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
             steps = self._advance(
-                step_address(), self.plant.model._address, data._address, data.qpos, data.qvel,
-                self._act, self._before, samples * every,
+                step_address(), self.plant.model._address, data._address, self._kept, self._saved,
+                samples * every,
             )  # fmt: skip
         # The callback counts steps, but one that ended in an exit was not taken.
         data.userdata[self._start + STEP_NOW] = first + steps
@@ -304,11 +341,12 @@ class MujocoLoop(ClosedLoop):
     def finish(self) -> Samples:
         """See the base class."""
         data = self.plant.data
-        state = self.plant.state  # first, since it brings a plant's sensors up to date
+        state = self.plant.state
         recorder = self._recorder(1, 1)
-        inside = self._finish(self.plant.model._address, data._address)
+        with callbacks(passive=self.plant.passive):
+            observe(self.plant, self._control, self._start)
         data.userdata[self._start + RECORDER] = 0.0
-        if inside:
+        if recorder.done[0]:
             return recorder.samples(0)
         none = np.full((1, len(self._u)), np.nan)
         struck = none[:, : len(self._u) * self._faulty]
@@ -347,6 +385,31 @@ class MujocoLoop(ClosedLoop):
         )  # fmt: skip
         userdata[self._start + RECORDER] = recorder.addresses[0]
         return recorder
+
+
+def observe(plant: "MujocoPlant | MjcfPlant", control: Any, start: int) -> None:
+    """Observe the present state without moving on, by the callback of a step's start.
+
+    Args:
+        plant: with mjData of a loop.
+        control: the loop's callback.
+        start: of its room in userdata.
+
+    The plant's callbacks must be installed.
+    """
+    model, data = plant.model, plant.data
+    plant.refresh()
+    step = data.userdata[start + STEP_NOW]
+    data.userdata[start + STAGE_NOW] = 0.0
+    control.ctypes(model._address, data._address)
+    data.userdata[start + STEP_NOW], data.userdata[start + STAGE_NOW] = step, 0.0
+
+
+def kept_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
+    """Views of all that a step of MuJoCo starts from, besides time, inputs and userdata."""
+    return (
+        data.qpos, data.qvel, data.act, data.qacc_warmstart, data.history, data.plugin_state
+    )  # fmt: skip
 
 
 def put_start(

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gne_mj.loops import explicit, faultless
+from gne_mj.loops import division, explicit, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import inside
@@ -47,6 +47,9 @@ from gne_mj.table import Table, floats_at, integers
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
+# Rates at four stages, a trial state, and the state at the start of a divided step
+SCRATCH_ROWS = 6
+
 # Mode implicit is held like sampled; what differs is how the input is found, a module of its own
 CONTINUOUS, HELD = 0, 1
 MODES = {"continuous": CONTINUOUS, "sampled": HELD, "implicit": HELD}
@@ -77,6 +80,9 @@ def look(
 ):  # fmt: skip
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
+    At the end of a piece of a step, mode continuous, what the next piece begins with is evaluated
+    and kept: outputs and slacks, and the law where its action does not depend on the step.
+
     One kernel for all stages keeps loops and MuJoCo's callback small, which is most of their speed
     and of the time to compile them.
 
@@ -89,7 +95,7 @@ def look(
         problem, channels, clock: as the loop has them.
         time: at the stage, in s.
         step: which step this is.
-        stage: 0 at its start; later ones are looked at in mode continuous only.
+        stage: 0 at its start; later ones, and division.END, in mode continuous only.
         storage: V^{x*} of the agents now (see :func:`stored`); read at stage 0.
         state: flat, channel after channel, at the stage.
         memory: the law's at the stage; own actions are written into it, and in the held modes it
@@ -101,22 +107,33 @@ def look(
         False if the run must end; the exit is then latched in the monitor.
     """
     y = work.y
-    measure(agent, state, channels.rest.shape[1], y)
+    known = work.division[division.KNOWN] if stage == 0 else float(division.NOTHING)
+    work.division[division.KNOWN] = division.NOTHING
     instant = clock.mode == CONTINUOUS or step % clock.period == 0
-    if not inside(game, problem, time, stage, y, work, monitor):
-        if not instant:
-            monitor[watch.EXIT_BETWEEN] = 1.0
-        return False
-    if instant:
+    if known == division.NOTHING:
+        measure(agent, state, channels.rest.shape[1], y)
+        if not inside(game, problem, time, max(stage, 0), y, work, monitor):
+            if not instant:
+                monitor[watch.EXIT_BETWEEN] = 1.0
+            return False
+    if stage == division.END and not faults.KNOWN_AHEAD:
+        work.division[division.KNOWN] = division.OUTPUTS
+        return True
+    if known == division.LAW:
+        faults.deliver(problem, clock, step, stage, work)
+    elif instant:
         if clock.mode != CONTINUOUS and work.stands[0] < step:  # a control period has passed
             law.propagate(problem, work.held, memory, work.scratch)
             work.stands[0] = step
         faults.begin(agent, problem, clock, step, stage, state, memory, work)
         if not acting.act(
             acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
-            stage, state, memory, work, monitor,
+            max(stage, 0), state, memory, work, monitor,
         ):  # fmt: skip
             return False
+        if stage == division.END:
+            work.division[division.KNOWN] = division.LAW
+            return True
         faults.deliver(problem, clock, step, stage, work)
     else:
         copy(u, work.u)
@@ -146,6 +163,32 @@ def stage_state(stage, h, state, k, trial):
         trial[r] = state[r] + length * k[stage - 1, r]
 
 
+@kernel
+def piece_end(
+    agent, faults, problem, channels, clock, step, length, u, state, k, trial, work, spare
+):  # fmt: skip
+    """Fill trial with the flat state at the end of a piece, mode continuous.
+
+    Args:
+        length: of the piece, in s.
+        u: (m,) inputs at its start.
+        state: flat, at its start.
+        k: (4, ...) rates at its stages.
+        spare: scratch for a step of Euler's method.
+    """
+    m, states = channels.rest.shape
+    if clock.method == RK4:
+        for r in range(len(state)):
+            rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
+            trial[r] = state[r] + length / 6.0 * rise
+        return
+    copy(state[: m * states], trial)
+    acts = faults.push(problem, clock, step, u, work.acts)
+    held_step(agent, channels.parameters, states, clock.method, length, trial, acts, spare)
+    for r in range(m * states, len(state)):  # Euler's method for the memory
+        trial[r] = state[r] + length * k[0, r]
+
+
 @cache
 def build(
     agent: ModuleType,
@@ -173,59 +216,81 @@ def build(
         if monitor[watch.EXIT] != watch.INSIDE:
             return 0
         state, scratch, h = rest[:n], rest[n:], clock.h
-        width = len(scratch) // 5
+        width = len(scratch) // SCRATCH_ROWS
         # of the state's own length, so that the memory behind the channels has its own too
         k, trial = scratch[: 4 * width].reshape((4, width)), scratch[4 * width : 4 * width + n]
+        begun, spare = scratch[5 * width : 5 * width + n], scratch[width : 2 * width]
         step, block = np.int64(room[STEP_NOW]), np.int64(room[RECORDER])
-        stages = 4 if clock.mode == CONTINUOUS and clock.method == RK4 and count > 0 else 1
-        for _substep in range(max(count, 1)):
+        moving = clock.mode == CONTINUOUS and count > 0
+        stages = 4 if moving and clock.method == RK4 else 1
+        divided, swapped, done, good = work.division, False, 0, True
+        divided[division.KNOWN] = division.NOTHING
+        while good:
+            if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
+                copy(state, begun)
+            time, length, stage = division.begins(divided, step, h), division.piece(divided, h), 0
             storage = stored(agent, channels, state)
-            for stage in range(stages):
-                now = state
-                if stage > 0:
-                    stage_state(stage, h, state, k, trial)
-                    now = trial
-                time = step * h + (0.0, 0.5 * h, 0.5 * h, h)[stage]
-                if not look(
-                    acting, faults, held_map, (), agent, law, game, problem, channels, clock,
-                    time, step, stage, storage, now, now[size:], u, monitor, work,
-                ):  # fmt: skip
-                    room[STEP_NOW] = step
-                    return 0
-                if stage == 0 and block > 0:
+            for point in range(stages + 1 if moving else 1):
+                now, stage, at = state, point, time
+                if point == stages:
+                    piece_end(
+                        agent, faults, problem, channels, clock, step, length, u, state, k, trial,
+                        work, spare,
+                    )  # fmt: skip
+                    now, stage, at = trial, division.END, division.ends(divided, step, h)
+                elif point > 0:
+                    stage_state(point, length, state, k, trial)
+                    now, at = trial, time + (0.5 * length, 0.5 * length, length)[point - 1]
+                good = look(
+                    acting, faults, held_map, (), agent, law, game, problem, channels, clock, at,
+                    step, stage, storage, now, now[size:], u, monitor, work,
+                )  # fmt: skip
+                if not good:
+                    break
+                if stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
                     record(
                         block, faults, agent, states, problem, clock, step, state[:size], u,
                         state[size:], work, state[:0],
                     )  # fmt: skip
-                if clock.mode == CONTINUOUS and count > 0:
+                if moving and point < stages:
+                    division.note(stage, problem, work)
                     acts = faults.push(problem, clock, step, work.u, work.acts)
                     seen = faults.choose(work.y, work.seen)
-                    rates(agent, law, problem, channels, now, acts, seen, k[stage, :n])
-            if count == 0:
-                return 1
-            if stages == 4:
-                for r in range(n):
-                    rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
-                    state[r] += h / 6.0 * rise
-            else:
+                    rates(agent, law, problem, channels, now, acts, seen, k[point, :n])
+            if count == 0 or (not good and stage == 0):
+                break
+            if not moving:
                 acts = faults.push(problem, clock, step, u, work.acts)
-                held_step(
-                    agent, channels.parameters, states, clock.method, h, state, acts,
-                    scratch[4 * width :],
-                )  # fmt: skip
-                if clock.mode == CONTINUOUS:  # Euler's method for the memory
-                    for r in range(size, n):
-                        state[r] += h * k[0, r]
-            step += 1
+                held_step(agent, channels.parameters, states, clock.method, h, state, acts, spare)
+                step, done = step + 1, done + 1
+                if done == count:
+                    break
+                continue
+            which = division.judge(stages, length, problem, work) if good else 0
+            if good and which < 0:
+                state, trial, swapped = trial, state, not swapped
+                if division.go_on(divided, h, monitor):
+                    step, done = step + 1, done + 1
+                    if done == count:
+                        break
+                continue
+            if divided[division.POSITION] == 0.0:
+                copy(state, begun)
+            good = division.halve(divided, monitor)
+            if not good:
+                division.give_up(faults, step, h, which, problem, work, monitor)
+                copy(begun, state)
+        if swapped:
+            copy(state, trial)
         room[STEP_NOW] = step
-        return 1
+        return 1 if good else 0
 
     return callback(LOOP, advance)
 
 
 @kernel
 def scratch_width(sizes):
-    """Entries of each of the five scratch rows behind state and memory."""
+    """Entries of each of the SCRATCH_ROWS rows behind state and memory."""
     m, states = sizes[ACTIONS], sizes[STATES]
     return max(m * states + sizes[MEMORY], m, 5 * states)
 
@@ -236,7 +301,12 @@ def room_length(sizes):
     needed = room_needed(
         sizes[ACTIONS], sizes[CONSTRAINTS], sizes[AGENTS], sizes[HISTORY], sizes[SOLVER]
     )
-    return needed + sizes[ACTIONS] * sizes[STATES] + sizes[MEMORY] + 5 * scratch_width(sizes)
+    return (
+        needed
+        + sizes[ACTIONS] * sizes[STATES]
+        + sizes[MEMORY]
+        + SCRATCH_ROWS * scratch_width(sizes)
+    )
 
 
 def ode_table(setup: Setup, agents: Agents, memory: int) -> Table:

@@ -7,7 +7,7 @@ import numpy as np
 
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
 from gne_mj.loops.layout import MONITOR, RECORDER
-from gne_mj.loops.ode import build, room_length, scratch_width
+from gne_mj.loops.ode import SCRATCH_ROWS, build, room_length, scratch_width
 from gne_mj.loops.recorder import FIRST
 from gne_mj.native import call_loop, compiled
 from gne_mj.plants.agents import Agents
@@ -52,7 +52,7 @@ class OdeBatch(BatchLoop):
         addresses = np.array([table.address for table in tables], dtype=np.int64)
         starts = np.stack([np.concatenate([c.state.ravel(), c.memory]) for c in cases])
         length = room_length(sizes)
-        state_at = length - starts.shape[1] - 5 * scratch_width(sizes)
+        state_at = length - starts.shape[1] - SCRATCH_ROWS * scratch_width(sizes)
 
         def piece(first: int) -> bool:
             part = slice(first, first + PIECE)

@@ -13,6 +13,9 @@ from gne_mj.table import integers
 PLACES, _, SIZES = range(3)
 NQ, NV, NU, _, NA = range(5)
 SENSORDATA, TWIN, MJ_STEP, MJ_FORWARD = range(7, 11)  # more entries of SIZES
+# Addresses of the functions that sensors of velocities need, in their order
+SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
+FIRST_OF_SENSORS, LAST_OF_SENSORS = 11, 13
 
 # A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
 # one, the joint's entry of qpos or -1, the actuator's of ctrl
@@ -31,6 +34,15 @@ def gather(at, data, table, state):
         position = places[r * PLACES_COUNT + POSITION_AT]
         state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
         state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
+
+
+@kernel
+def refresh(model, data, table):
+    """Bring sensors of velocities up to date, which are of the last step's start."""
+    sizes = integers(table, SIZES)
+    if sizes[MJ_FORWARD] != 0:
+        for function in range(FIRST_OF_SENSORS, LAST_OF_SENSORS + 1):
+            call(sizes[function], model, data)
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
 
+import copy
 import sys
-from typing import Any
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -13,7 +14,15 @@ from gne_mj.plants import mjcf_ahead, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import read_model
-from gne_mj.plants.mjcf_ahead import ACTUATOR, OUTPUT_AT, POSITION_AT, actuator_of, gather
+from gne_mj.plants.mjcf_ahead import (
+    ACTUATOR,
+    OUTPUT_AT,
+    POSITION_AT,
+    SENSOR_FUNCTIONS,
+    actuator_of,
+    gather,
+    refresh,
+)
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, run_steps
 from gne_mj.plants.native_mujoco import (
@@ -24,7 +33,7 @@ from gne_mj.plants.native_mujoco import (
 )
 from gne_mj.table import Table
 
-__all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "stored"]
+__all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
 
@@ -96,6 +105,7 @@ class MjcfPlant(Plant):
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
             model.na - memory, model.nsensordata, self._twin._address, step_address(),
             0 if self.measures_every_stage else step_address("mj_forward"),
+            *(step_address(name) for name in SENSOR_FUNCTIONS),
         )  # fmt: skip
         self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
         self._table = Table(self.table_arrays)
@@ -171,6 +181,19 @@ class MjcfPlant(Plant):
                 f" most {least:g}",
             )
 
+    def twin(self) -> Self:
+        """The same fleet with a model and data of its own, for another thread."""
+        other = copy.copy(self)
+        other.model = copy.copy(self.model)
+        other.data = mujoco.MjData(other.model)
+        return other
+
+    def refresh(self) -> None:
+        """Bring sensors of velocities up to date, which are of the last step's start."""
+        if not self.measures_every_stage:
+            for name in SENSOR_FUNCTIONS:
+                getattr(mujoco, name)(self.model, self.data)
+
     @property
     def output_joints(self) -> NDArray[np.int64]:
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
@@ -179,8 +202,7 @@ class MjcfPlant(Plant):
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, 2), a copy: outputs and positions."""
-        if not self.measures_every_stage:
-            mujoco.mj_forward(self.model, self.data)  # sensors are of the last step's start
+        self.refresh()
         at, sensor = self.places[:, OUTPUT_AT], self.data.sensordata
         output = [self.data.qvel[a] if a >= 0 else sensor[-1 - a] for a in at]
         position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places[:, POSITION_AT]]

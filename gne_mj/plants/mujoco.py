@@ -1,8 +1,9 @@
 """Flexible robots in MuJoCo: the fleet's model and data, its atan springs as native forces."""
 
+import copy
 import sys
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -63,6 +64,11 @@ def gather(at, data, table, state):
         state[4 * r + 1] = qvel[places[row + MAIN_V]]
         state[4 * r + 2] = qvel[places[row + APPENDAGE_V]]
         state[4 * r + 3] = position
+
+
+@kernel
+def refresh(model, data, table):
+    """Bring sensors up to date: none is read."""
 
 
 @kernel
@@ -223,6 +229,20 @@ class MujocoPlant(Plant):
             ("tendon_stiffness", tendons, parameters[:, :, 2]),
             ("tendon_damping", tendons, parameters[:, :, 4]),
         ]
+
+    def twin(self) -> Self:
+        """The same fleet with a model and data of its own, for another thread."""
+        other = copy.copy(self)
+        other.model = copy.copy(self.model)
+        other.data = mujoco.MjData(other.model)
+        return other
+
+    def refresh(self) -> None:
+        """Bring the springs' arctangents up to date, which are of the last step's start.
+
+        The callback must be installed.
+        """
+        mujoco.mj_passive(self.model, self.data)
 
     @property
     def output_joints(self) -> NDArray[np.int64]:

@@ -50,7 +50,9 @@ class Offsets(NamedTuple):
     qacc_warmstart: int
     sensordata: int
     userdata: int
+    time: int  # a number in mjData itself
     nuserdata: int  # in mjModel
+    timestep: int  # mjModel.opt.timestep, a number in mjModel itself
 
 
 @cache
@@ -67,9 +69,15 @@ def offsets() -> Offsets:
         <sensor><jointvel joint="j"/></sensor></mujoco>"""
     )
     data = mujoco.MjData(model)
-    names = [name for name in Offsets._fields if name != "nuserdata"]
+    names = [name for name in Offsets._fields if name not in ("time", "nuserdata", "timestep")]
     found = {name: _find(data._address, getattr(data, name).ctypes.data) for name in names}
-    result = Offsets(**found, nuserdata=_find(model._address, size))
+    data.time = model.opt.timestep = 0.7919
+    result = Offsets(
+        **found,
+        time=_find(data._address, _bits(0.7919)),
+        nuserdata=_find(model._address, size),
+        timestep=_find(model._address, _bits(0.7919)),
+    )
     read_back = _read_back()
     for mark, name in enumerate(names, start=1):
         array = getattr(data, name)
@@ -79,7 +87,16 @@ def offsets() -> Offsets:
     other = mujoco.MjModel.from_xml_string('<mujoco><size nuserdata="6133"/></mujoco>')
     if ctypes.c_int64.from_address(other._address + 8 * result.nuserdata).value != 6133:
         raise _unknown_layout("mjModel.nuserdata")
+    ctypes.c_double.from_address(data._address + 8 * result.time).value = 0.25
+    ctypes.c_double.from_address(model._address + 8 * result.timestep).value = 0.5
+    if data.time != 0.25 or model.opt.timestep != 0.5:
+        raise _unknown_layout("mjData.time or mjModel.opt.timestep")
     return result
+
+
+def _bits(number: float) -> int:
+    """A double as the 8-byte integer of the same bits."""
+    return int(np.float64(number).view(np.int64))
 
 
 def _unknown_layout(name: str) -> EngineError:
@@ -132,6 +149,18 @@ def field(typingctx: Any, struct: Any, offset: Any, length: Any) -> Any:
         return array_at(context, builder, kind, pointer, arguments[2])
 
     return kind(types.int64, types.int64, types.int64), codegen
+
+
+@intrinsic
+def set_number(typingctx: Any, struct: Any, offset: Any, number: Any) -> Any:
+    """Set the double at an offset in the struct at an address."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _at_word(context, builder, *arguments[:2])
+        builder.store(arguments[2], builder.inttoptr(place, arguments[2].type.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.float64), codegen
 
 
 def _at_word(context: Any, builder: Any, struct: Any, offset: Any) -> Any:

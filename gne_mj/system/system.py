@@ -26,6 +26,7 @@ from gne_mj.game import Game
 from gne_mj.loops import explicit, faultless, joint, local
 from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
+from gne_mj.loops.division import typical_sizes
 from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
 from gne_mj.loops.layout import Clock as LoopClock
 from gne_mj.loops.layout import Setup
@@ -222,6 +223,7 @@ class System:
             settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.equilibrium.action,
+            size=self._typical_sizes,
             propagator=(
                 no_propagator()
                 if self.mode == "continuous"
@@ -242,6 +244,12 @@ class System:
             ),
             *self._sizes,
         )
+
+    @property
+    def _typical_sizes(self) -> NDArray[np.float64]:
+        """Of outputs and slacks, at the start and at the equilibrium."""
+        ends = np.stack([self.start, self.equilibrium.action])
+        return typical_sizes(ends, -self.game.constraints(ends) - self.game.margins)
 
     @property
     def _sizes(self) -> Sizes:
