@@ -32,6 +32,7 @@ _ORDER = (
     "diverged",
     "left_feasible_set",
     "estimate_left_feasible_set",
+    "step_too_small",
     "interrupted",
     "completed",
     "converged",

@@ -1,19 +1,22 @@
 """How mode continuous divides steps, so that the integrator follows the law near the boundary.
 
 Where the barrier is stiff a whole step of an explicit method leaves the set that the law keeps. A
-step is then taken in pieces of 1/2, 1/4, ... 1/4096 of it. Each piece is looked at when it is done:
+step is then taken in pieces of 1/2, 1/4, ... 1/4096 of it. Each piece is looked at when it is done.
+It is *ordinary* if its end has changed every slack -g - t by little, and (Runge-Kutta 4) if for the
+outputs Y1 ... Y4 of its stages |Y4 - 2 Y3 + Y1| is little beside |Y3 - Y2|, output by output: the
+second and third stage are both of the middle, so that the ratio z of these two is the piece's length
+times the closed loop's rate. An ordinary piece stands. Of any other
 
-- neither a stage nor the end may use up more than a quarter of any slack -g - t;
-- Runge-Kutta 4: with z = |Y4 - 2 Y3 + Y1| / |Y3 - Y2| of the stages' outputs, which is the piece's
-  length times the closed loop's greatest rate (Y2 and Y3 are both of the middle), each slack's error
-  is about |g(Y3) - g(Y2)| z^3 / 30, and must be small;
+- neither a stage nor the end may use up more than a quarter of any slack;
+- Runge-Kutta 4: each slack's error, about |g(Y3) - g(Y2)| z^3 / 30 with the z of the constraint's own
+  outputs, must be small;
 - Euler: half of what a slack's rate has changed by since the piece before, times the length, must be
   small.
 
 A piece that fails is taken back and halved. One that succeeds by far is followed by one of twice its
 length, where that lies on the coarser grid and no piece has failed lately. All this depends on the
 present state alone, which ``work.division`` is part of, so that a run comes out the same however it
-is cut into calls. A step that needs no division costs a comparison for each constraint and stage.
+is cut into calls.
 
 Outputs, slacks and (in runs without faults) the law are evaluated at a piece's end to be looked at;
 the next piece begins with them in place of evaluating them again.
@@ -37,16 +40,18 @@ LEVEL = 0  # pieces are 2^-LEVEL of a step
 POSITION = 1  # where in its step the next piece begins, in 1/PIECES of it
 CALM = 2  # pieces since one failed
 KNOWN = 3  # what is evaluated at the present state, one of the constants below
-SPOILT = 4  # 1: a stage of this piece used up too much of a slack
-SPLIT = 5  # 1: the present step is divided
-BEFORE = 6  # Euler: whether Stages.change has the rates of a piece before
-EASY = 7  # 1: twice the length is sure to do
-HEADER = 8
+SPLIT = 4  # 1: the present step is divided
+EASY = 5  # 1: twice the length is sure to do
+RATED = 6  # Euler, 1: the second row of Stages.g has the rates of g in the piece before
+HEADER = 7
 
 END = -1  # in place of a stage's number: the end of a piece
 NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what the law asks for
 
-USE = 0.25  # the greatest part of a slack that a piece may use up
+# An ordinary piece: z, the outputs' differences that are none beside their size, and the part of a
+# slack that changes. Its error is below 1e-7 of that part.
+MILD, TINY, LITTLE = 0.1, 1e-10, 0.02
+USE = 0.25  # the greatest part of a slack that another may use up
 # The greatest error of a slack in a piece of Runge-Kutta 4, relative to the slack and to its typical
 # size; at the finest pieces so many times that, there being nothing finer
 OF_SLACK, OF_SIZE, LAST_RESORT = 1e-6, 3e-8, 100.0
@@ -58,30 +63,23 @@ CALM_FOR = 32  # pieces after a failure before twice the length is tried again
 
 
 class Stages(NamedTuple):
-    """What a piece's stages have shown; views of ``work.division``."""
+    """What a piece's stages have shown, stage after stage; views of ``work.division``."""
 
-    y: np.ndarray  # (4 m,) outputs at the stages
-    start: np.ndarray  # (p,) g at the piece's start
-    room: np.ndarray  # (p,) by how much g may rise
-    change: np.ndarray  # (p,) |g(Y3) - g(Y2)|; under Euler's method the rates of g in the last one
+    y: np.ndarray  # (4 m,) outputs
+    g: np.ndarray  # (4 p,) constraints
 
 
 @kernel
 def length(m, p):
     """Entries of ``work.division``."""
-    return HEADER + 4 * m + 3 * p
+    return HEADER + 4 * m + 4 * p
 
 
 @kernel
 def stages_of(division, m, p):
     """The arrays in ``work.division``."""
     at = HEADER + 4 * m
-    return Stages(
-        division[HEADER:at],
-        division[at : at + p],
-        division[at + p : at + 2 * p],
-        division[at + 2 * p : at + 3 * p],
-    )
+    return Stages(division[HEADER:at], division[at : at + 4 * p])
 
 
 def typical_sizes(
@@ -121,94 +119,97 @@ def ends(division, step, h):
 
 
 @kernel
-def note(stage, problem, work):
-    """Keep what a stage has shown; False if a slack has been used up too much."""
-    m, p, g = len(work.y), len(work.g), work.g
+def note(stage, work):
+    """Keep what a stage has shown."""
+    m, p = len(work.y), len(work.g)
     stages = stages_of(work.division, m, p)
     copy(work.y, stages.y[stage * m : (stage + 1) * m])
-    if stage == 0:
-        work.division[SPOILT] = 0.0
-        tightening = problem.data.tightening
-        for k in range(p):
-            stages.start[k] = g[k]
-            stages.room[k] = -USE * (g[k] + tightening[k])
-        return True
-    good = True
-    for k in range(p):
-        good &= g[k] - stages.start[k] <= stages.room[k]
-    if stage == 1:
-        copy(g, stages.change)
-    elif stage == 2:
-        for k in range(p):
-            stages.change[k] = abs(g[k] - stages.change[k])
-    if not good:
-        work.division[SPOILT] = 1.0
+    copy(work.g, stages.g[stage * p : (stage + 1) * p])
+
+
+@kernel
+def ordinary(count, problem, work, stages):
+    """Whether a piece whose end is in work.g needs no closer look; ``count`` stages, 1 of Euler."""
+    m, g, tightening, good = len(work.y), work.g, problem.data.tightening, True
+    for k in range(len(g)):
+        start = stages.g[k]
+        good &= abs(g[k] - start) <= -LITTLE * (start + tightening[k])
+    if count == 1 or not good:
+        return good
+    y, tiny = stages.y, TINY * problem.size[0]
+    first, second, third, fourth = y[:m], y[m : 2 * m], y[2 * m : 3 * m], y[3 * m :]
+    for r in range(m):
+        bend = abs(third[r] - second[r])
+        good &= abs(fourth[r] - 2.0 * third[r] + first[r]) <= MILD * bend + tiny
     return good
 
 
 @kernel
-def stiffness(y, size):
-    """z of the stages' outputs y (4 m,), at most STIFFEST; 0 where rounding hides it."""
-    m = len(y) // 4
-    bend, turn = 0.0, 0.0
-    for r in range(m):
-        bend = max(bend, abs(y[2 * m + r] - y[m + r]))
-        turn = max(turn, abs(y[3 * m + r] - 2.0 * y[2 * m + r] + y[r]))
-    if not bend > ROUNDING * size:
+def stiffness(problem, stages, m, k):
+    """z of the outputs in constraint k, at most STIFFEST; 0 where rounding hides it."""
+    data, y, bend, turn = problem.data, stages.y, 0.0, 0.0
+    for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
+        i = data.member_index[entry]
+        for r in range(data.offsets[i], data.offsets[i + 1]):
+            bend = max(bend, abs(y[2 * m + r] - y[m + r]))
+            turn = max(turn, abs(y[3 * m + r] - 2.0 * y[2 * m + r] + y[r]))
+    if not bend > ROUNDING * problem.size[0]:
         return 0.0
     return min(turn / bend, STIFFEST)
 
 
 @kernel
-def error_of(count, h, problem, work, stages):
-    """The greatest error of a slack in a piece over what is allowed, and whose that is.
+def error_of(count, h, problem, work, stages, k):
+    """The error of slack k in a piece of h seconds over what is allowed of it."""
+    m, p, start = len(work.y), len(work.g), stages.g[k]
+    slack = -start - problem.data.tightening[k]
+    if count == 1:
+        if work.division[RATED] == 0.0:
+            return 0.0
+        error = 0.5 * abs(work.g[k] - start - h * stages.g[p + k])
+        return error / (OF_SLACK_EULER * slack)
+    z = stiffness(problem, stages, m, k)
+    error = abs(stages.g[2 * p + k] - stages.g[p + k]) * z * z * z / 30.0
+    return error / min(OF_SLACK * slack, OF_SIZE * problem.size[1 + k])
 
-    Args:
-        count: stages of the method; one means Euler's.
-        h: the piece's length in s.
-        problem, work: of the run; work.g is of the piece's end.
-        stages: what the piece has shown.
-    """
-    worst, which, g = 0.0, 0, work.g
-    if count > 1:
-        z = stiffness(stages.y, problem.size[0])
-        factor = z * z * z / 30.0
-        for k in range(len(g)):
-            allowed = min(OF_SLACK / USE * stages.room[k], OF_SIZE * problem.size[1 + k])
-            if stages.change[k] * factor > worst * allowed:
-                worst, which = stages.change[k] * factor / allowed, k
-    elif work.division[BEFORE] > 0.0:
-        for k in range(len(g)):
-            error = 0.5 * abs(g[k] - stages.start[k] - h * stages.change[k])
-            allowed = OF_SLACK_EULER / USE * stages.room[k]
-            if error > worst * allowed:
-                worst, which = error / allowed, k
-    return worst, which
+
+@kernel
+def use_of(count, problem, work, stages, k):
+    """The greatest part of slack k that a stage of a piece or its end has used up."""
+    p, start, highest = len(work.g), stages.g[k], work.g[k]
+    for stage in range(1, count):
+        highest = max(highest, stages.g[stage * p + k])
+    return (highest - start) / (-start - problem.data.tightening[k])
 
 
 @kernel
 def judge(count, h, problem, work):
-    """Whether the piece whose end is evaluated may stand: -1, or the constraint that is why not."""
-    division, g = work.division, work.g
-    stages = stages_of(division, len(work.y), len(g))
-    finest = division[LEVEL] == FINEST
-    error, which = error_of(count, h, problem, work, stages)
-    if not error <= (LAST_RESORT if finest else 1.0):
-        return which
-    most = 0.0  # of the room for a slack that is used
-    for k in range(len(g)):
-        used = g[k] - stages.start[k]
-        if used > most * stages.room[k]:
-            most, which = used / stages.room[k], k
-    if not finest and (most > 1.0 or division[SPOILT] > 0.0):
-        return which
-    if count == 1:
-        division[BEFORE] = 1.0
-        for k in range(len(g)):
-            stages.change[k] = (g[k] - stages.start[k]) / h
+    """Whether the piece whose end is evaluated may stand: -1, or the constraint that is why not.
+
+    Args:
+        count: stages of the method; one means Euler's.
+        h: the piece's length in s.
+        problem, work: of the run.
+    """
+    division, p = work.division, len(work.g)
+    stages = stages_of(division, len(work.y), p)
     division[CALM] += 1.0
-    easy = division[CALM] >= CALM_FOR and GROWTH * error < 1.0 and most < 0.4
-    division[EASY] = 1.0 if easy else 0.0
+    division[EASY] = 1.0 if division[CALM] >= CALM_FOR else 0.0
+    if ordinary(count, problem, work, stages):
+        division[RATED] = 0.0
+        return -1
+    finest = division[LEVEL] == FINEST
+    for k in range(p):
+        error = error_of(count, h, problem, work, stages, k)
+        use = use_of(count, problem, work, stages, k)
+        if not error <= (LAST_RESORT if finest else 1.0) or not (use <= USE or finest):
+            return k
+        if GROWTH * error > 1.0 or use > 0.4 * USE:
+            division[EASY] = 0.0
+    if count == 1:
+        division[RATED] = 1.0
+        for k in range(p):
+            stages.g[p + k] = (work.g[k] - stages.g[k]) / h
     return -1
 
 
@@ -258,7 +259,7 @@ def give_up(faults, step, h, which, problem, work, monitor):
         problem, work, monitor: of the run.
     """
     division = work.division
-    start = stages_of(division, len(work.y), len(work.g)).start
+    start = stages_of(division, len(work.y), len(work.g)).g
     guarded = problem.settings[GUARDED] > 0.0 and faults.measured(problem)
     for r in range(len(work.u)):
         guarded &= work.u[r] == work.demand[r]

@@ -47,8 +47,8 @@ from gne_mj.table import Table, floats_at, integers
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
-# Rates at four stages, a trial state, and the state at the start of a divided step
-SCRATCH_ROWS = 6
+# Rates at four stages, a trial state, the state at the start of a divided step, and scratch
+SCRATCH_ROWS = 7
 
 # Mode implicit is held like sampled; what differs is how the input is found, a module of its own
 CONTINUOUS, HELD = 0, 1
@@ -70,6 +70,18 @@ def stored(agent, channels, state):
     for r in range(len(channels.rest)):
         x = state[r * states : (r + 1) * states]
         total += agent.storage(channels.parameters[r], x, channels.rest[r])
+    return total
+
+
+@kernel
+def stored_keeping(agent, channels, state, known):
+    """The same; known (m,) is filled with what the rates at this state need again."""
+    states = channels.rest.shape[1]
+    total = 0.0
+    for r in range(len(channels.rest)):
+        q, x = channels.parameters[r], state[r * states : (r + 1) * states]
+        known[r] = agent.shared(q, x)
+        total += agent.storage_given(q, x, channels.rest[r], known[r])
     return total
 
 
@@ -146,12 +158,18 @@ def look(
 
 
 @kernel
-def rates(agent, law, problem, channels, state, u, y, out):
-    """Fill out with the rate of the flat state under u (m,), the law having acted at y (m,)."""
+def rates(agent, law, problem, channels, stage, state, known, u, y, out):
+    """Fill out with the rate of the flat state under u (m,), the law having acted at y (m,).
+
+    At stage 0 ``known`` is what :func:`stored_keeping` has found for this state.
+    """
     m, states = channels.rest.shape
     for r in range(m):
         x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
-        agent.rate(channels.parameters[r], x, u[r], rate)
+        if stage == 0:
+            agent.rate_given(channels.parameters[r], x, u[r], known[r], rate)
+        else:
+            agent.rate(channels.parameters[r], x, u[r], rate)
     law.rate(problem, y, state[m * states :], out[m * states :])
 
 
@@ -219,7 +237,7 @@ def build(
         width = len(scratch) // SCRATCH_ROWS
         # of the state's own length, so that the memory behind the channels has its own too
         k, trial = scratch[: 4 * width].reshape((4, width)), scratch[4 * width : 4 * width + n]
-        begun, spare = scratch[5 * width : 5 * width + n], scratch[width : 2 * width]
+        begun, spare = scratch[5 * width : 5 * width + n], scratch[6 * width :]
         step, block = np.int64(room[STEP_NOW]), np.int64(room[RECORDER])
         moving = clock.mode == CONTINUOUS and count > 0
         stages = 4 if moving and clock.method == RK4 else 1
@@ -229,7 +247,7 @@ def build(
             if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
                 copy(state, begun)
             time, length, stage = division.begins(divided, step, h), division.piece(divided, h), 0
-            storage = stored(agent, channels, state)
+            storage = stored_keeping(agent, channels, state, spare)
             for point in range(stages + 1 if moving else 1):
                 now, stage, at = state, point, time
                 if point == stages:
@@ -253,10 +271,12 @@ def build(
                         state[size:], work, state[:0],
                     )  # fmt: skip
                 if moving and point < stages:
-                    division.note(stage, problem, work)
+                    division.note(stage, work)
                     acts = faults.push(problem, clock, step, work.u, work.acts)
                     seen = faults.choose(work.y, work.seen)
-                    rates(agent, law, problem, channels, now, acts, seen, k[point, :n])
+                    rates(
+                        agent, law, problem, channels, stage, now, spare, acts, seen, k[point, :n]
+                    )  # fmt: skip
             if count == 0 or (not good and stage == 0):
                 break
             if not moving:

@@ -55,15 +55,27 @@ def energy_balance(parameters):
 
 
 @kernel
-def pull(q, x):
+def shared(q, x):
+    """What both the rate and V need: the extension's arctangent."""
+    return np.arctan(x[0])
+
+
+@kernel
+def pull(q, x, arctangent):
     """Force of spring and damper on the appendage, in N (the main mass feels its opposite)."""
-    return q[2] * x[0] + q[3] * np.arctan(x[0]) + q[4] * (x[1] - x[2])
+    return q[2] * x[0] + q[3] * arctangent + q[4] * (x[1] - x[2])
 
 
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'; u in N."""
-    force = pull(q, x)
+    rate_given(q, x, u, np.arctan(x[0]), out)
+
+
+@kernel
+def rate_given(q, x, u, arctangent, out):
+    """The same where the extension's arctangent is at hand."""
+    force = pull(q, x, arctangent)
     out[0] = x[1] - x[2]
     out[1] = (u - force) / q[0]
     out[2] = force / q[1]
@@ -73,7 +85,7 @@ def rate(q, x, u, out):
 @kernel
 def euler_step(q, x, u, h, out):
     """One semi-implicit Euler step, as MuJoCo's: velocities first, positions with the new ones."""
-    force = pull(q, x)
+    force = pull(q, x, np.arctan(x[0]))
     velocity = x[1] + h * (u - force) / q[0]
     appendage = x[2] + h * force / q[1]
     out[0] = x[0] + h * (velocity - appendage)

@@ -62,3 +62,20 @@ def equilibrium(q, y, out):
 def storage(q, x, rest):
     """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
     return 0.5 * (x[0] - rest[0]) ** 2
+
+@kernel
+def shared(q, x):
+    """Nothing that both the rate and V need is worth keeping."""
+    return 0.0
+
+
+@kernel
+def rate_given(q, x, u, known, out):
+    """As :func:`rate`, with what :func:`shared` returned."""
+    rate(q, x, u, out)
+
+
+@kernel
+def storage_given(q, x, rest, known):
+    """As :func:`storage`, likewise."""
+    return storage(q, x, rest)

@@ -125,3 +125,28 @@ def storage(q, x, rest):
     if q[0] == INTEGRATOR:
         return integrator.storage(q[1:], x[1:2], rest[1:2])
     return pi_cascade.storage(q[1:], x[1:3], rest[1:3])
+
+
+@kernel
+def shared(q, x):
+    """What both the rate and V need of the channel's type."""
+    if q[0] == ROBOT:
+        return flexible_robot.shared(q[1:], x)
+    return 0.0
+
+
+@kernel
+def rate_given(q, x, u, known, out):
+    """As :func:`rate`, with what :func:`shared` returned."""
+    if q[0] == ROBOT:
+        flexible_robot.rate_given(q[1:], x, u, known, out)
+    else:
+        rate(q, x, u, out)
+
+
+@kernel
+def storage_given(q, x, rest, known):
+    """As :func:`storage`, likewise."""
+    if q[0] == ROBOT:
+        return flexible_robot.storage_given(q[1:], x, rest, known)
+    return storage(q, x, rest)

@@ -69,3 +69,20 @@ def storage(q, x, rest):
     r = q[1] / (q[0] - q[1])
     output, integral = x[0] - rest[0], x[1] - rest[1]
     return 0.5 * (output * output + r * (output - integral) ** 2)
+
+@kernel
+def shared(q, x):
+    """Nothing that both the rate and V need is worth keeping."""
+    return 0.0
+
+
+@kernel
+def rate_given(q, x, u, known, out):
+    """As :func:`rate`, with what :func:`shared` returned."""
+    rate(q, x, u, out)
+
+
+@kernel
+def storage_given(q, x, rest, known):
+    """As :func:`storage`, likewise."""
+    return storage(q, x, rest)
