@@ -20,6 +20,7 @@ from builders import (
     robots,
     run_loop,
 )
+from numba import njit
 
 import reference
 from gne_mj import graph as graphs
@@ -73,7 +74,7 @@ def problem_of(game, law, limit=np.inf):
     return Problem(game.data, law.graph_data, settings, bounds, y, no_propagator())
 
 
-def loop_at(game, law, y, memory, h=1.0):
+def loop_at(game, law, y, memory, h=2.0**-30):
     """The product's compiled loop of integrators (state y), Euler, at any state and memory."""
     agents = integrators(game.actions)
     rest, clock = np.zeros((game.actions, 1)), Clock(h, 1, CONTINUOUS, EULER)
@@ -81,18 +82,29 @@ def loop_at(game, law, y, memory, h=1.0):
     return OdeLoop(agents, law.kernels, game.kernels, setup, y.reshape(-1, 1), memory)
 
 
+@cache
+def compiled_rate(kernels):
+    """The product's rate of a law's memory, compiled."""
+
+    @njit(error_model="numpy")
+    def rate(problem, y, memory, out):
+        kernels.rate(problem, y, memory, out)
+
+    return rate
+
+
 def step(game, law, y, memory):
-    """u and the memory's rate at a state: an Euler step of length 1 adds exactly one rate."""
+    """u, by an Euler step that is too short to be divided, and the memory's rate at a state."""
     memory = own_actions_in(memory, y, game.agent_of_action)
     loop = loop_at(game, law, y, memory)
     first = loop.advance(1, 1)
     assert loop.monitor[watch.EXIT] == watch.INSIDE
     assert np.array_equal(first.state[0, :, 0], y)
     assert np.array_equal(first.memory[0], memory)
-    last = loop.finish()
-    u = first.input[0]
-    assert np.array_equal(last.state[0, :, 0], y + u)
-    return u, last.memory[0] - memory
+    u, rate = first.input[0], np.zeros(len(memory))
+    assert np.array_equal(loop.finish().state[0, :, 0], y + 2.0**-30 * u)
+    compiled_rate(law.kernels)(problem_of(game, law), y, memory, rate)
+    return u, rate
 
 
 def own_actions_in(memory, y, owner):

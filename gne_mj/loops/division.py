@@ -7,9 +7,10 @@ outputs Y1 ... Y4 of its stages |Y4 - 2 Y3 + Y1| is little beside |Y3 - Y2|, out
 second and third stage are both of the middle, so that the ratio z of these two is the piece's length
 times the closed loop's rate. An ordinary piece stands. Of any other
 
-- neither a stage nor the end may use up more than a quarter of any slack;
-- Runge-Kutta 4: each slack's error, about |g(Y3) - g(Y2)| z^3 / 30 with the z of the constraint's own
-  outputs, must be small;
+- neither a stage nor the end may use up more than a quarter of any slack, nor more than double it;
+- Runge-Kutta 4: each slack's error must be small, with the z of the constraint's own outputs about
+  |g(Y3) - g(Y2)| z^3 / 30, as of a linear law, and s z r^4 / 50 if the slack s changes by a part r,
+  as of the barrier's gradient 1/s under Simpson's rule;
 - Euler: half of what a slack's rate has changed by since the piece before, times the length, must be
   small.
 
@@ -49,12 +50,13 @@ END = -1  # in place of a stage's number: the end of a piece
 NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what the law asks for
 
 # An ordinary piece: z, the outputs' differences that are none beside their size, and the part of a
-# slack that changes. Its error is below 1e-7 of that part.
+# slack that changes. Its error is below 1e-7 of that slack.
 MILD, TINY, LITTLE = 0.1, 1e-10, 0.02
-USE = 0.25  # the greatest part of a slack that another may use up
+USE, GAIN = 0.25, 1.0  # the greatest parts of a slack that another may use up, and add to it
 # The greatest error of a slack in a piece of Runge-Kutta 4, relative to the slack and to its typical
-# size; at the finest pieces so many times that, there being nothing finer
-OF_SLACK, OF_SIZE, LAST_RESORT = 1e-6, 3e-8, 100.0
+# size; and in a finest piece, after which there is nothing finer to try
+OF_SLACK, OF_SIZE = 3e-6, 3e-8
+OF_SLACK_AT_LAST, OF_SIZE_AT_LAST = 1e-2, 1e-6
 OF_SLACK_EULER = 0.01
 GROWTH = 64.0  # twice the length has 2^5 times the error; with a reserve
 ROUNDING = 1e-13  # stages that differ by less of the outputs' size tell nothing of stiffness
@@ -163,23 +165,31 @@ def error_of(count, h, problem, work, stages, k):
     """The error of slack k in a piece of h seconds over what is allowed of it."""
     m, p, start = len(work.y), len(work.g), stages.g[k]
     slack = -start - problem.data.tightening[k]
+    finest = work.division[LEVEL] == FINEST
     if count == 1:
-        if work.division[RATED] == 0.0:
+        if work.division[RATED] == 0.0 or finest:
             return 0.0
         error = 0.5 * abs(work.g[k] - start - h * stages.g[p + k])
         return error / (OF_SLACK_EULER * slack)
     z = stiffness(problem, stages, m, k)
+    change = abs(work.g[k] - start)
+    part = change / max(slack, slack + start - work.g[k])
     error = abs(stages.g[2 * p + k] - stages.g[p + k]) * z * z * z / 30.0
+    error += slack * z * part * part * part * part / 50.0
+    if finest:
+        return error / min(OF_SLACK_AT_LAST * slack, OF_SIZE_AT_LAST * problem.size[1 + k])
     return error / min(OF_SLACK * slack, OF_SIZE * problem.size[1 + k])
 
 
 @kernel
 def use_of(count, problem, work, stages, k):
-    """The greatest part of slack k that a stage of a piece or its end has used up."""
-    p, start, highest = len(work.g), stages.g[k], work.g[k]
+    """The greatest parts of slack k that a stage of a piece or its end has used up, and added."""
+    p, start, highest, lowest = len(work.g), stages.g[k], work.g[k], work.g[k]
     for stage in range(1, count):
         highest = max(highest, stages.g[stage * p + k])
-    return (highest - start) / (-start - problem.data.tightening[k])
+        lowest = min(lowest, stages.g[stage * p + k])
+    slack = -start - problem.data.tightening[k]
+    return (highest - start) / slack, (start - lowest) / slack
 
 
 @kernel
@@ -201,10 +211,10 @@ def judge(count, h, problem, work):
     finest = division[LEVEL] == FINEST
     for k in range(p):
         error = error_of(count, h, problem, work, stages, k)
-        use = use_of(count, problem, work, stages, k)
-        if not error <= (LAST_RESORT if finest else 1.0) or not (use <= USE or finest):
+        use, gain = use_of(count, problem, work, stages, k)
+        if not error <= 1.0 or not gain <= GAIN or not (use <= USE or finest):
             return k
-        if GROWTH * error > 1.0 or use > 0.4 * USE:
+        if GROWTH * error > 1.0 or use > 0.4 * USE or gain > 0.4 * GAIN:
             division[EASY] = 0.0
     if count == 1:
         division[RATED] = 1.0
