@@ -101,7 +101,8 @@ def _coupling(coupling: dict[str, Any]) -> Iterator[tuple[str, str]]:
     texts = {
         "printed": "mu (c lambda_2 - theta_2) > theta_2^2; no proof, since theta_1 is missing",
         "rigorous": "4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2",
-        "quadratic": f"-dV/dt's quadratic form positive definite ({coupling['label']})",
+        "quadratic": "sufficient for V to fall: -dV/dt's quadratic form positive definite"
+        f" ({coupling['label']})",
     }
     for name, text in texts.items():
         condition = coupling[name]
