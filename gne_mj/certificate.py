@@ -11,6 +11,7 @@ from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equili
 from gne_mj.errors import SolverError
 from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
+from gne_mj.margins import epsilon_bounds, of_the_set
 from gne_mj.system import System
 from gne_mj.theory import Theorem
 from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
@@ -28,7 +29,8 @@ class Certificate:
         worst_constraint: the least margin -g over all constraints and integration steps.
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
-        epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
+        epsilon: what agents could gain at the penalised equilibrium, against
+            :func:`gne_mj.margins.epsilon_bounds`.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
             whether it is known (not of MJCF robots), and whether the theory claims that it never
@@ -310,8 +312,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
-        variational = variational_equilibrium(game, penalised)
+        variational = variational_equilibrium(of_the_set(system.game), penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
@@ -321,21 +322,12 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
-    game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
-    affine = game.affine_constraints
     try:
-        measured = float(np.max(measured_epsilon(game, equilibrium.action)))
+        gains = measured_epsilon(of_the_set(system.game), equilibrium.action)
+        measured = float(np.max(gains))
     except SolverError:
         measured = None
-    return {
-        "measured": measured,
-        "p_rho": game.constraints_count * system.rho,
-        # By convexity a tightening t_l costs at most lambda_l t_l more.
-        "of_margin": float(equilibrium.multipliers @ system.game.margins),
-        # The same set by affine constraints meets Assumption [asmp:cost] to the letter.
-        "p_rho_affine": None if affine is None else affine * system.rho,
-        "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
-    }
+    return {"measured": measured, **epsilon_bounds(system.game, equilibrium)}
 
 
 def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) -> dict[str, Any]:

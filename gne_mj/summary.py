@@ -47,8 +47,9 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
                 rows["held inputs"] += f"; {implicit[key]} {what}"
     if epsilon["measured"] is not None:
         rows["epsilon"] = (
-            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
-            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
-            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; at most"
+            f" {epsilon['bound']:.4g} = p rho"
+            + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
+            + f", and {epsilon['largest_own_bound']:.4g} by each agent's own constraints"
         )
     return rows

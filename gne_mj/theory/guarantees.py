@@ -7,6 +7,7 @@ import numpy as np
 
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
+from gne_mj.margins import epsilon_bounds
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
@@ -89,7 +90,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": system.equilibrium.action.tolist(),
-            **verdict.epsilon_bounds(system),
+            **epsilon_bounds(game, system.equilibrium),
         },
         periods={
             "push": _at_both(system, push_period),

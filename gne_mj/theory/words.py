@@ -49,6 +49,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
+    yield "epsilon of y*", _bounds(g["equilibrium"])
     yield "sampling", _periods(g)
     if g["held"] is not None:
         yield from _held(g["held"])
@@ -158,6 +159,14 @@ def _estimates(estimates: dict[str, Any]) -> str:
     if distance == 0.0:
         return "they equal y(0)"
     return f"at most {distance:.6g} from y(0); under partial information they need not lie inside"
+
+
+def _bounds(bounds: dict[str, Any]) -> str:
+    margin = f" + {bounds['of_margin']:.4g} for the margin" if bounds["of_margin"] else ""
+    return (
+        f"at most {bounds['bound']:.4g} = p rho{margin},"
+        f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
+    )
 
 
 def _periods(g: dict[str, Any]) -> str:
