@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from gne_mj import verdicts
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
-from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import epsilon_bounds, of_the_set
 from gne_mj.system import System
+from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
 
@@ -38,7 +38,8 @@ class Certificate:
             met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         exit: where the run left, the law and the input that led there; None if it did not.
-        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, how far
+        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, of how
+            many periods (``covered``) the promise for control instants speaks therefore, how far
             outputs were from their prediction at control instants, periods in which dy+/du was not
             positive; None in other modes.
         steps, end_time, wall_time: integration steps taken, simulated and real time.
@@ -256,6 +257,7 @@ def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | 
         "mean_newton_steps": float(monitor[watch.SOLVER_STEPS]) / max(solutions, 1),
         "most_newton_steps": int(monitor[watch.MOST_STEPS]),
         "not_accurate": int(monitor[watch.UNSOLVED]),
+        "covered": solutions - int(monitor[watch.UNSOLVED]),
         "first_not_accurate": when(watch.UNSOLVED, watch.UNSOLVED_TIME),
         "largest_prediction_error": float(monitor[watch.PREDICTION]),
         "largest_prediction_error_time": when(watch.PREDICTION, watch.PREDICTION_TIME),
@@ -347,18 +349,6 @@ def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) ->
     }
 
 
-def _limit_then(system: System, channel: int, time: float) -> float:
-    """The least limit of a channel's actuator at a time: its own, or a fault's."""
-    limit = float(system.agents.input_limit[channel])
-    for fault in system.faults:
-        if not isinstance(fault, Saturation):
-            continue
-        struck = channel in fault.targets(system.game, system.law.graph)
-        if struck and fault.start <= time + 1e-9 < fault.end + 1e-9:
-            limit = min(limit, fault.limit)
-    return limit
-
-
 def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     m, p = system.game.actions, system.game.constraints_count
     peak, when, rms, energy = (each[0] for each in verdicts.inputs(monitor[None], p, m))
@@ -381,6 +371,6 @@ def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
             "agent": int(agent[index]) + 1,
             "time": float(monitor[watch.SATURATED_TIME]),
             "demand": float(monitor[watch.SATURATED_DEMAND]),
-            "limit": _limit_then(system, index, float(monitor[watch.SATURATED_TIME])),
+            "limit": float(limits_at(system, float(monitor[watch.SATURATED_TIME]))[index]),
         }
     return result

@@ -72,7 +72,9 @@ def test_paths_that_are_none(text):
 def test_in_words():
     done = gne("solve", "desired-velocity", "--path", "1:1e-2:3")
     assert (done.returncode, done.stderr) == (0, "")
-    for text in ("rho = 0.1", "3.6, 4.6, 4.32, 3.32, 3.1067 m/s", "2 of 5", "at most 0.5 = p rho", "path"):
+    for text in (
+        "rho = 0.1", "3.6, 4.6, 4.32, 3.32, 3.1067 m/s", "2 of 5", "at most 0.5 = p rho", "path",
+    ):  # fmt: skip
         assert text in done.stdout
 
 

@@ -1,10 +1,9 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
-import numpy as np
-
 from gne_mj.margins import epsilon_bounds
 from gne_mj.system import System
 from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 
@@ -13,8 +12,7 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     """What the theorem gives."""
     system = theorem.system
     limit = _limit(system)
-    limited = np.any(np.isfinite(system.agents.input_limit))
-    as_long = ", as long as no input limit is met" if limited else ""
+    as_long = ", as long as no input limit is met" if limited(system) else ""
     trust = [f"[{a.label}]" for a in theorem.assumptions if a.status == ASSUMED]
     provided = f", provided {' and '.join(trust)}" if trust else ""
     if theorem.status == CERTIFIED:
@@ -33,11 +31,15 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     if system.mode == "implicit" and held is not None and held.promised:
         terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
         return [
-            "at every control instant every shared constraint holds, from every interior start"
-            + (f", provided {' and '.join(terms)}" if terms else "")
+            "at every control instant every shared constraint holds, from every interior start,"
+            " unless the input of the period before was not found accurately (a run counts those:"
+            " not_accurate)" + (f", provided {' and '.join(terms)}" if terms else "")
         ]
     if not theorem.obstacles:
-        return ["nothing of this run; the same law in continuous time is covered by the theorem"]
+        return [
+            "nothing of this run; the same law in continuous time is covered by the theorem"
+            f"{as_long}"
+        ]
     return ["nothing"]
 
 

@@ -50,6 +50,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
     yield "epsilon of y*", _bounds(g["equilibrium"])
+    yield "inputs", _inputs(g["inputs"])
     yield "sampling", _periods(g)
     if g["held"] is not None:
         yield from _held(g["held"])
@@ -167,6 +168,17 @@ def _bounds(bounds: dict[str, Any]) -> str:
         f"at most {bounds['bound']:.4g} = p rho{margin},"
         f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
     )
+
+
+def _inputs(inputs: dict[str, Any]) -> str:
+    if inputs["largest"] is None:
+        return f"{inputs['of']} has none"
+    text = inputs["exceeded"]
+    if text is None:
+        text = f"{inputs['of']} asks for up to {inputs['largest']:.4g} (agent {inputs['agent']})"
+        if inputs["largest_factor"] is not None:
+            text += f", up to {inputs['largest_factor']:.2g} of a limit"
+    return f"{text}; limits of at least {inputs['largest']:.4g} are not met there, at y* none is"
 
 
 def _periods(g: dict[str, Any]) -> str:
