@@ -97,7 +97,7 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
     bound = slopes.between
     if bound is not None:
         owner = slopes.game.agent_of_action
-        if _unknowns(bound.base, owner) ** 3 <= _WORK:
+        if len(_entries(bound.base, bound.loss, owner)[0]) ** 3 <= _WORK:
             least = least_coupling(bound.base, graph, owner, loss=bound.loss)
             quadratic = condition(least, sure)
     return Coupling(
@@ -128,7 +128,7 @@ def least_coupling(
     """
     if loss is None:
         loss = np.zeros_like(slope)
-    agent, column = _entries(slope, owner)
+    agent, column = _entries(slope, loss, owner)
     part = _second_term(slope, loss, owner, agent, column)
     apart = _disagreements(graph, agent, column)
     consensus = csr_array((np.ones(len(agent)), (np.arange(len(agent)), column)))
@@ -141,17 +141,15 @@ def least_coupling(
     return max(0.0, _greatest(needed)) if len(needed) else 0.0
 
 
-def _entries(slope: Array, owner: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
+def _entries(
+    slope: Array, loss: Array, owner: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Agents i and actions r of the entries of **y** in the form's second term, by action."""
     used = np.zeros((int(owner[-1]) + 1, len(owner)), dtype=bool)
-    np.logical_or.at(used, owner, slope != 0.0)
+    np.logical_or.at(used, owner, (slope != 0.0) | (loss != 0.0))
     used[owner, np.arange(len(owner))] = True
     column, agent = np.nonzero(used.T)
     return agent, column
-
-
-def _unknowns(slope: Array, owner: NDArray[np.int64]) -> int:
-    return len(_entries(slope, owner)[0])
 
 
 def _second_term(
@@ -180,7 +178,8 @@ def _second_term(
 
 def _disagreements(graph: Graph, agent: NDArray[np.int64], column: NDArray[np.int64]) -> csr_array:
     """The bases V_r side by side, (entries, entries - m)."""
-    inverse = np.linalg.pinv(graph.laplacian, hermitian=True)
+    # The pseudo-inverse but for a constant, which differences do not see
+    inverse = np.linalg.inv(graph.laplacian + 1.0 / graph.agents)
     bases = []
     for r in range(int(column[-1]) + 1):
         known = agent[column == r]
