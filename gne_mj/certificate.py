@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import verdicts
-from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.controllers import FullyDistributed
+from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
-from gne_mj.faults import Saturation
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
+from gne_mj.margins import epsilon_bounds, of_the_set
 from gne_mj.system import System
+from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
 
@@ -30,7 +31,8 @@ class Certificate:
         worst_constraint: the least margin -g over all constraints and integration steps.
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
-        epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
+        epsilon: what agents could gain at the penalised equilibrium, against
+            :func:`gne_mj.margins.epsilon_bounds`.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
             whether it is known (not of MJCF robots), and whether the theory claims that it never
@@ -41,7 +43,8 @@ class Certificate:
         division: mode continuous with a fixed step: how many steps were divided near the boundary
             (:mod:`gne_mj.loops.division`), and the shortest piece in s, None if none was; None in
             other modes.
-        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, how far
+        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, of how
+            many periods (``covered``) the promise for control instants speaks therefore, how far
             outputs were from their prediction at control instants, periods in which dy+/du was not
             positive; None in other modes.
         steps, end_time, wall_time: integration steps taken, pieces of divided ones counted;
@@ -285,6 +288,7 @@ def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | 
         "mean_newton_steps": float(monitor[watch.SOLVER_STEPS]) / max(solutions, 1),
         "most_newton_steps": int(monitor[watch.MOST_STEPS]),
         "not_accurate": int(monitor[watch.UNSOLVED]),
+        "covered": solutions - int(monitor[watch.UNSOLVED]),
         "first_not_accurate": when(watch.UNSOLVED, watch.UNSOLVED_TIME),
         "largest_prediction_error": float(monitor[watch.PREDICTION]),
         "largest_prediction_error_time": when(watch.PREDICTION, watch.PREDICTION_TIME),
@@ -341,8 +345,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
-        variational = variational_equilibrium(game, penalised)
+        variational = variational_equilibrium(of_the_set(system.game), penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
@@ -352,21 +355,12 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
-    game = system.game.tightened(0.0) if np.any(system.game.margins) else system.game
-    affine = game.affine_constraints
     try:
-        measured = float(np.max(measured_epsilon(game, equilibrium.action)))
+        gains = measured_epsilon(of_the_set(system.game), equilibrium.action)
+        measured = float(np.max(gains))
     except SolverError:
         measured = None
-    return {
-        "measured": measured,
-        "p_rho": game.constraints_count * system.rho,
-        # By convexity a tightening t_l costs at most lambda_l t_l more.
-        "of_margin": float(equilibrium.multipliers @ system.game.margins),
-        # The same set by affine constraints meets Assumption [asmp:cost] to the letter.
-        "p_rho_affine": None if affine is None else affine * system.rho,
-        "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
-    }
+    return {"measured": measured, **epsilon_bounds(system.game, equilibrium)}
 
 
 def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) -> dict[str, Any]:
@@ -384,18 +378,6 @@ def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) ->
         "observed_until": float(monitor[watch.TIME]),
         "left": bool(monitor[watch.EXIT] != watch.INSIDE),
     }
-
-
-def _limit_then(system: System, channel: int, time: float) -> float:
-    """The least limit of a channel's actuator at a time: its own, or a fault's."""
-    limit = float(system.agents.input_limit[channel])
-    for fault in system.faults:
-        if not isinstance(fault, Saturation):
-            continue
-        struck = channel in fault.targets(system.game, system.law.graph)
-        if struck and fault.start <= time + 1e-9 < fault.end + 1e-9:
-            limit = min(limit, fault.limit)
-    return limit
 
 
 def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
@@ -420,6 +402,6 @@ def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
             "agent": int(agent[index]) + 1,
             "time": float(monitor[watch.SATURATED_TIME]),
             "demand": float(monitor[watch.SATURATED_DEMAND]),
-            "limit": _limit_then(system, index, float(monitor[watch.SATURATED_TIME])),
+            "limit": float(limits_at(system, float(monitor[watch.SATURATED_TIME]))[index]),
         }
     return result

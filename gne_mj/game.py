@@ -84,6 +84,8 @@ class Game:
         quantities: what follows from the actions and is recorded and drawn beside them.
         tightening: t >= 0, shape (p,), by which the barrier keeps farther away, in the
             constraints' own units: it guards g + t < 0. None for 0.
+        feasible_jacobian_bounds: (lower, upper) bounds of every entry of dF/dy over the feasible
+            profiles, each (m, m), where they are known to be closer than those over ``box``.
 
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
@@ -108,6 +110,7 @@ class Game:
     axes: tuple[str, ...] = ()
     quantities: tuple[Quantity, ...] = ()
     tightening: NDArray[np.float64] | None = None
+    feasible_jacobian_bounds: Box | None = None
 
     def __post_init__(self) -> None:
         self._check()

@@ -11,10 +11,12 @@ g < 0 at every control instant.
 
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.equilibrium import Equilibrium
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.plants import mixed
@@ -164,6 +166,41 @@ def with_margin(
     """
     effect = influence(agents, timestep, integrator, period, bound.delay)
     return game.tightened(tightening(game, effect.of(bound)))
+
+
+def of_the_set(game: Game) -> Game:
+    """The game with a barrier of g < 0 itself, whatever keeps farther away from it."""
+    return game.tightened(0.0) if np.any(game.margins) else game
+
+
+def epsilon_bounds(game: Game, equilibrium: Equilibrium) -> dict[str, Any]:
+    """What any agent could gain at most, by deviating alone in the set g <= 0 [lemma:epsilon].
+
+    From a penalised equilibrium agent i's cost, convex in y_i, falls by at most
+    sum_l lambda_l (-g_l) over the constraints l that contain y_i, which are convex. With
+    lambda_l = rho/(-g_l - t_l) that is p_i rho + sum_l lambda_l t_l. All in the costs' unit.
+
+    Returns:
+        ``p_rho`` for p constraints and ``of_margin``, sum_l lambda_l t_l of all of them; ``bound``,
+        the two together; ``p_rho_affine`` and ``bound_affine``, the same where affine constraints
+        describe the set (None if the game's own do, or none do); ``own_bound`` of each agent, the
+        greatest of these ``largest_own_bound``, and the greatest p_i rho ``largest_own_p_rho``.
+    """
+    rho, affine = equilibrium.rho, game.affine_constraints
+    p_rho, costs = game.constraints_count * rho, equilibrium.multipliers * game.margins
+    of_margin = float(np.sum(costs))
+    member = np.repeat(np.arange(game.agents), game.own_constraints)
+    own = np.bincount(member, rho + costs[game.data.own_index], game.agents)
+    return {
+        "p_rho": p_rho,
+        "of_margin": of_margin,
+        "bound": p_rho + of_margin,
+        "p_rho_affine": None if affine is None else affine * rho,
+        "bound_affine": None if affine is None else affine * rho + of_margin,
+        "own_bound": own.tolist(),
+        "largest_own_bound": float(np.max(own)),
+        "largest_own_p_rho": float(np.max(game.own_constraints)) * rho,
+    }
 
 
 def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Array) -> float:

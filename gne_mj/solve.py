@@ -18,6 +18,7 @@ from gne_mj.equilibrium import (
 )
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
+from gne_mj.margins import epsilon_bounds, of_the_set
 from gne_mj.system import System
 
 
@@ -91,7 +92,7 @@ def solve_system(
     """
     game, start = system.game, system.start
     penalised = [penalised_equilibrium(game, rho, start) for rho in rhos or (system.rho,)]
-    variational = variational_equilibrium(game, penalised[0])
+    variational = variational_equilibrium(of_the_set(game), penalised[0])
     binding = variational.multipliers > -game.constraints(variational.action)
     return Solution(
         name=system.name,
@@ -128,7 +129,7 @@ def parse_path(text: str, option: str = "--path") -> list[float]:
 def write_path(solution: Solution, file: Path) -> None:
     """The path as CSV: a row for each rho, with every action and multiplier."""
     game = solution.game
-    header = ["rho", "distance_to_variational", "epsilon_measured", "p_rho", "largest_own_p_rho"]
+    header = ["rho", "distance_to_variational", "epsilon_measured", "bound", "largest_own_bound"]
     header += [f"{game.action_name} {a + 1}" for a in range(game.actions)]
     header += [f"multiplier of {name}" for name in game.constraint_names]
     with file.open("w", encoding="utf-8", newline="") as stream:
@@ -142,8 +143,8 @@ def write_path(solution: Solution, file: Path) -> None:
                     numbers["rho"],
                     numbers["distance_to_variational"],
                     epsilon["measured"],
-                    epsilon["p_rho"],
-                    epsilon["largest_own_p_rho"],
+                    epsilon["bound"],
+                    epsilon["largest_own_bound"],
                     *numbers["action"],
                     *numbers["multipliers"],
                 ]
@@ -152,7 +153,7 @@ def write_path(solution: Solution, file: Path) -> None:
 
 def _measure(game: Game, point: Equilibrium, variational: Equilibrium) -> Measured:
     distance = float(np.max(np.abs(point.action - variational.action)))
-    return Measured(point, measured_epsilon(game, point.action), distance)
+    return Measured(point, measured_epsilon(of_the_set(game), point.action), distance)
 
 
 def _numbers(game: Game, point: Equilibrium) -> dict[str, Any]:
@@ -168,7 +169,6 @@ def _numbers(game: Game, point: Equilibrium) -> dict[str, Any]:
 
 
 def _compared(game: Game, point: Measured) -> dict[str, Any]:
-    rho, own = point.equilibrium.rho, game.own_constraints
     largest = int(np.argmax(point.gains))
     return {
         **_numbers(game, point.equilibrium),
@@ -177,9 +177,7 @@ def _compared(game: Game, point: Measured) -> dict[str, Any]:
             "measured": float(point.gains[largest]),
             "agent": largest + 1,
             "each": point.gains.tolist(),
-            "p_rho": game.constraints_count * rho,
-            "own_p_rho": (own * rho).tolist(),
-            "largest_own_p_rho": float(np.max(own)) * rho,
+            **epsilon_bounds(game, point.equilibrium),
         },
     }
 
@@ -202,7 +200,9 @@ def summary(solution: Solution) -> list[str]:
             f"    {'multipliers':16} {_listed(point.equilibrium.multipliers)}",
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
-            f" p rho = {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}",
+            f" at most {epsilon['bound']:g} = p rho"
+            + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
+            + f", {epsilon['largest_own_bound']:g} by each agent's own constraints",
             f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
     lines += [
@@ -215,12 +215,12 @@ def summary(solution: Solution) -> list[str]:
         f" {variational.iterations} iterations",
     ]
     if solution.path:
-        lines += ["  path", f"    {'rho':>10}  {'distance':>10}  {'epsilon':>10}  {'p rho':>10}"]
+        lines += ["  path", f"    {'rho':>10}  {'distance':>10}  {'epsilon':>10}  {'at most':>10}"]
         for point in solution.path:
-            rho = point.equilibrium.rho
             lines.append(
-                f"    {rho:10.3g}  {point.distance:10.3g}  {np.max(point.gains):10.3g}"
-                f"  {game.constraints_count * rho:10.3g}"
+                f"    {point.equilibrium.rho:10.3g}  {point.distance:10.3g}"
+                f"  {np.max(point.gains):10.3g}"
+                f"  {epsilon_bounds(game, point.equilibrium)['bound']:10.3g}"
             )
     return lines
 

@@ -45,16 +45,23 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" steps each; predicted outputs off by up to"
             f" {implicit['largest_prediction_error']:.2g}"
         )
-        for key, what in (
-            ("not_accurate", "not accurate (though inside)"),
-            ("periods_not_monotone", "periods without dy+/du > 0"),
+        for key, first, what in (
+            (
+                "not_accurate",
+                "first_not_accurate",
+                "not accurate, at whose periods' ends nothing is promised",
+            ),
+            ("periods_not_monotone", "first_not_monotone", "periods without dy+/du > 0"),
         ):
             if implicit[key]:
-                rows["held inputs"] += f"; {implicit[key]} {what}"
+                rows["held inputs"] += (
+                    f"; {implicit[key]} {what} (first at {implicit[first]:.4g} s)"
+                )
     if epsilon["measured"] is not None:
         rows["epsilon"] = (
-            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
-            f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
-            + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; at most"
+            f" {epsilon['bound']:.4g} = p rho"
+            + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
+            + f", and {epsilon['largest_own_bound']:.4g} by each agent's own constraints"
         )
     return rows

@@ -4,11 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import EQUAL, V0, integrators, pi_cascades, robot_state, robots
+from builders import (
+    EQUAL,
+    V0,
+    integrators,
+    pi_cascades,
+    random_consensus,
+    robot_state,
+    robots,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gne_mj.controllers import FullInformation
+from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Noise, Push, SensorDelay
 from gne_mj.games import (
@@ -19,11 +28,18 @@ from gne_mj.games import (
     velocity_game,
 )
 from gne_mj.loops import monitor as watch
-from gne_mj.margins import Disturbance, influence, largest_push, tightening
+from gne_mj.margins import (
+    Disturbance,
+    epsilon_bounds,
+    influence,
+    largest_push,
+    of_the_set,
+    tightening,
+)
 from gne_mj.plants.ode import OdePlant
 from gne_mj.scenario import load_scenario
 from gne_mj.system import Clock, System
-from gne_mj.theory import certify, search_period, search_push
+from gne_mj.theory import certify, search_period, search_push, words
 
 
 def random_robots(rng, count=5):
@@ -269,8 +285,70 @@ def test_what_agents_could_gain_is_asked_of_the_set_itself():
 
     report = run("velocity-sync", {**MARGIN, "simulation.duration": 0.1}).reports["robots"]
     epsilon = report["epsilon"]
-    assert epsilon["measured"] <= epsilon["p_rho"] + epsilon["of_margin"]
+    assert epsilon["measured"] <= epsilon["largest_own_bound"] <= epsilon["bound"]
+    assert epsilon["bound"] == epsilon["p_rho"] + epsilon["of_margin"]
     assert epsilon["of_margin"] > 0
+
+
+def tightened_game(rng):
+    """A game with a margin, each in its turn, and a profile inside what is left."""
+    kind = int(rng.integers(3))
+    if kind == 0:
+        n = int(rng.integers(2, 6))
+        wishes = rng.uniform(-9, 9, n)
+        game = velocity_game(
+            n, V0, 3.0, desired_velocity=wishes, desired_weight=rng.uniform(0.5, 5, n)
+        )
+        return game.tightened(rng.uniform(0, 8.9, n)), np.full(n, V0)
+    if kind == 1:
+        drawn = random_consensus(int(rng.integers(2**31)), 2)
+        game = drawn.game
+        t = rng.uniform(0, 0.9) * game.gap_bounds**2
+        return game.tightened(t), np.tile(drawn.oracle.v0, game.agents)
+    n = int(rng.integers(2, 5))
+    price, noise = rng.uniform(0.2, 1, n), rng.uniform(0.05, 0.5, n)
+    game = osnr_game(
+        price, rng.uniform(1, 3, n), rng.uniform(0.3, 1, n), noise, rng.uniform(0, 0.02, (n, n)),
+        2.0,
+    )  # fmt: skip
+    t = np.append(rng.uniform(0, 0.1, n), rng.uniform(0, 1.0))
+    return game.tightened(t), np.full(n, 0.9 / n)
+
+
+def test_no_agent_can_gain_more_than_the_bound_whatever_the_margin():
+    beyond_p_rho = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        game, y = tightened_game(rng)
+        found = penalised_equilibrium(game, 10.0 ** rng.uniform(-4, 0), y)
+        bounds = epsilon_bounds(game, found)
+        gains = measured_epsilon(of_the_set(game), found.action)
+        own = np.array(bounds["own_bound"])
+        assert np.all(gains <= own * (1 + 1e-9) + 1e-9), seed
+        assert np.max(own) == bounds["largest_own_bound"]
+        assert np.max(own) <= bounds["bound"] * (1 + 1e-12)
+        # by hand, agent by agent
+        for i in range(game.agents):
+            mine = [k for k, who in enumerate(game.in_constraint) if i in who]
+            by_hand = sum(found.rho + found.multipliers[k] * game.margins[k] for k in mine)
+            assert own[i] == pytest.approx(by_hand, rel=1e-12)
+        beyond_p_rho += np.max(gains) > bounds["p_rho"]
+    assert beyond_p_rho > 5  # p rho alone would be wrong
+
+
+def test_certify_tells_what_the_margin_costs():
+    changes = {**MARGIN, "margin": {"push": 4.0}, "initial.action": 3.0}
+    scenario = load_scenario("desired-velocity", changes)
+    (system,) = scenario.system_objects()
+    report = certify(system, scenario.clock())
+    bounds = report.to_dict()["equilibrium"]
+    lost = float(system.equilibrium.multipliers @ system.game.margins)
+    assert lost > 0.1
+    assert bounds["of_margin"] == pytest.approx(lost)
+    assert bounds["bound"] == pytest.approx(bounds["p_rho"] + lost)
+    gains = measured_epsilon(of_the_set(system.game), system.equilibrium.action)
+    assert np.max(gains) <= bounds["largest_own_bound"] <= bounds["bound"]
+    assert f"{bounds['bound']:.4g} = p rho" in "\n".join(words(report))
 
 
 def test_a_start_within_the_tightening_is_refused():

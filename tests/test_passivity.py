@@ -9,7 +9,7 @@ import pytest
 from builders import EQUAL, UNEQUAL, integrators, pi_cascades, reference_robots, robots
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
@@ -130,7 +130,10 @@ def kept_by(f):
 @pytest.mark.parametrize("storage", ["agents", None])
 @pytest.mark.parametrize("name", PASSIVE)
 def test_passive_plants_pass(name, storage, integrator):
-    report = examine(ode(PASSIVE[name], integrator), 0.02, storage=storage, outputs=(-10.0, 2.0))
+    report = examine(
+        ode(PASSIVE[name], integrator), 0.02, storage=storage, outputs=(-10.0, 2.0),
+        reaches=(1.0, 1e3),
+    )  # fmt: skip
     assert report.holds, report.message
     assert report.status == "no violation found"
     assert "no proof" in report.message
@@ -140,7 +143,7 @@ def test_passive_plants_pass(name, storage, integrator):
     assert all(finding.excess <= finding.error for finding in report.findings)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     seed=st.integers(0, 2**32 - 1),
     name=st.sampled_from(sorted(PASSIVE)),
@@ -176,7 +179,9 @@ def test_passive_about_one_equilibrium_only():
         return -y * (y - 2) ** 2
 
     near_zero = (-0.01, 0.01)
-    assert examine(scalars(f), 0.02, equilibrium=kept_by(f), outputs=near_zero).holds
+    assert examine(
+        scalars(f), 0.02, equilibrium=kept_by(f), outputs=near_zero, reaches=(1.0,)
+    ).holds
     report = examine(scalars(f), 0.02, equilibrium=kept_by(f), outputs=(-2.0, 2.0))
     assert not report.holds
     assert 2 / 3 < report.counterexample.finding.rest_output < 2
@@ -248,6 +253,62 @@ def test_energy_of_a_spring_that_pushes_apart_obeys_the_balance_but_is_negative(
         "energy extracted",
         "storage negative",
     }
+
+
+@pytest.mark.parametrize(("stiffness", "reach"), [(-0.02, 1e3), (-0.0005, 1e4)])
+def test_springs_that_push_from_far_out_only_are_found(stiffness, reach):
+    """psi = k s + atan(s): its energy is negative beyond some 3/|k| m, 150 and 6000 here."""
+    build = ode(robots({**EQUAL, "stiffness": [stiffness] * 5}))
+    near = examine(build, 0.02, duration=10.0, reaches=(1.0,))
+    assert near.holds
+    report = examine(build, 0.02, duration=10.0)
+    assert report.status == "violated"
+    assert [r.reach for r in report.ranges] == [r for r in (1.0, 30.0, 1e3, 1e4) if r <= reach]
+    assert report.counterexample.finding.reach == reach
+    assert report.counterexample.confirmed
+    farthest = report.ranges[-1].states["extension"]
+    assert quad(lambda s: stiffness * s + np.arctan(s), 0, farthest, limit=500)[0] < 0
+    assert farthest > 3 / abs(stiffness) > near.ranges[0].states["extension"]
+
+
+def test_an_error_that_fades_with_the_step_is_no_violation():
+    """Springs without dampers at a thousand times the range: their kink is within one step."""
+    undamped = robots({**UNEQUAL, "damping": [0.0] * 5})
+    report = examine(ode(undamped), 0.02, duration=10.0, trials=9, seed=564)
+    assert report.status == "no violation found"
+    assert [r.reach for r in report.ranges] == [1.0, 30.0]
+    assert "at 1000 times the outputs' range" in report.message
+
+
+def test_the_ranges_are_those_that_were_tried():
+    """By hand, from the trials' own starts and inputs: integrators only move with their input."""
+    report = examine(ode(integrators(2)), 0.02, trials=4, duration=4.0, outputs=(-1.0, 2.0))
+    assert [r.reach for r in report.ranges] == [1.0, 30.0, 1e3]
+    for tried in report.ranges:
+        assert set(tried.states) == {"action"}
+        assert 0 < tried.input <= 3 * 3.0 * tried.reach
+        assert tried.output == pytest.approx(tried.states["action"], rel=0.2)
+        assert tried.output <= 4.0 * tried.input + 1e-9  # from rest, in 4 s
+    words = "\n".join(report.summary())
+    assert "at 3 amplitudes" in words
+    assert f"tried up to {report.ranges[-1].output:.3g} from y*" in words
+    assert report.to_dict()["ranges"][2]["reach"] == 1e3
+
+
+def test_amplitudes_at_which_outputs_run_away_say_nothing():
+    class Fragile(OdePlant):
+        @property
+        def output(self):
+            y = super().output
+            return np.where(np.abs(y) > 10.0, np.nan, y)
+
+    report = examine(
+        lambda copies, h: Fragile(integrators(2).repeated(copies), h), 0.02, trials=12, duration=4.0
+    )
+    assert report.holds
+    assert [r.reach for r in report.ranges] == [1.0]
+    assert report.examined == 4.0
+    assert "at 30 times the outputs' range an output ran away" in report.message
 
 
 def repeated_by_scipy(example, numbers, output):
@@ -343,7 +404,7 @@ def test_a_plant_that_is_no_longer_a_number_ends_its_trials():
 
 
 def test_mujoco_gives_what_the_ode_gives():
-    options = {"duration": 4.0, "trials": 13, "seed": 3}
+    options = {"duration": 4.0, "trials": 13, "seed": 3, "reaches": (1.0,)}
     twin = examine(ode(robots(UNEQUAL)), 0.02, **options)
     fleet = examine(plants_of(robots(UNEQUAL), "mujoco", "rk4"), 0.02, **options)
     assert twin.holds

@@ -141,7 +141,8 @@ def passivity(
     """Look for violations of equilibrium-independent passivity in the plants of a scenario.
 
     Trials last as long as the scenario, and use its step and half of it; input limits and the law
-    do not matter here. That no violation is found is no proof.
+    do not matter here. Amplitudes grow, and the report tells how far was tried. That no violation
+    is found is no proof.
     """
     from gne_mj.passivity import examine, plants_of
     from gne_mj.scenario import load_scenario

@@ -71,6 +71,8 @@ def osnr_game(
         values=lambda y: np.sum(y, axis=1),
         bound=total_power_limit,
     )
+    weight = np.prod([columns["utility_weight"], columns["gain"]], axis=0)
+    noise, response = np.asarray(columns["noise_power"]), matrix + np.diag(columns["gain"])
     return Game(
         name="OSNR",
         kernels=sys.modules[__name__],
@@ -86,20 +88,19 @@ def osnr_game(
         box=(np.zeros(agents), np.full(agents, total_power_limit)),
         agent_name="channel",
         quantities=(total,),
-        jacobian_bounds=partial(
-            _jacobian_bounds,
-            np.prod([columns["utility_weight"], columns["gain"]], axis=0),
-            np.asarray(columns["noise_power"]),
-            matrix + np.diag(columns["gain"]),
-        ),
+        jacobian_bounds=partial(_jacobian_bounds, weight, noise, response),
         row_scaled=True,
+        # All of the power in the channel that is heard most: no feasible profile gives more.
+        feasible_jacobian_bounds=_slope_bounds(
+            weight, response, noise, noise + total_power_limit * np.max(response, axis=1)
+        ),
     )
 
 
 def _jacobian_bounds(
     weight: NDArray[np.float64], noise: NDArray[np.float64], response: NDArray[np.float64], box: Box
 ) -> Box:
-    """Bounds of dF/dy = diag(weight / received^2) response, received = noise + response y.
+    """Bounds of dF/dy over a box.
 
     response >= 0, so that what is received is least and greatest at two corners of the box.
     Without bounds (infinite) where it need not be positive.
@@ -107,6 +108,19 @@ def _jacobian_bounds(
     least, most = noise + response @ box[0], noise + response @ box[1]
     if np.any(least <= 0):
         return np.full_like(response, -np.inf), np.full_like(response, np.inf)
+    return _slope_bounds(weight, response, least, most)
+
+
+def _slope_bounds(
+    weight: NDArray[np.float64],
+    response: NDArray[np.float64],
+    least: NDArray[np.float64],
+    most: NDArray[np.float64],
+) -> Box:
+    """Bounds of dF/dy = diag(weight / received^2) response, each channel receiving least to most.
+
+    What it receives is noise + response y, noise included.
+    """
     return (weight / most**2)[:, None] * response, (weight / least**2)[:, None] * response
 
 

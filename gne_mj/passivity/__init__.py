@@ -15,12 +15,24 @@ integral, by Simpson's rule. Everything is computed with the given step and with
 the same inputs, side by side. The difference of the two bounds the error of the finer one for a
 method of any order p >= 1; twice its greatest value so far is taken, of V and of the supply each,
 and an excess counts only beyond that and rounding. The violation that is shown is repeated with a
-sixth of the step: where that disagrees by more than the estimated error, the step does not resolve
-the plant's motion, and nothing is said. (What oscillates several times within a step can look slow
-at every step tried: the step must suit the plant.)
+sixth of the step: where that disagrees by more than the estimated error, or half of the excess, the
+step does not resolve the plant's motion, and nothing is said. (What oscillates several times within
+a step can look slow at every step tried: the step must suit the plant.)
+
+Amplitudes and deviations grow, from the outputs' range to a thousand times that and where V is seen
+to be negative to a million times, until something is found or no longer resolved; the report says
+how far from the equilibria was tried.
 """
 
 from gne_mj.passivity.examine import examine, plants_of
-from gne_mj.passivity.report import CHECKS, Counterexample, Finding, PassivityReport
+from gne_mj.passivity.report import CHECKS, Counterexample, Finding, PassivityReport, Range
 
-__all__ = ["CHECKS", "Counterexample", "Finding", "PassivityReport", "examine", "plants_of"]
+__all__ = [
+    "CHECKS",
+    "Counterexample",
+    "Finding",
+    "PassivityReport",
+    "Range",
+    "examine",
+    "plants_of",
+]

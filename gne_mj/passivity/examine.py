@@ -1,9 +1,11 @@
 """The examination of a plant: trials of all its channels, and the worst that they showed."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.passivity.report import (
@@ -14,13 +16,19 @@ from gne_mj.passivity.report import (
     Counterexample,
     Finding,
     PassivityReport,
+    Range,
+    widest,
 )
-from gne_mj.passivity.trials import Build, Rest, Storage, Trials
+from gne_mj.passivity.trials import Build, Rest, Storage, Trials, least_storage
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import OdePlant
 
+# How many times the outputs' range is gone through; beyond SIMULATED only where V is negative, by
+# more than rounding
+REACHES = (1.0, 30.0, 1e3, 1e4, 1e5, 1e6)
+SIMULATED, ROUNDING = 1e3, 1e-12
 # Channels in one simulation, at most
 _CHANNELS = 512
 
@@ -58,6 +66,7 @@ def examine(
     owners: ArrayLike | None = None,
     equilibrium: Rest | None = None,
     storage: Storage | Literal["agents"] | None = "agents",
+    reaches: Sequence[float] = REACHES,
 ) -> PassivityReport:
     """Look for a violation of equilibrium-independent passivity.
 
@@ -74,6 +83,9 @@ def examine(
         equilibrium: the state and input that rest at y*; by default the agents' own, with u* = 0.
         storage: V; by default the agents' own, where their type has one. Without one all trials
             start at rest.
+        reaches: how many times the outputs' range amplitudes and deviations are in proportion to,
+            one after the other until a violation is found or the step no longer resolves the
+            motion; beyond a thousand times only where V is seen to be negative.
 
     Raises:
         InvalidInput: numbers that cannot be used, or a plant that does not rest at its equilibria.
@@ -92,14 +104,62 @@ def examine(
     lower, upper = (np.broadcast_to(np.asarray(b, dtype=np.float64), (channels,)) for b in outputs)
     if not (np.all(np.isfinite(upper - lower)) and np.all(lower < upper)):
         raise InvalidInput("outputs", outputs, "each lower one must be below the upper one")
+    where = (lower, upper)
+    rest = 0.5 * (lower + upper)
+    levels: list[_Level] = []
+    unresolved = None
+    for reach in reaches:
+        if reach > SIMULATED and not (
+            least_storage(build, reach * (upper - lower), rest, equilibrium, storage) < -ROUNDING
+        ):
+            continue
+        level = _level(build, trials, timestep, duration, seed, where, owner, equilibrium, storage,
+                       reach)  # fmt: skip
+        sure = level.counterexample is None or level.counterexample.confirmed
+        if levels and (not sure or (level.escaped and level.counterexample is None)):
+            unresolved = reach
+            break
+        levels.append(level)
+        if level.counterexample is not None or level.escaped:
+            break
+    return _report(levels, unresolved, owner, trials, seed, duration, timestep)
+
+
+@dataclass(frozen=True)
+class _Level:
+    """What the trials of one amplitude showed."""
+
+    worst: dict[tuple[int, int], Finding]
+    counterexample: Counterexample | None
+    examined: float
+    escaped: bool
+    has_storage: bool
+    range: Range
+
+
+def _level(
+    build: Build,
+    trials: int,
+    timestep: float,
+    duration: float,
+    seed: int,
+    outputs: tuple[NDArray[np.float64], NDArray[np.float64]],
+    owner: NDArray[np.int64],
+    equilibrium: Rest | None,
+    storage: Storage | Literal["agents"] | None,
+    reach: float,
+) -> _Level:
+    """All trials of one amplitude, so many channels at a time."""
     worst: dict[tuple[int, int], Finding] = {}
     counterexample, examined, escaped, has_storage = None, duration, False, False
-    batch = max(1, _CHANNELS // channels)
+    ranges = []
+    batch = max(1, _CHANNELS // len(owner))
     for first in range(0, trials, batch):
         part = Trials(build, range(first, min(first + batch, trials)), timestep, duration, seed,
-                      (lower, upper), owner, equilibrium, storage)  # fmt: skip
+                      outputs, owner, equilibrium, storage, reach)  # fmt: skip
         examined = min(examined, float(part.time[-1]))
         escaped, has_storage = escaped or part.escaped, part.has_storage
+        ranges.append(part.range())
         found = part.findings()
         for finding in found:
             place = (finding.channel, CHECKS.index(finding.check))
@@ -110,14 +170,42 @@ def examine(
             counterexample is None or _rank(shown) > _rank(counterexample.finding)
         ):
             counterexample = part.counterexample(shown)
+    return _Level(worst, counterexample, examined, escaped, has_storage, widest(ranges))
+
+
+def _report(
+    levels: list[_Level],
+    unresolved: float | None,
+    owner: NDArray[np.int64],
+    trials: int,
+    seed: int,
+    duration: float,
+    timestep: float,
+) -> PassivityReport:
+    """The levels together: the last one's violation, or the worst of all that held."""
+    last = levels[-1]
+    worst = dict(last.worst)
+    if last.counterexample is None:
+        for level in levels:
+            for place, finding in level.worst.items():
+                if _severity(finding) > _severity(worst.get(place, finding)):
+                    worst[place] = finding
     findings = tuple(worst[place] for place in sorted(worst))
     agents = len(set(owner.tolist()))
+    examined = min(level.examined for level in levels)
     message = f"{trials} trials of {duration:g} s for each of {agents} agents, seed {seed}"
-    if not has_storage:
+    if len(levels) > 1:
+        message += f", at {len(levels)} amplitudes"
+    if not last.has_storage:
         message += ", no storage function known"
-    if escaped:
+    if last.escaped:
         message += f"; some ended at {examined:.4g} s, when an output had run away"
-    status, message = _verdict(message, findings, counterexample, timestep)
+    if unresolved is not None:
+        message += (
+            f"; at {unresolved:g} times the outputs' range an output ran away, or the step did not"
+            " resolve the motion, which says nothing"
+        )
+    status, message = _verdict(message, findings, last.counterexample, timestep)
     return PassivityReport(
         status=status,
         message=message,
@@ -127,9 +215,10 @@ def examine(
         duration=duration,
         examined=examined,
         timestep=timestep,
-        storage=has_storage,
+        storage=last.has_storage,
+        ranges=tuple(level.range for level in levels),
         findings=findings,
-        counterexample=counterexample,
+        counterexample=last.counterexample,
     )
 
 

@@ -1,5 +1,6 @@
 """What an examination of a plant's passivity found."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -15,7 +16,8 @@ class Finding:
     Attributes:
         check: one of CHECKS.
         agent, channel: numbered from 1; a channel is one output with its input.
-        trial: numbered from 0; with the seed it defines everything that was done.
+        trial: numbered from 0; with the seed and ``reach`` it defines everything that was done.
+        reach: how many times the outputs' range amplitudes and deviations are in proportion to.
         excess: by how much the inequality is violated; zero or negative where it holds.
         error: estimate of the error of ``excess``.
         exchanged: energy moved until then, in either direction, to compare with.
@@ -27,6 +29,7 @@ class Finding:
     agent: int
     channel: int
     trial: int
+    reach: float
     excess: float
     error: float
     exchanged: float
@@ -51,8 +54,39 @@ class Finding:
         return (
             f"agent {self.agent}: {self.check}: {self.excess:.4g} (error {self.error:.2g},"
             f" {self.exchanged:.4g} exchanged) from {self.since:.4g} s to {self.time:.4g} s,"
-            f" equilibrium y = {self.rest_output:.4g}, trial {self.trial}"
+            f" equilibrium y = {self.rest_output:.4g}, trial {self.trial}, reach {self.reach:g}"
         )
+
+
+@dataclass(frozen=True)
+class Range:
+    """How far trials went from their equilibria.
+
+    Attributes:
+        reach: how many times the outputs' range amplitudes and deviations were in proportion to.
+        output, input: greatest |y - y*| and |u - u*| over all agents and times.
+        states: greatest |x - x*| of each state, by its name.
+    """
+
+    reach: float
+    output: float
+    input: float
+    states: dict[str, float]
+
+    def sentence(self) -> str:
+        """For people."""
+        states = ", ".join(f"{name} {value:.3g}" for name, value in self.states.items())
+        return (
+            f"tried up to {self.output:.3g} from y*, inputs up to {self.input:.3g} from u*,"
+            f" states up to: {states}"
+        )
+
+
+def widest(ranges: Sequence[Range]) -> Range:
+    """What several ranges of one reach come to together."""
+    states = {name: max(r.states[name] for r in ranges) for name in ranges[0].states}
+    output, inputs = (max(getattr(r, key) for r in ranges) for key in ("output", "input"))
+    return Range(ranges[0].reach, output, inputs, states)
 
 
 @dataclass(frozen=True)
@@ -80,8 +114,12 @@ class Counterexample:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the repetition agrees, to within the error that was estimated."""
-        return abs(self.repeated_excess - self.finding.excess) <= self.finding.error
+        """Whether the repetition agrees, to within the error that was estimated.
+
+        What is no more than an error itself fades with the step, and does not count either.
+        """
+        change = abs(self.repeated_excess - self.finding.excess)
+        return change <= min(self.finding.error, 0.5 * self.finding.excess)
 
 
 @dataclass(frozen=True)
@@ -97,6 +135,7 @@ class PassivityReport:
         examined: after which time the shortest one ended, in s (an output had run away).
         timestep: the coarser integration step in s; errors are against half of it.
         storage: whether a storage function was known and checked.
+        ranges: how far the trials went from their equilibria, one amplitude after the other.
         findings: for each channel the worst of each check.
         counterexample: None if there is no violation.
     """
@@ -110,6 +149,7 @@ class PassivityReport:
     examined: float
     timestep: float
     storage: bool
+    ranges: tuple[Range, ...]
     findings: tuple[Finding, ...]
     counterexample: Counterexample | None
 
@@ -132,5 +172,6 @@ class PassivityReport:
             ]
         return [
             f"{self.status}: {self.message}",
+            f"  {self.ranges[-1].sentence()}",
             *(f"  {finding.sentence()}" for finding in shown),
         ]

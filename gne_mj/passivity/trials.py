@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.passivity.excitation import COMBINATIONS, Excitation
-from gne_mj.passivity.report import CHECKS, Counterexample, Finding
+from gne_mj.passivity.report import CHECKS, Counterexample, Finding, Range
 from gne_mj.plants.base import Plant
 
 # (copies, timestep in s) -> a plant with the channels of all agents, ``copies`` times in a row
@@ -26,6 +26,8 @@ _SAFETY = 2.0
 _FIRST = 20
 # Roundings in V, relative to the squared range of the output; each step may round once more.
 _ROUNDINGS = 10
+# States at which V is looked at without a trial
+_STATES = 200
 # A trial ends where an output is this many times its range away: nothing passive gets there.
 _ESCAPED = 1e6
 
@@ -48,11 +50,12 @@ class Trials:
         owner: NDArray[np.int64],
         equilibrium: Rest | None,
         storage: Storage | Literal["agents"] | None,
+        reach: float = 1.0,
     ) -> None:
         steps = round(duration / timestep)
         self.substeps = 2 * max(1, -(-steps // (2 * _HOLDS)))
         holds = steps // self.substeps
-        self.trials, self.timestep, self.owner = trials, timestep, owner
+        self.trials, self.timestep, self.owner, self.reach = trials, timestep, owner, reach
         self.hold = self.substeps * timestep
         self.plants = [build(len(trials), timestep), build(len(trials), 0.5 * timestep)]
         self.build, self.storage = build, storage
@@ -60,7 +63,7 @@ class Trials:
         # Numbers of a trial depend on the seed and the trial alone.
         generators = [np.random.default_rng([seed, trial]) for trial in trials]
         lower, upper = outputs
-        width = upper - lower
+        width = reach * (upper - lower)
         self.width = np.tile(width, len(trials))
         self.rest_output = np.concatenate([rng.uniform(lower, upper) for rng in generators])
         if equilibrium is None:
@@ -79,15 +82,8 @@ class Trials:
             [not self.has_storage or trial // COMBINATIONS % 2 == 0 for trial in trials],
             len(self.owner),
         )
-        shape = (len(owner), self.rest_state.shape[1])
-        deviation = np.concatenate(
-            [
-                rng.normal(size=shape)
-                * width[:, None]
-                * np.exp(rng.uniform(-3.5, 0.0, (shape[0], 1)))
-                for rng in generators
-            ]
-        )
+        states = self.rest_state.shape[1]
+        deviation = np.concatenate([deviations(rng, width, states) for rng in generators])
         self.initial_state = self.rest_state + np.where(self.at_rest[:, None], 0.0, deviation)
         self._simulate(holds)
 
@@ -96,7 +92,7 @@ class Trials:
         plant.reset(self.rest_state)
         plant.step(self.rest_input, self.substeps)
         moved = np.abs(plant.output - self.rest_output)
-        if not np.all(moved <= 1e-9 * (np.abs(self.rest_output) + self.width)):
+        if not np.all(moved <= 1e-9 * (np.abs(self.rest_output) + self.width / self.reach)):
             worst = int(np.argmax(np.where(np.isnan(moved), np.inf, moved)))
             raise InvalidInput(
                 "equilibrium",
@@ -112,8 +108,10 @@ class Trials:
         supplied = np.zeros((2, holds + 1, channels))
         stored = np.zeros((2, holds + 1, channels))
         moved, gross = np.zeros((holds + 1, channels)), np.zeros((holds + 1, channels))
+        self.farthest = np.max(np.abs(self.initial_state - self.rest_state), axis=0)
         for plant in self.plants:
             plant.reset(self.initial_state)
+        self.farthest_output = 0.0
         everyone = slice(None)
         stored[:, 0] = self._stored(self.plants[1], everyone)
         done = 0
@@ -131,6 +129,9 @@ class Trials:
             if not np.all(np.maximum(*away) <= _ESCAPED * self.width):
                 break
             done = k + 1
+            states = np.abs(self.plants[1].state - self.rest_state)
+            self.farthest = np.maximum(self.farthest, np.max(states, axis=0))
+            self.farthest_output = max(self.farthest_output, float(np.max(away)))
         self.time = self.hold * np.arange(done + 1)
         self.supplied, self.stored = supplied[:, : done + 1], stored[:, : done + 1]
         peak = np.maximum.accumulate(np.abs(self.stored[1]))
@@ -165,6 +166,21 @@ class Trials:
         if storage is None:
             return np.zeros(plant.agents.channels)
         return storage(plant.state, self.rest_state[mine])
+
+    def range(self) -> Range:
+        """How far the trials went from their equilibria."""
+        kind = getattr(self.plants[0].agents, "kind", None)
+        names = [name for name, _ in getattr(kind, "STATES", ())]
+        if len(names) != len(self.farthest):
+            names = [f"state {k + 1}" for k in range(len(self.farthest))]
+        done = len(self.time) - 1
+        inputs = np.abs(self.input[:done] - self.rest_input)
+        return Range(
+            reach=self.reach,
+            output=self.farthest_output,
+            input=float(np.max(inputs, initial=0.0)),
+            states=dict(zip(names, self.farthest.tolist(), strict=True)),
+        )
 
     def findings(self) -> list[Finding]:
         """The worst of each check for each channel."""
@@ -208,6 +224,7 @@ class Trials:
                     agent=int(agent) + 1,
                     channel=channel + 1,
                     trial=self.trials[int(trial)],
+                    reach=self.reach,
                     excess=float(excess[k, r]) + 0.0,
                     error=float(error[k, r]),
                     exchanged=float(self.exchanged[k, r]),
@@ -253,6 +270,48 @@ class Trials:
             "storage negative": -stored,
         }
         return float(excess[finding.check][channel])
+
+
+def deviations(
+    rng: np.random.Generator, width: NDArray[np.float64], states: int
+) -> NDArray[np.float64]:
+    """Random states (channels, states) about an equilibrium, up to about ``width`` (channels,).
+
+    Each state has a size of its own, so that what is large may be one of them alone.
+    """
+    shape = (len(width), states)
+    direction = rng.normal(size=shape)
+    return direction * width[:, None] * np.exp(rng.uniform(-7.0, 0.0, shape))
+
+
+def least_storage(
+    build: Build,
+    width: NDArray[np.float64],
+    rest_output: NDArray[np.float64],
+    equilibrium: Rest | None,
+    storage: Storage | Literal["agents"] | None,
+) -> float:
+    """The least V, over the squared widths, of many states about an equilibrium; 0 without a V.
+
+    Args:
+        build, equilibrium, storage: of the plant.
+        width: (channels,) how far states are away.
+        rest_output: (channels,) y*.
+    """
+    plant = build(1, 1.0)
+    known = _storage(plant, storage)
+    if known is None:
+        return 0.0
+    rest = (
+        plant.agents.equilibrium(rest_output)
+        if equilibrium is None
+        else equilibrium(rest_output)[0]
+    )
+    rng = np.random.default_rng(0)
+    found = [
+        known(rest + deviations(rng, width, rest.shape[1]), rest) / width**2 for _ in range(_STATES)
+    ]
+    return float(np.min(found))
 
 
 def _storage(plant: Plant, storage: Storage | Literal["agents"] | None) -> Storage | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gne_mj.exit_map import Cell
+from gne_mj.margins import epsilon_bounds
 from gne_mj.plots.style import STYLE, line_style
 from gne_mj.solve import Solution
 
@@ -22,7 +23,9 @@ def save_path(solution: Solution, file: Path) -> None:
     lines = {
         "distance to the vGNE": [point.distance for point in solution.path],
         "measured $\\epsilon$": [np.max(point.gains) for point in solution.path],
-        "$p\\rho$": solution.game.constraints_count * rho,
+        "its bound": [
+            epsilon_bounds(solution.game, point.equilibrium)["bound"] for point in solution.path
+        ],
     }
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")

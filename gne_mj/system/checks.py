@@ -156,7 +156,16 @@ def check_faults(system: "System") -> None:
         except InvalidInput as error:
             where = error.key.replace("faults", f"{key}.{number}", 1)
             raise InvalidInput(where, error.value, error.expected) from None
-    held = strikes_messages(system.faults) or sensor_delay(system.faults) > 0
+    late = sensor_delay(system.faults) > 0
+    if late and system.decentralised:
+        raise InvalidInput(
+            key,
+            "late sensors",
+            "looking ahead over a sensor's delay needs the inputs that all others had meanwhile,"
+            " which an agent of the decentralised law does not have: use mode 'sampled', or leave"
+            " decentralised out",
+        )
+    held = strikes_messages(system.faults) or late
     if held and system.mode == "continuous":
         raise InvalidInput(
             key,

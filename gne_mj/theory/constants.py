@@ -11,17 +11,15 @@ profiles, whichever profiles the other agents have.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.game import Box, Game
+from gne_mj.theory.monotonicity import Bound, least_eigenvalue
 
 EXACT, BOUNDED, SAMPLED = "exact", "bounded", "sampled"
 
-# Matrices that are tried one by one: 2^m of them for m rows that vary
-MOST_ENDS = 4096
 # Sampled points, and how much work their eigenvalues may be
 SAMPLES = 200
 _WORK = 1e10
@@ -67,17 +65,24 @@ class Slopes:
     feasible: bool
 
     @cached_property
-    def ends(self) -> NDArray[np.float64] | None:
-        """Matrices (count, m, m) whose convex hull holds dF/dy with every row taken anywhere."""
+    def rows(self) -> Box | None:
+        """Two matrices (m, m) between whose rows those of dF/dy lie, the shorter ones first.
+
+        The same one twice for an affine F; None if nothing of the kind is known.
+        """
         if self._affine:
-            return self.game.pseudo_gradient_jacobian(self.center)[None]
-        if self._bounds is None or not self.game.row_scaled or 2**self.game.actions > MOST_ENDS:
+            here = self.game.pseudo_gradient_jacobian(self.center)
+            return here, here
+        if self._bounds is None or not self.game.row_scaled:
             return None
         lower, upper = self._bounds
         flipped = np.abs(lower) > np.abs(upper)
-        rows = np.where(flipped, upper, lower), np.where(flipped, lower, upper)
-        choice = np.array(list(product((False, True), repeat=self.game.actions)))
-        return np.where(choice[:, :, None], rows[1], rows[0])
+        return np.where(flipped, upper, lower), np.where(flipped, lower, upper)
+
+    @cached_property
+    def between(self) -> Bound | None:
+        """What follows for mu from ``rows``."""
+        return None if self.rows is None else least_eigenvalue(*self.rows)
 
     @property
     def label(self) -> str:
@@ -90,11 +95,11 @@ class Slopes:
     def mu(self) -> Constant:
         """Strong monotonicity: the least eigenvalue of the symmetric part of dF/dy.
 
-        It is a concave function of dF/dy, so that it is least at one of the ends. From bounds of
-        the entries alone: that of their centre less the spectral norm of their radius.
+        From bounds of the entries alone: that of their centre less the spectral norm of their
+        radius.
         """
-        if self.ends is not None:
-            return self._constant(float(_monotonicity(self.ends).min()), "mu")
+        if self.between is not None:
+            return self._constant(self.between.value, "mu")
         if self._bounds is None:
             return Constant(self.samples["mu"], SAMPLED)
         lower, upper = self._bounds
@@ -107,8 +112,7 @@ class Slopes:
         """Lipschitz constant of F: the greatest singular value of dF/dy."""
         if self._bounds is None and not self._affine:
             return Constant(self.samples["theta_1"], SAMPLED)
-        values = np.linalg.norm(self._greatest, 2, axis=(-2, -1))
-        return self._constant(float(np.max(values)), "theta_1")
+        return self._constant(float(np.linalg.norm(self._greatest, 2)), "theta_1")
 
     @cached_property
     def theta_2(self) -> Constant:
@@ -122,10 +126,7 @@ class Slopes:
         """Whether F is certainly strongly monotone over the set: mu > 0 beyond rounding."""
         if self.label == SAMPLED:
             return False
-        floor = 1e-12 * float(np.max(np.abs(self._greatest)))
-        if self.ends is None:
-            return self.mu.value > floor
-        return positive_definite(_symmetric(self.ends) - floor * np.eye(self.game.actions))
+        return self.mu.value > 1e-12 * float(np.max(np.abs(self._greatest)))
 
     @property
     def refuted(self) -> bool:
@@ -170,15 +171,18 @@ class Slopes:
         if self.game.jacobian_bounds is None or self.box is None:
             return None
         lower, upper = self.game.jacobian_bounds(self.box)
+        closer = self.game.feasible_jacobian_bounds
+        if self.feasible and closer is not None:
+            lower, upper = np.maximum(lower, closer[0]), np.minimum(upper, closer[1])
         return (lower, upper) if np.all(np.isfinite(lower) & np.isfinite(upper)) else None
 
     @property
     def _greatest(self) -> NDArray[np.float64]:
-        """Matrices at which norms of all rows together, and of some, are greatest."""
-        if self.ends is not None:
-            return self.ends
+        """A matrix at which norms of all rows together, and of some, are greatest."""
+        if self.rows is not None:
+            return self.rows[1]
         assert self._bounds is not None
-        return np.maximum(np.abs(self._bounds[0]), np.abs(self._bounds[1]))[None]
+        return np.maximum(np.abs(self._bounds[0]), np.abs(self._bounds[1]))
 
 
 def profiles(

@@ -8,22 +8,26 @@ tau/2 |estimates - y*|^2, whatever tau) falls at least as fast as the quadratic 
 With p the mean profile of e and w the rest, that is at least
 mu |p|^2 - (theta_1 + theta_2) |p| |w| + (c lambda_2 - theta_2) |w|^2, which is positive if
 4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2: the *rigorous* condition. The paper's,
-mu (c lambda_2 - theta_2) > theta_2^2, leaves theta_1 out: the *printed* one. Where the matrices
-that dF/dy may be are few, the form's own least eigenvalue tells *exactly* when it is positive.
+mu (c lambda_2 - theta_2) > theta_2^2, leaves theta_1 out: the *printed* one. Where F is affine, or
+the rows of dF/dy only change in length, the form itself is looked at, with what every such matrix
+has at least. That it is positive definite is sufficient for V to fall.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigvalsh
+from scipy.linalg import cho_factor, cho_solve, eigvalsh, helmert
+from scipy.sparse import block_diag, csr_array
 from scipy.sparse.linalg import eigsh
 
 from gne_mj.graph import Graph
 from gne_mj.theory.constants import Slopes, positive_definite
 
+Array = NDArray[np.float64]
+
 # Greatest number of operations for the quadratic form, and where iteration is quicker
-_WORK = 2e10
+_WORK = 1.3e11
 _DENSE = 500
 
 
@@ -51,8 +55,9 @@ class Coupling:
         printed: mu (c lambda_2 - theta_2) > theta_2^2; never certified, since V can rise
             all the same (docs/certificates.md has a case).
         rigorous: 4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2.
-        quadratic: the quadratic form is positive definite; None where it is not computed.
-        label: what ``quadratic`` is: "exact" for affine F, else "bounded".
+        quadratic: the quadratic form is positive definite, which is sufficient for V to fall; None
+            where it is not computed.
+        label: how its least gain is known: "exact" for affine F, else "bounded" (from above).
     """
 
     gain: float
@@ -89,57 +94,98 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
         return Coupling(gain, nothing, nothing, None, slopes.label)
     printed, rigorous = (needed / connectivity for needed in needed_connectivity(slopes))
     quadratic = None
-    ends = slopes.ends
-    if ends is not None and len(ends) * (graph.agents * slopes.game.actions) ** 3 <= _WORK:
+    bound = slopes.between
+    if bound is not None:
         owner = slopes.game.agent_of_action
-        least = 0.0
-        for slope in ends:
-            least = least_coupling(slope, graph, owner, at_least=least)
-            if least == np.inf:
-                break
-        quadratic = condition(least, sure)
+        if len(_entries(bound.base, bound.loss, owner)[0]) ** 3 <= _WORK:
+            least = least_coupling(bound.base, graph, owner, loss=bound.loss)
+            quadratic = condition(least, sure)
     return Coupling(
         gain, condition(printed, False), condition(rigorous, sure), quadratic, slopes.label
     )
 
 
 def least_coupling(
-    slope: NDArray[np.float64],
-    graph: Graph,
-    owner: NDArray[np.int64],
-    *,
-    at_least: float = 0.0,
+    slope: Array, graph: Graph, owner: NDArray[np.int64], *, loss: Array | None = None
 ) -> float:
     """The c above which the quadratic form with this dF/dy is positive definite.
 
-    In the basis of consensus (first) and the Laplacian's other eigenvectors the form has the blocks
-    B11, B21 and c Lambda + B22, of which only the last depends on c. By Schur's complement it is
-    positive definite if B11 is and c Lambda > B21 B11^-1 B21' - B22.
+    Of column r of **y**, what the agents take action r to be, only the owner's entry and those of
+    agents whose rows of dF/dy have an r-th entry are in the second term. The others are minimised
+    over: that leaves Kron's reduction of the graph to those agents, whose pseudo-inverse is the
+    part of L's that belongs to them, but for constants. With a basis 1, V_r of such a column,
+    V_r' L_r V_r = I, the form has the blocks B11 (of the consensus), B21 and c I + B22. By Schur's
+    complement it is positive definite if B11 is and c > lambda_max(B21 B11^-1 B21' - B22).
 
     Args:
         slope: dF/dy, (m, m).
         graph: of N >= 2 agents.
         owner: the agent that each action belongs to, (m,).
-        at_least: returned if nothing more is needed, which is quick to see.
+        loss: (m, m) rows w_r, by each of which w_r w_r' is taken from the part of r's owner.
+
+    Returns:
+        infinity if no c suffices.
     """
-    agents, m = graph.agents, len(slope)
-    values, vectors = np.linalg.eigh(graph.laplacian)
-    # Eigenvectors at the action's owner, scaled so that Lambda becomes the identity: (m, N - 1)
-    basis = (vectors[:, 1:] / np.sqrt(values[1:]))[owner]
-    consensus = (slope + slope.T) / (2.0 * agents)
+    if loss is None:
+        loss = np.zeros_like(slope)
+    agent, column = _entries(slope, loss, owner)
+    part = _second_term(slope, loss, owner, agent, column)
+    apart = _disagreements(graph, agent, column)
+    consensus = csr_array((np.ones(len(agent)), (np.arange(len(agent)), column)))
     try:
-        factor = cho_factor(consensus)
+        factor = cho_factor((consensus.T @ part @ consensus).toarray())
     except np.linalg.LinAlgError:
         return np.inf
-    size = (agents - 1) * m
-    between = np.einsum("ra,rs->ars", basis, slope) + np.einsum("sa,sr->ars", basis, slope)
-    between = between.reshape(size, m) / (2.0 * np.sqrt(agents))
-    apart = np.einsum("ra,rb,rs->arbs", basis, basis, 0.5 * slope, optimize=True)
-    apart = apart.reshape(size, size)
-    needed = between @ cho_solve(factor, between.T) - (apart + apart.T)
-    if positive_definite(at_least * np.eye(size) - needed):
-        return at_least
-    return max(at_least, _greatest(needed))
+    between = (apart.T @ part @ consensus).toarray()
+    needed = between @ cho_solve(factor, between.T) - (apart.T @ part @ apart).toarray()
+    return max(0.0, _greatest(needed)) if len(needed) else 0.0
+
+
+def _entries(
+    slope: Array, loss: Array, owner: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Agents i and actions r of the entries of **y** in the form's second term, by action."""
+    used = np.zeros((int(owner[-1]) + 1, len(owner)), dtype=bool)
+    np.logical_or.at(used, owner, (slope != 0.0) | (loss != 0.0))
+    used[owner, np.arange(len(owner))] = True
+    column, agent = np.nonzero(used.T)
+    return agent, column
+
+
+def _second_term(
+    slope: Array,
+    loss: Array,
+    owner: NDArray[np.int64],
+    agent: NDArray[np.int64],
+    column: NDArray[np.int64],
+) -> csr_array:
+    """sum_r (e_r s_r' + s_r e_r')/2 - w_r w_r' in the owners' entries of **y**, symmetric."""
+    rows, columns, values = [], [], []
+    for i in range(int(owner[-1]) + 1):
+        mine = np.flatnonzero(agent == i)
+        at, own = column[mine], np.flatnonzero(owner == i)
+        block = np.zeros((len(mine), len(mine)))
+        block[np.searchsorted(at, own)] = slope[np.ix_(own, at)]
+        lost = loss[np.ix_(own, at)]
+        block = 0.5 * (block + block.T) - lost.T @ lost
+        rows.append(np.repeat(mine, len(mine)))
+        columns.append(np.tile(mine, len(mine)))
+        values.append(block.ravel())
+    shape = (len(agent), len(agent))
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return csr_array(entries, shape=shape)
+
+
+def _disagreements(graph: Graph, agent: NDArray[np.int64], column: NDArray[np.int64]) -> csr_array:
+    """The bases V_r side by side, (entries, entries - m)."""
+    # The pseudo-inverse but for a constant, which differences do not see
+    inverse = np.linalg.inv(graph.laplacian + 1.0 / graph.agents)
+    bases = []
+    for r in range(int(column[-1]) + 1):
+        known = agent[column == r]
+        apart = helmert(len(known)).T if len(known) > 1 else np.zeros((1, 0))
+        bases.append(apart @ np.linalg.cholesky(apart.T @ inverse[np.ix_(known, known)] @ apart))
+    return csr_array(block_diag(bases))
 
 
 def _greatest(matrix: NDArray[np.float64]) -> float:

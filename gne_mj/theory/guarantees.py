@@ -7,10 +7,12 @@ import numpy as np
 
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
+from gne_mj.margins import epsilon_bounds
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
 from gne_mj.theory.coupling import needed_connectivity
+from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.theorem import HELD, Theorem
@@ -36,6 +38,7 @@ class Guarantees:
     epsilon: dict[str, Any] | None
     start: dict[str, Any]
     equilibrium: dict[str, Any]
+    inputs: dict[str, Any]
     periods: dict[str, Any]
     held: dict[str, Any] | None
     lyapunov_claimed: bool
@@ -64,7 +67,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "mode": system.mode,
             "integrator": system.integrator,
             "engine": system.engine,
-            "limited_inputs": bool(np.any(np.isfinite(system.agents.input_limit))),
+            "limited_inputs": limited(system),
         },
         status=HELD if held is not None and held.promised else theorem.status,
         theorem={
@@ -89,8 +92,9 @@ def certify(system: System, clock: Clock) -> Guarantees:
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": system.equilibrium.action.tolist(),
-            **verdict.epsilon_bounds(system),
+            **epsilon_bounds(game, system.equilibrium),
         },
+        inputs=(theorem if held is None else held).demand.report(),
         periods={
             "push": _at_both(system, push_period),
             "linear": _at_both(system, linear_period),

@@ -5,16 +5,19 @@ one system.
 """
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from gne_mj.controllers import FullyDistributed
-from gne_mj.faults import Bias, Fault, Noise, Push, Saturation, sensor_delay
 from gne_mj.margins import Disturbance, Influence, influence, largest_push
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
+from gne_mj.system.first_input import first_input, law_at_start
 from gne_mj.theory.assumptions import ASSUMED, FAILS, MET, UNKNOWN, Assumption, convex_constraints
+from gne_mj.theory.demand import Demand, limited
+from gne_mj.theory.disturbances import strength
 from gne_mj.theory.theorem import Theorem
 
 
@@ -33,17 +36,23 @@ class Held:
     @property
     def influence(self) -> Influence | None:
         """Bounds of the plant's map over a control period; None where no ODE is known."""
+        bound = self.system.disturbance
+        return self._influence(0 if bound is None else bound.delay)
+
+    def _influence(self, delay: int) -> Influence | None:
         system, clock = self.system, self.clock
         if isinstance(system.agents, MjcfRobots):
             return None
-        bound = system.disturbance
-        return influence(
-            system.agents,
-            clock.timestep,
-            system.integrator,
-            clock.steps(clock.control_period),
-            0 if bound is None else bound.delay,
-        )
+        steps = clock.steps(clock.control_period)
+        return influence(system.agents, clock.timestep, system.integrator, steps, delay)
+
+    @cached_property
+    def demand(self) -> Demand:
+        """The first input: as a run solves for it where there are limits, else as the law reads."""
+        system = self.system
+        if not limited(system):
+            return Demand(system, np.abs(law_at_start(system)), "the law at the start")
+        return Demand(system, first_input(system, self.clock), "the first period")
 
     @property
     def conditions(self) -> tuple[Assumption, ...]:
@@ -85,15 +94,19 @@ class Held:
         }
 
     def largest_push(self) -> float | None:
-        """The greatest push on all agents at once that the tightening covers; None if unknown."""
-        effect = self.influence
+        """The greatest push on all agents at once that the tightening covers; None if unknown.
+
+        Besides the errors and delay of sensors that are declared, or that faults make.
+        """
+        struck, m = strength(self.system), self.system.game.actions
+        bound = self.system.disturbance or Disturbance(np.zeros(m), np.zeros(m))
+        effect = self._influence(max(bound.delay, struck.delay))
         if effect is None:
             return None
         if self.system.decentralised:
             return 0.0
-        m = self.system.game.actions
-        bound = self.system.disturbance or Disturbance(np.zeros(m), np.zeros(m))
-        return largest_push(self.system.game, effect, bound, self.system.game.margins)
+        besides = Disturbance(np.zeros(m), np.maximum(bound.noise, struck.noise))
+        return largest_push(self.system.game, effect, besides, self.system.game.margins)
 
     def _law(self) -> Assumption:
         label = "law"
@@ -145,21 +158,23 @@ class Held:
         )
 
     def _inputs(self) -> Assumption:
-        limited = bool(np.any(np.isfinite(self.system.agents.input_limit)))
-        if limited or any(isinstance(f, Saturation) for f in self.system.faults):
-            return Assumption(
-                "inputs", ASSUMED, "as long as no input limit is met, which a run reports"
-            )
-        return Assumption("inputs", MET, "delivered as asked for")
+        if not limited(self.system):
+            return Assumption("inputs", MET, "delivered as asked for")
+        exceeded = self.demand.exceeded
+        if exceeded is not None:
+            return Assumption("inputs", FAILS, f"{exceeded}: a limit is met at once")
+        return Assumption(
+            "inputs", ASSUMED, "as long as no input limit is met, which a run reports"
+        )
 
     def _disturbances(self) -> Assumption:
         label, system = "disturbances", self.system
         bound = system.disturbance
-        struck = strength(system.faults, system)
+        struck = strength(system)
         if bound is None:
-            if not np.any(struck.push) and not np.any(struck.noise):
-                return Assumption(label, MET, "no fault moves the agents or their sensors")
-            return Assumption(label, FAILS, "there are faults and no [margin] that covers them")
+            if np.any(struck.push) or np.any(struck.noise):
+                return Assumption(label, FAILS, "there are faults and no [margin] that covers them")
+            return Assumption(label, MET, _harmless(struck.delay))
         if system.decentralised:
             return Assumption(
                 label, FAILS, "shares of slacks leave no room for disturbances: no margin is known"
@@ -193,16 +208,11 @@ def _ours(system: System) -> bool:
     return system.game.kernels.__name__.startswith("gne_mj.games.")
 
 
-def strength(faults: tuple[Fault, ...], system: System) -> Disturbance:
-    """The most that faults do at once, each channel's pushes and sensor errors added up."""
-    push, noise = np.zeros((2, system.game.actions))
-    for fault in faults:
-        at = fault.targets(system.game, system.law.graph) if isinstance(fault, MOVERS) else []
-        if isinstance(fault, Push):
-            push[at] += abs(fault.force)
-        elif isinstance(fault, Noise | Bias):
-            noise[at] += abs(fault.size)
-    return Disturbance(push, noise, sensor_delay(faults))
-
-
-MOVERS = (Push, Noise, Bias)
+def _harmless(delay: int) -> str:
+    """What is so where nothing pushes agents and sensors read true, late or not."""
+    if not delay:
+        return "no fault pushes the agents or makes their sensors wrong"
+    return (
+        f"sensors are {delay} periods late and read true, and all agents' inputs since then are"
+        " known, so that the plant's map looks ahead exactly"
+    )

@@ -9,10 +9,13 @@ from gne_mj.controllers import FullInformation, FullyDistributed, PartialInforma
 from gne_mj.game import Box
 from gne_mj.graph import complete
 from gne_mj.system import System
+from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
 from gne_mj.theory.assumptions import Assumption
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.coupling import Coupling, coupling
+from gne_mj.theory.demand import Demand, limited
+from gne_mj.theory.disturbances import estimate_error
 from gne_mj.theory.gain import Gain, required_gain
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
@@ -45,7 +48,8 @@ class Theorem:
 
         Feasible profiles; under partial information the box that also holds the estimates' starts:
         consensus keeps every estimate of an action between where they start and what that action
-        has been, and the mean of all profiles, at which the proof takes F, lies in the box too.
+        has been, but for what faults of sensors and estimates add, and the mean of all profiles, at
+        which the proof takes F, lies in the box too.
         """
         partial = isinstance(self.system.law, PartialInformation)
         box = _with_estimates(self.system) if partial else self.system.game.box
@@ -71,6 +75,11 @@ class Theorem:
         own = law.graph is not None
         graph = law.graph if law.graph is not None else complete(self.system.game.agents)
         return "own" if own else "complete", coupling(self.slopes, graph, 1.0)
+
+    @cached_property
+    def demand(self) -> Demand:
+        """What the law, as it reads, asks of the actuators at the start."""
+        return Demand(self.system, np.abs(law_at_start(self.system)), "the law at the start")
 
     @cached_property
     def gain(self) -> Gain | None:
@@ -120,6 +129,8 @@ class Theorem:
             found.append("the penalty changes in time, and the theorems have a constant one")
         if self.system.faults:
             found.append("the scenario has faults, and the theorems have none")
+        if self.system.mode != "implicit" and limited(self.system) and self.demand.exceeded:
+            found.append(f"{self.demand.exceeded}, and the theorems have inputs without limits")
         return tuple(found)
 
     @property
@@ -146,7 +157,7 @@ class Theorem:
 
 
 def _with_estimates(system: System) -> Box | None:
-    """The game's box widened to hold all estimates' starts."""
+    """The game's box widened to hold all estimates' starts, and what faults make of estimates."""
     box = system.game.box
     if box is None:
         return None
@@ -156,4 +167,5 @@ def _with_estimates(system: System) -> Box | None:
         others = system.game.agent_of_action != i
         lower[others] = np.minimum(lower[others], row[others])
         upper[others] = np.maximum(upper[others], row[others])
-    return lower, upper
+    error = estimate_error(system)
+    return lower - error, upper + error

@@ -1,40 +1,18 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
-from typing import Any
-
-import numpy as np
-
+from gne_mj.margins import epsilon_bounds
 from gne_mj.system import System
 from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
-
-
-def epsilon_bounds(system: System) -> dict[str, Any]:
-    """Bounds of the epsilon of the limit, an epsilon-vGNE [lemma:epsilon].
-
-    p rho, the same where affine constraints describe the set (None if the game's own do, or none
-    do), and the greatest p_i rho.
-    """
-    game = system.game
-    affine = game.affine_constraints
-    return {
-        "p_rho": game.constraints_count * system.rho,
-        "p_rho_affine": None if affine is None else affine * system.rho,
-        "largest_own_p_rho": float(np.max(game.own_constraints)) * system.rho,
-    }
 
 
 def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     """What the theorem gives."""
     system = theorem.system
-    bound = epsilon_bounds(system)
-    limit = f"an epsilon-vGNE with epsilon = p rho = {bound['p_rho']:g}"
-    if bound["p_rho_affine"] is not None:
-        limit += f" ({bound['p_rho_affine']:g} by the affine reading)"
-    limit += f", and p_i rho <= {bound['largest_own_p_rho']:g}"
-    limited = np.any(np.isfinite(system.agents.input_limit))
-    as_long = ", as long as no input limit is met" if limited else ""
+    limit = _limit(system)
+    as_long = ", as long as no input limit is met" if limited(system) else ""
     trust = [f"[{a.label}]" for a in theorem.assumptions if a.status == ASSUMED]
     provided = f", provided {' and '.join(trust)}" if trust else ""
     if theorem.status == CERTIFIED:
@@ -53,12 +31,26 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     if system.mode == "implicit" and held is not None and held.promised:
         terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
         return [
-            "at every control instant every shared constraint holds, from every interior start"
-            + (f", provided {' and '.join(terms)}" if terms else "")
+            "at every control instant every shared constraint holds, from every interior start,"
+            " unless the input of the period before was not found accurately (a run counts those:"
+            " not_accurate)" + (f", provided {' and '.join(terms)}" if terms else "")
         ]
     if not theorem.obstacles:
-        return ["nothing of this run; the same law in continuous time is covered by the theorem"]
+        return [
+            "nothing of this run; the same law in continuous time is covered by the theorem"
+            f"{as_long}"
+        ]
     return ["nothing"]
+
+
+def _limit(system: System) -> str:
+    """What y* is."""
+    bound = epsilon_bounds(system.game, system.equilibrium)
+    margin = " + sum lambda_l t_l" if bound["of_margin"] else ""
+    limit = f"an epsilon-vGNE with epsilon = p rho{margin} = {bound['bound']:g}"
+    if bound["bound_affine"] is not None:
+        limit += f" ({bound['bound_affine']:g} by the affine reading)"
+    return f"{limit}, and over its own constraints each agent's <= {bound['largest_own_bound']:g}"
 
 
 def measured(theorem: Theorem) -> list[str]:

@@ -49,6 +49,8 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
+    yield "epsilon of y*", _bounds(g["equilibrium"])
+    yield "inputs", _inputs(g["inputs"])
     yield "sampling", _periods(g)
     if g["held"] is not None:
         yield from _held(g["held"])
@@ -101,7 +103,8 @@ def _coupling(coupling: dict[str, Any]) -> Iterator[tuple[str, str]]:
     texts = {
         "printed": "mu (c lambda_2 - theta_2) > theta_2^2; no proof, since theta_1 is missing",
         "rigorous": "4 mu (c lambda_2 - theta_2) > (theta_1 + theta_2)^2",
-        "quadratic": f"-dV/dt's quadratic form positive definite ({coupling['label']})",
+        "quadratic": "sufficient for V to fall: -dV/dt's quadratic form positive definite"
+        f" ({coupling['label']})",
     }
     for name, text in texts.items():
         condition = coupling[name]
@@ -157,6 +160,25 @@ def _estimates(estimates: dict[str, Any]) -> str:
     if distance == 0.0:
         return "they equal y(0)"
     return f"at most {distance:.6g} from y(0); under partial information they need not lie inside"
+
+
+def _bounds(bounds: dict[str, Any]) -> str:
+    margin = f" + {bounds['of_margin']:.4g} for the margin" if bounds["of_margin"] else ""
+    return (
+        f"at most {bounds['bound']:.4g} = p rho{margin},"
+        f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
+    )
+
+
+def _inputs(inputs: dict[str, Any]) -> str:
+    if inputs["largest"] is None:
+        return f"{inputs['of']} has none"
+    text = inputs["exceeded"]
+    if text is None:
+        text = f"{inputs['of']} asks for up to {inputs['largest']:.4g} (agent {inputs['agent']})"
+        if inputs["largest_factor"] is not None:
+            text += f", up to {inputs['largest_factor']:.2g} of a limit"
+    return f"{text}; limits of at least {inputs['largest']:.4g} are not met there, at y* none is"
 
 
 def _periods(g: dict[str, Any]) -> str:

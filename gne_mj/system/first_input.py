@@ -1,0 +1,90 @@
+"""What a system's law asks of the actuators at the start, and what they deliver at a time."""
+
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.controllers.propagation import no_propagator
+from gne_mj.controllers.settings import LINKS, PENALTY
+from gne_mj.errors import InvalidInput
+from gne_mj.faults import Saturation, strikes_messages
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.feedback import Problem, work
+from gne_mj.native import compiled, source_key
+from gne_mj.plain import raise_pending
+from gne_mj.system.clock import Clock
+from gne_mj.system.system import System
+
+Array = NDArray[np.float64]
+
+
+def law_at_start(system: System) -> Array:
+    """u (m,) as the law reads at y(0) and its memory at the start, without any limit.
+
+    Faults of sensors are left out. Not a number where the law has no action.
+    """
+    game, law = system.game, system.law
+    rho = system.rho if system.schedule is None else system.schedule.start
+    y, memory = system.start.copy(), system.loop_memory.copy()
+    settings = law.settings(rho)
+    if strikes_messages(system.faults):
+        settings[LINKS] = len(system.memory)
+    problem = Problem(
+        data=game.data,
+        graph=law.graph_data,
+        settings=settings,
+        limit=system.agents.input_limit,
+        equilibrium=y,  # nothing is measured from it here
+        propagator=no_propagator(),
+    )
+    scratch = work(game.actions, game.constraints_count, game.agents)
+    scratch.now[PENALTY] = rho
+    weights = rho / -(game.constraints(y) + game.margins)
+    u = np.full(game.actions, np.nan)
+    left = _native(law.kernels, game.kernels)(problem, y, weights, memory, scratch, u)
+    raise_pending()
+    return u if left < 0 else np.full(game.actions, np.nan)
+
+
+def first_input(system: System, clock: Clock) -> Array:
+    """|u| (m,) that the first control period's input would need, without any limit.
+
+    Unlike :func:`law_at_start` that is what a run solves for in mode implicit, faults included.
+    Not a number where there is none.
+    """
+    m, p = system.game.actions, system.game.constraints_count
+    try:
+        loop = system.closed_loop(clock)
+    except InvalidInput:  # a period that no run may have
+        return np.full(m, np.nan)
+    loop.finish()
+    raise_pending()
+    if loop.monitor[watch.EXIT] != watch.INSIDE:
+        return np.full(m, np.nan)
+    at = int(watch.inputs_at(p))
+    return loop.monitor[at : at + m].copy()
+
+
+def limits_at(system: System, time: float) -> Array:
+    """The least limit (m,) of each channel's actuator at a time in s: its own, or a fault's."""
+    limits = system.agents.input_limit.copy()
+    for fault in system.faults:
+        if isinstance(fault, Saturation) and fault.start <= time + 1e-9 < fault.end + 1e-9:
+            struck = fault.targets(system.game, system.law.graph)
+            limits[struck] = np.minimum(limits[struck], fault.limit)
+    return limits
+
+
+@cache
+def _native(law: ModuleType, game: ModuleType) -> Any:
+    source = source_key(law, game)
+
+    @compiled
+    def action(problem, y, weights, memory, scratch, u):
+        _ = source
+        return law.action(game, problem, y, weights, memory, scratch, u)
+
+    return action
