@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
+from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import (
     cournot_game,
@@ -143,19 +144,31 @@ class Fleet:
 def towards_bound(
     rng: np.random.Generator, game: Game, inner: np.ndarray, margin: float
 ) -> np.ndarray:
-    """A profile (m,) on a random ray from ``inner``, this share of the way to the bound left."""
+    """A profile (m,) on a random ray from ``inner``, this share of the way to the bound left.
+
+    Where the game is tightened, that is the tightened bound.
+
+    Raises:
+        InvalidInput: ``inner`` is not inside.
+    """
+
+    def inside(y: np.ndarray) -> bool:
+        return bool(np.all(game.constraints(y) + game.margins < 0))
+
+    if not inside(inner):
+        raise InvalidInput("margin", game.name, "a tightened set that holds its middle")
     direction = rng.normal(size=game.actions)
     low, high = 0.0, 1.0
-    while np.all(game.constraints(inner + high * direction) < 0):
+    while inside(inner + high * direction):
         high *= 2.0
     for _ in range(200):
         middle = 0.5 * (low + high)
-        if np.all(game.constraints(inner + middle * direction) < 0):
+        if inside(inner + middle * direction):
             low = middle
         else:
             high = middle
     y = inner + low * (1.0 - margin) * direction
-    while not np.all(game.constraints(y) < 0):  # rounding, within 1e-9 of the bound
+    while not inside(y):  # rounding, within 1e-9 of the bound
         y = inner + (y - inner) * (1.0 - 1e-12)
     return y
 

@@ -339,7 +339,7 @@ def _try(rng: np.random.Generator, name: str) -> Draw | None:
     hard = float(rng.choice([0.0, 1.0, 5.0, 20.0]))
     y = towards_bound(rng, both.game, both.middle, margin)
     step = float(log_uniform(rng, *STEPS))
-    law = _law(rng, kind.law, count)
+    law = random_law(rng, kind.law, count)
     system = System(
         "run", both.game, agents, law, float(log_uniform(rng, 1e-6, 1.0)),
         kicked(rng, agents, y, hard), engine=kind.engine,
@@ -362,7 +362,8 @@ def _try(rng: np.random.Generator, name: str) -> Draw | None:
     return Draw(system, clock, loop, x, name, margin, hard)
 
 
-def _law(rng: np.random.Generator, information: str, count: int) -> Law:
+def random_law(rng: np.random.Generator, information: str, count: int) -> Law:
+    """A law on a random graph; coupling gain and epsilon are 1 and still to be chosen."""
     if information == "full":
         return FullInformation()
     graph = Graph(count, tuple(_pairs(rng, count)))

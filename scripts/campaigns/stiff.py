@@ -7,10 +7,11 @@ rest and are never read, then (distributed) z. Positions, on which nothing depen
 """
 
 import itertools
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.integrate import Radau
+from scipy.integrate import LSODA, Radau
 
 ROBOT, INTEGRATOR, CASCADE = "robot", "integrator", "cascade"
 STATES = {ROBOT: 3, INTEGRATOR: 1, CASCADE: 2}
@@ -67,6 +68,7 @@ class Game:
         pull: F.
         line, bound: C (lines, m), d (lines,); first among the constraints if any.
         disc, center, radius: B (discs, k, m), r (discs, k), delta (discs,).
+        sign: -1 for all that is outside of a disc, (discs,) or one for all.
     """
 
     owner: np.ndarray
@@ -76,18 +78,23 @@ class Game:
     disc: np.ndarray
     center: np.ndarray
     radius: np.ndarray
+    sign: np.ndarray | float = 1.0
+
+    @property
+    def _signed(self):
+        return np.broadcast_to(self.sign, self.radius.shape)[:, None, None] * self.disc
 
     def slacks(self, rows):
         """-g at profiles (n, m): (n, p)."""
         away = np.einsum("lka,na->nlk", self.disc, rows) - self.center
         length = np.sqrt(np.sum(away**2, axis=2))
-        of_discs = (self.radius - length) * (self.radius + length)
+        of_discs = self.sign * (self.radius - length) * (self.radius + length)
         return np.concatenate([self.bound - rows @ self.line.T, of_discs], axis=1)
 
     def slopes(self, rows):
         """dg/dy at profiles (n, m): (n, p, m)."""
         away = np.einsum("lka,na->nlk", self.disc, rows) - self.center
-        of_discs = 2.0 * np.einsum("lka,nlk->nla", self.disc, away)
+        of_discs = 2.0 * np.einsum("lka,nlk->nla", self._signed, away)
         lines = np.broadcast_to(self.line, (len(rows), *self.line.shape))
         return np.concatenate([lines, of_discs], axis=1)
 
@@ -99,7 +106,7 @@ class Game:
         """d2phi/dy2 at profiles (n, m): (n, m, m)."""
         slack, slope = self.slacks(rows), self.slopes(rows)
         scaled = slope * (np.sqrt(rho) / slack)[:, :, None]
-        curved = np.einsum("lka,lkb->lab", self.disc, self.disc)
+        curved = np.einsum("lka,lkb->lab", self._signed, self.disc)
         weight = 2.0 * rho / slack[:, len(self.bound) :]
         return np.einsum("npa,npb->nab", scaled, scaled) + np.einsum("nl,lab->nab", weight, curved)
 
@@ -269,13 +276,33 @@ class Loop:
 
 
 def follow(loop, x, times, rtol):
-    """SciPy's Radau from times[0] through all times: outputs (reached, m), one row a time.
+    """SciPy's LSODA from times[0] through all times: outputs (reached, m), one row a time.
 
-    Restarted at each time, so that no row is interpolated (the dense output is of lower order).
     Fewer rows come back if its step becomes too small, as where the law's domain ends.
     """
     rows = [x[loop.output]]
-    step = 1e-3 / max(1.0, float(np.max(np.sum(np.abs(loop.jacobian(0.0, x)), axis=1))))
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # it says in a warning what its status says, too
+        solver = LSODA(
+            loop.rate, times[0], x, times[-1], rtol=rtol, atol=0.01 * rtol, jac=loop.jacobian,
+            first_step=_first_step(loop, x),
+        )  # fmt: skip
+        while solver.status == "running":
+            solver.step()
+            if solver.status == "failed":
+                break
+            passed = times[len(rows) : np.searchsorted(times, solver.t, side="right")]
+            if len(passed):
+                rows += list(solver.dense_output()(passed).T[:, loop.output])
+    return np.array(rows)
+
+
+def follow_by_radau(loop, x, times, rtol):
+    """The same by Radau's method, some five times slower.
+
+    Restarted at each time, so that no row is interpolated (the dense output is of lower order).
+    """
+    rows, step = [x[loop.output]], _first_step(loop, x)
     for start, end in itertools.pairwise(times):
         solver = Radau(
             loop.rate, start, x, end, rtol=rtol, atol=0.01 * rtol, jac=loop.jacobian,
@@ -289,3 +316,8 @@ def follow(loop, x, times, rtol):
         step, x = max(step, solver.h_abs), solver.y
         rows.append(x[loop.output])
     return np.array(rows)
+
+
+def _first_step(loop, x):
+    fastest = float(np.max(np.sum(np.abs(loop.jacobian(0.0, x)), axis=1)))
+    return 1e-3 / max(1.0, fastest)
