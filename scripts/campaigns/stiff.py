@@ -18,6 +18,7 @@ STATES = {ROBOT: 3, INTEGRATOR: 1, CASCADE: 2}
 OUTPUT = {ROBOT: 1, INTEGRATOR: 0, CASCADE: 0}
 # What a rate is where the law has none: so great that no step of the solver is taken there
 OUTSIDE = 1e30
+SMALLEST = 1e-12  # step, of the time that has passed, at which a solution ends
 
 
 @dataclass
@@ -281,15 +282,17 @@ def follow(loop, x, times, rtol):
     Fewer rows come back if its step becomes too small, as where the law's domain ends.
     """
     rows = [x[loop.output]]
+    if not times[-1] > times[0]:
+        return np.array(rows)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # it says in a warning what its status says, too
         solver = LSODA(
             loop.rate, times[0], x, times[-1], rtol=rtol, atol=0.01 * rtol, jac=loop.jacobian,
-            first_step=_first_step(loop, x),
+            first_step=min(_first_step(loop, x), times[-1] - times[0]),
         )  # fmt: skip
         while solver.status == "running":
             solver.step()
-            if solver.status == "failed":
+            if solver.status == "failed" or solver.step_size < SMALLEST * solver.t:
                 break
             passed = times[len(rows) : np.searchsorted(times, solver.t, side="right")]
             if len(passed):
