@@ -1,4 +1,4 @@
-"""The campaigns' own oracle and games: held to the slow ones of reference.py, and to differences."""
+"""The campaigns' oracle and games: held to the slow ones of reference.py, and to differences."""
 
 import sys
 from pathlib import Path

@@ -263,9 +263,7 @@ def oracle_states(agents: Agents, state: np.ndarray) -> list[np.ndarray]:
     return [row[cut[kind]] for (kind, _), row in zip(oracle_channels(agents), state, strict=True)]
 
 
-def kicked(
-    rng: np.random.Generator, agents: Agents, y: np.ndarray, hard: float
-) -> np.ndarray:
+def kicked(rng: np.random.Generator, agents: Agents, y: np.ndarray, hard: float) -> np.ndarray:
     """States with these outputs: appendages flying off at up to ``hard`` m/s, springs extended."""
     state = agents.equilibrium(y)
     for r, (kind, _) in enumerate(oracle_channels(agents)):

@@ -73,7 +73,9 @@ def own(rng: np.random.Generator, count: int) -> Both:
     """A game of one's own: right ones, and wrong ones of four kinds."""
     n, half = quadratic_numbers(rng, count)
     m = len(n.offset)
-    which = rng.choice(["right", "not monotone", "concave", "hole", "merely"], p=[0.3, 0.2, 0.15, 0.25, 0.1])
+    which = rng.choice(
+        ["right", "not monotone", "concave", "hole", "merely"], p=[0.3, 0.2, 0.15, 0.25, 0.1]
+    )
     if which == "not monotone":
         least = float(np.linalg.eigvalsh(0.5 * (n.slope + n.slope.T))[0])
         n.slope -= (least + log_uniform(rng, 0.01, 3.0)) * np.eye(m)
@@ -122,7 +124,12 @@ FAULTY = {
 }  # fmt: skip
 NOT_DRAWN = {
     (kind, "decentralised")
-    for kind in ("lane robots, MuJoCo", "lane robots, partial", "channels, cascades", "own, partial")
+    for kind in (
+        "lane robots, MuJoCo",
+        "lane robots, partial",
+        "channels, cascades",
+        "own, partial",
+    )
 }
 
 
@@ -257,4 +264,3 @@ def _anything(rng: np.random.Generator, parts: Parts) -> tuple[Fault, ...]:
         if "partial" in parts.kind:
             choices.append(MessageLoss(probability=0.3))
     return (choices[int(rng.integers(len(choices)))],)
-
