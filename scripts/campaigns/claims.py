@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import stiff
 from draws import progress
 from wrong import Case, build, draw
 
@@ -395,6 +396,25 @@ def constants(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
         yield Check(f"{name} ({label})", holds, {"told": value, "seen": seen_})
 
 
+def premises(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
+    """What is certified has convex constraints, and costs as its theorem asks for."""
+    if not told["status"].startswith("certified"):
+        return
+    convex = bool(np.all(np.asarray(case.oracle.sign) > 0))
+    yield Check("what is certified has convex constraints", convex, None)
+    if isinstance(case.oracle.pull, stiff.Osnr):
+        return
+    slope, owner = case.oracle.pull.slope, case.oracle.owner
+    system = case.system
+    if told["status"] == HELD and (system.decentralised or system.law.graph is not None):
+        slope = slope * (owner[:, None] == owner)
+        name = "what is certified has costs convex in own actions"
+    else:
+        name = "what is certified has a monotone F"
+    least = float(np.linalg.eigvalsh(0.5 * (slope + slope.T))[0])
+    yield Check(name, least > -ROUNDING, {"least eigenvalue": least})
+
+
 def starts(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
     """The start's least margin is what the oracle has."""
     slack = float(np.min(case.oracle.slacks(case.system.start[None])))
@@ -420,7 +440,7 @@ def outputs(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
 
 
 CHECKS = (
-    for_all_time, small_epsilon, at_instants, no_fault, limits, lyapunov, tends, equilibrium,
+    premises, for_all_time, small_epsilon, at_instants, no_fault, limits, lyapunov, tends, equilibrium,
     epsilons, constants, starts, outputs,
 )  # fmt: skip
 
