@@ -17,8 +17,8 @@ from draws import progress
 from wrong import Case, build, draw
 
 from gne_mj.controllers import FullyDistributed
-from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
-from gne_mj.faults import Bias, Noise, Push, SensorDelay
+from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, SolverError
+from gne_mj.faults import Bias, Noise, Push, SensorDelay, steady_push
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
 from gne_mj.theory import certify
@@ -65,7 +65,17 @@ def main() -> int:
 
 def _job(job: tuple[int, int, int]) -> list[dict[str, Any]]:
     seed, first, last = job
-    return [one(seed, index) for index in range(first, last)]
+    return [_guarded(seed, index) for index in range(first, last)]
+
+
+def _guarded(seed: int, index: int) -> dict[str, Any]:
+    """As :func:`one`; what it does not expect is told as a contradiction, and ends no campaign."""
+    try:
+        return one(seed, index)
+    except Exception as error:
+        crash = Check("nothing crashes", False, f"{type(error).__name__}: {error}")
+        row = {"index": index, "kind": "any", "mode": "any", "verdict": "crashed"}
+        return row | _tally([crash])
 
 
 def one(seed: int, index: int) -> dict[str, Any]:
@@ -103,13 +113,13 @@ def one(seed: int, index: int) -> dict[str, Any]:
     checks = [Check("a start is taken that is inside", parts.inside, None)]
     try:
         told = certify(system, clock).to_dict()
-    except (InvalidInput, SolverError) as error:
+    except GneError as error:
         checks.append(Check("certify answers", False, str(error)))
         return row | {"verdict": "no answer"} | _tally(checks)
     row["verdict"] = told["status"]
     try:
         seen = _run(system, clock)
-    except (InvalidInput, SolverError) as error:
+    except GneError as error:
         checks.append(Check("what certify answers about can be run", False, str(error)))
         return row | _tally(checks)
     row |= {"status": seen.report["status"], "message": seen.report["message"]}
@@ -222,6 +232,23 @@ def at_instants(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]
                 implicit["largest_prediction_error"] <= most,
                 {"error": implicit["largest_prediction_error"], "told": most},
             )
+
+
+def largest_push(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
+    """The greatest push on all agents at once that the margin covers, in random directions."""
+    system = case.system
+    push = (told["held"] or {}).get("largest_push")
+    if told["status"] != HELD or system.disturbance is None or not push:
+        return
+    rng = np.random.default_rng(system.seed)
+    pushes = steady_push(system.game, push * rng.choice([-1.0, 1.0], system.game.actions))
+    delay = system.disturbance.delay
+    late = (SensorDelay(periods=delay),) if delay else ()
+    pushed = _run(replace(system, faults=(*pushes, *late)), case.clock)
+    out = pushed.report["exit"]
+    if not pushed.limited:
+        holds = not pushed.left or not out["at_control_instant"]
+        yield Check("the largest push is covered", holds, {"push": push, "exit": out})
 
 
 def system_moved(system: System) -> bool:
@@ -440,8 +467,8 @@ def outputs(case: Case, told: dict[str, Any], seen: Seen) -> Iterator[Check]:
 
 
 CHECKS = (
-    premises, for_all_time, small_epsilon, at_instants, no_fault, limits, lyapunov, tends, equilibrium,
-    epsilons, constants, starts, outputs,
+    premises, for_all_time, small_epsilon, at_instants, no_fault, limits, lyapunov, tends,
+    largest_push, equilibrium, epsilons, constants, starts, outputs,
 )  # fmt: skip
 
 
