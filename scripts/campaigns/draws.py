@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
+from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import (
     cournot_game,
@@ -99,20 +100,7 @@ class Fleet:
     def start(self, margin: float) -> np.ndarray:
         """States (m, states) whose outputs are within this share of the way to some bound."""
         rng, game = self.rng, self.game
-        inner = self._center()
-        direction = rng.normal(size=game.actions)
-        low, high = 0.0, 1.0
-        while np.all(game.constraints(inner + high * direction) < 0):
-            high *= 2.0
-        for _ in range(200):
-            middle = 0.5 * (low + high)
-            if np.all(game.constraints(inner + middle * direction) < 0):
-                low = middle
-            else:
-                high = middle
-        y = inner + low * (1.0 - margin) * direction
-        while not np.all(game.constraints(y) < 0):  # rounding, within 1e-9 of the bound
-            y = inner + (y - inner) * (1.0 - 1e-12)
+        y = towards_bound(rng, game, self._center(), margin)
         state = self.agents.equilibrium(y)
         if self.agents.kind is flexible_robot:
             m = game.actions
@@ -151,6 +139,38 @@ class Fleet:
         periods = int(rng.integers(4, 25))
         clock = Clock(period * periods, period / steps, period, period * periods)
         return Draw(system, clock, self.kind, margin)
+
+
+def towards_bound(
+    rng: np.random.Generator, game: Game, inner: np.ndarray, margin: float
+) -> np.ndarray:
+    """A profile (m,) on a random ray from ``inner``, this share of the way to the bound left.
+
+    Where the game is tightened, that is the tightened bound.
+
+    Raises:
+        InvalidInput: ``inner`` is not inside.
+    """
+
+    def inside(y: np.ndarray) -> bool:
+        return bool(np.all(game.constraints(y) + game.margins < 0))
+
+    if not inside(inner):
+        raise InvalidInput("margin", game.name, "a tightened set that holds its middle")
+    direction = rng.normal(size=game.actions)
+    low, high = 0.0, 1.0
+    while inside(inner + high * direction):
+        high *= 2.0
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if inside(inner + middle * direction):
+            low = middle
+        else:
+            high = middle
+    y = inner + low * (1.0 - margin) * direction
+    while not inside(y):  # rounding, within 1e-9 of the bound
+        y = inner + (y - inner) * (1.0 - 1e-12)
+    return y
 
 
 def progress(done: Iterable[Any], total: int, what: str) -> Iterator[Any]:

@@ -1,0 +1,236 @@
+"""Random certified systems in mode continuous: how runs end, and how near they stay to continuous
+time, which a stiff solver computes from the paper's equations."""
+
+import argparse
+import json
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import stiff
+from draws import progress
+from kinds import KINDS, Draw, draw
+
+from gne_mj.errors import GneError
+from gne_mj.simulation import Simulation
+from gne_mj.theory import Theorem
+from gne_mj.theory.theorem import CONDITIONAL
+
+RUNS_A_JOB = 25
+LARGEST = 160  # states of a system that is compared
+WANTED = 1e-6  # greatest relative difference
+# Each with the relative tolerances of its two solutions; the second where the first is not sure
+METHODS = ((stiff.follow, 1e-11, 1e-10), (stiff.follow_by_radau, 1e-10, 1e-9))
+CRUDE = 1e-7  # relative tolerance where only the solution's end matters
+SURE = 1e-7  # greatest relative difference of the two where the solver is relied on
+LEFT = ("left_feasible_set", "estimate_left_feasible_set", "diverged")
+AS_CONTINUOUS = "left, as in continuous time"
+REFUSED, CRASHED = "refused", "crashed"
+# Of the law without its barrier, step times greatest rate: below it RK4 can be asked for WANTED
+SMOOTH = 0.05
+
+
+def main() -> int:
+    """Run, print the tables; 1 if a run left, or was farther off than wanted."""
+    parser = argparse.ArgumentParser(prog="scripts/check-continuous", description=__doc__)
+    parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--against", type=int, default=400, help="of them against a stiff solver")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--index", type=int, help="repeat this run alone")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", type=Path, help="JSON file for the counts and each notable run")
+    options = parser.parse_args()
+    started = time.perf_counter()
+    if options.index is not None:
+        found = one(options.seed, options.index, against=True)
+        print(json.dumps(found, indent=2))
+        return 0
+    share = options.against / max(options.runs, 1)
+    jobs = [
+        (options.seed, first, min(first + RUNS_A_JOB, options.runs), share)
+        for first in range(0, options.runs, RUNS_A_JOB)
+    ]
+    rows: list[dict[str, Any]] = []
+    with ProcessPoolExecutor(options.processes) as pool:
+        for part in progress(pool.map(_job, jobs), len(jobs), "runs"):
+            rows += part
+    lines, broken = report(rows)
+    print("\n".join([*lines, "", f"{time.perf_counter() - started:.0f} s"]))
+    if options.out:
+        kept = [row for row in rows if "error" in row or _is_broken(row) or row["divided"]]
+        text = json.dumps({"seed": options.seed, "runs": len(rows), "notable": kept}, indent=1)
+        options.out.write_text(text + "\n", encoding="utf-8")
+    return 1 if broken else 0
+
+
+def _job(job: tuple[int, int, int, float]) -> list[dict[str, Any]]:
+    seed, first, last, share = job
+    # Spread evenly, so that which runs are compared follows from the counts alone
+    return [
+        _guarded(seed, index, int((index + 1) * share) > int(index * share))
+        for index in range(first, last)
+    ]
+
+
+def _guarded(seed: int, index: int, against: bool) -> dict[str, Any]:
+    """As :func:`one`; what it does not expect ends no campaign."""
+    try:
+        return one(seed, index, against=against)
+    except Exception as error:
+        row = {"index": index, "kind": "any", "integrator": "any", "divided": 0}
+        return row | {"status": CRASHED, "message": f"{type(error).__name__}: {error}"}
+
+
+def one(seed: int, index: int, *, against: bool) -> dict[str, Any]:
+    """Draw a system, run it, and compare it if asked; plain numbers, strings and None."""
+    drawn = draw(np.random.default_rng([seed, index]))
+    system, clock = drawn.system, drawn.clock
+    row: dict[str, Any] = {
+        "index": index, "kind": drawn.kind, "agents": system.game.agents, "rho": system.rho,
+        "margin": drawn.margin, "kick": drawn.kick, "integrator": system.integrator,
+        "timestep": clock.timestep, "duration": clock.duration, "divided": 0,
+    }  # fmt: skip
+    try:
+        simulation = Simulation([system], clock)
+        trajectory = simulation.run()
+    except GneError as error:
+        return row | {"status": REFUSED, "message": str(error)}
+    report = trajectory.reports["run"]
+    row |= {"status": report["status"], "message": report["message"], "end": report["end_time"]}
+    division = report.get("division") or {}
+    row["divided"] = division.get("divided_steps", 0)
+    row["smallest_step"] = division.get("smallest_step")
+    data = trajectory["run"]
+    y = data["action"].to_numpy().reshape(len(data["time"]), -1)
+    times = data["time"].to_numpy()
+    if drawn.loop.length > LARGEST:
+        return row
+    # The theorem is for some small epsilon: with this one continuous time may leave, too.
+    conditional = row["status"] in LEFT and Theorem(system).status == CONDITIONAL
+    if conditional and leaves(drawn, times[-1] + 2 * clock.sample_period):
+        row["status"] = AS_CONTINUOUS
+    elif against:
+        row |= compare(drawn, times, y)
+    return row
+
+
+def leaves(drawn: Draw, until: float) -> bool:
+    """Whether the stiff solution ends before a time in s."""
+    return len(stiff.follow(drawn.loop, drawn.x, np.array([0.0, until]), CRUDE)) < 2
+
+
+def compare(drawn: Draw, times: np.ndarray, y: np.ndarray) -> dict[str, Any]:
+    """The greatest relative difference from the stiff solution, and how sure that solution is.
+
+    Args:
+        drawn: the system.
+        times: (samples,) in s.
+        y: (samples, m) outputs of the run; where it ended early, up to there.
+    """
+    best, own = solution(drawn.loop, drawn.x, times)
+    reached = min(len(y), len(best))
+    away = _relative(y[:reached], best[:reached])
+    at = int(np.argmax(away))
+    return {
+        "error": float(away[at]),
+        "error_time": float(times[at]),
+        "reference_error": float(own),
+        "compared": reached,
+        "step_times_rate": smooth_rate(drawn) * drawn.clock.timestep,
+    }
+
+
+def solution(loop: stiff.Loop, x: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, float]:
+    """Outputs at the times that are reached, and how far those of two tolerances are apart.
+
+    By another method where one does not agree with itself.
+    """
+    for follow, *tolerances in METHODS:
+        best, other = (follow(loop, x, times, rtol) for rtol in tolerances)
+        reached = min(len(best), len(other))
+        apart = float(np.max(_relative(other[:reached], best[:reached])))
+        if apart <= SURE and len(best) == len(times):
+            break
+    return best[:reached], apart
+
+
+def _relative(y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Greatest difference of each row, relative to the reference's greatest where above 1."""
+    scale = np.maximum(1.0, np.max(np.abs(reference), axis=1))
+    return np.max(np.abs(y - reference), axis=1) / scale
+
+
+def smooth_rate(drawn: Draw) -> float:
+    """Greatest rate, in 1/s, of the closed loop at the start without the barrier."""
+    loop = drawn.loop
+    rho, loop.rho = loop.rho, 0.0
+    slope = loop.jacobian(0.0, drawn.x)
+    loop.rho = rho
+    return float(np.max(np.abs(np.linalg.eigvals(slope))))
+
+
+def _is_broken(row: dict[str, Any]) -> bool:
+    wrong = row["integrator"] != "euler" and row.get("error", 0.0) > WANTED
+    return row["status"] in (*LEFT, CRASHED) or wrong
+
+
+def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
+    """Markdown tables: how runs ended by kind, and how far off they were; what is broken."""
+    statuses = sorted({row["status"] for row in rows})
+    lines = ["| kind | runs | " + " | ".join(statuses) + " | with divided steps |"]
+    lines.append("|---" * (len(statuses) + 3) + "|")
+    for kind in (*KINDS, "all"):
+        own = [row for row in rows if kind in (row["kind"], "all")]
+        cells = [sum(row["status"] == status for row in own) for status in statuses]
+        divided = sum(row["divided"] > 0 for row in own)
+        lines.append(f"| {kind} | {len(own)} | " + " | ".join(map(str, cells)) + f" | {divided} |")
+    compared = [row for row in rows if "error" in row]
+    lines += ["", *_differences(compared), ""]
+    broken = [row for row in rows if _is_broken(row)]
+    for row in broken[:20]:
+        shown = {key: row[key] for key in ("index", "kind", "status") if key in row}
+        numbers = ("agents", "rho", "margin", "kick", "timestep", "error", "step_times_rate")
+        shown |= {key: f"{row[key]:.4g}" for key in numbers if row.get(key) is not None}
+        lines.append(", ".join(f"{key} {value}" for key, value in shown.items()))
+    left = sum(row["status"] in LEFT for row in rows)
+    crashed = sum(row["status"] == CRASHED for row in rows)
+    smallest = min((row["smallest_step"] for row in rows if row.get("smallest_step")), default=None)
+    if smallest is not None:
+        lines.append(f"smallest step: {smallest:.3g} s")
+    lines.append(
+        f"left: {left} of {len(rows)}; farther off than {WANTED:g}, but inside:"
+        f" {len(broken) - left - crashed}; crashed: {crashed}"
+    )
+    return lines, len(broken)
+
+
+def _differences(rows: list[dict[str, Any]]) -> list[str]:
+    lines = [
+        f"| integrator, step x rate | compared | greatest difference | over {WANTED:g} |"
+        " of the solver's two solutions | solver not sure |",
+        "|---|---|---|---|---|---|",
+    ]
+    for integrator in ("rk4", "rosenbrock", "euler"):
+        for low, high in ((0.0, SMOOTH), (SMOOTH, np.inf)):
+            own = [
+                row for row in rows
+                if row["integrator"] == integrator and low <= row["step_times_rate"] < high
+            ]  # fmt: skip
+            if not own:
+                continue
+            side = f"below {high:g}" if np.isfinite(high) else f"from {low:g}"
+            errors = np.array([row["error"] for row in own])
+            solver = np.array([row["reference_error"] for row in own])
+            lines.append(
+                f"| {integrator}, {side} | {len(own)} | {errors.max():.2g} |"
+                f" {np.sum(errors > WANTED)} | {solver.max():.1g} |"
+                f" {np.sum(solver > SURE)} |"
+            )
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())
