@@ -93,6 +93,9 @@ def osnr_game(
             matrix + np.diag(columns["gain"]),
         ),
         row_scaled=True,
+        constraint_class="affine",
+        smooth=True,
+        tested=True,
     )
 
 
