@@ -321,9 +321,7 @@ class Game:
         start, actions = self.actions_in_constraints
         own = actions[start[constraint] : start[constraint + 1]]
         out = np.zeros((len(own), len(own)))
-        _native(self.kernels).constraint_hessian(
-            self.data, self._profile(y), constraint, own, out
-        )
+        _native(self.kernels).constraint_hessian(self.data, self._profile(y), constraint, own, out)
         raise_pending()
         return out
 
