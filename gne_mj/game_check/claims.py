@@ -130,7 +130,7 @@ def jacobian_bounds(
     into = Comparison("jacobian_bounds", "dF/dy at the points")
     assert game.jacobian_bounds is not None
     if game.box is None:
-        into.note = "there is no box"
+        into.note = "there is no box that they could be compared over"
         return into
     lower, upper = game.jacobian_bounds(game.box)
     m = game.actions
@@ -177,7 +177,7 @@ def gap_bounds(f: Functions, points: Points, rng: np.random.Generator, most: int
     for k in chosen(rng, game.constraints_count, most):
         own = actions[start[k] : start[k + 1]]
         if len(own) > _SMALL:
-            into.note = f"constraints of more than {_SMALL} actions"
+            into.note = f"not of constraints of more than {_SMALL} actions"
             continue
         for y in points:
             rows = [_curvature_row(f, k, int(a), own, y) for a in own]
@@ -223,7 +223,7 @@ def _cost_row(f: Functions, i: int, a: int, y: Array) -> Array | None:
     return _differences(f, partial(f.slope, i, a), y, range(len(y)))
 
 
-def _curvature_row(f: Functions, k: int, a: int, own: Array, y: Array) -> Array | None:
+def _curvature_row(f: Functions, k: int, a: int, own: NDArray[np.int64], y: Array) -> Array | None:
     """d2g_k/dy_a dy_b for the constraint's own actions b, likewise."""
     if f.has_constraint_hessian:
         return np.array([f.constraint_curvature(k, a, int(b), y) for b in own])

@@ -45,8 +45,10 @@ def cost_gradients(f: Functions, y: Array, rng: np.random.Generator, most: int,
             into.difference = _difference("cost_gradient", given, what, y, "cost", found[0])
 
 
-def second_derivatives(f: Functions, y: Array, rng: np.random.Generator, most: int,
-                       costs: Comparison, gradients: Comparison, hessians: Comparison) -> None:  # fmt: skip
+def second_derivatives(
+    f: Functions, y: Array, rng: np.random.Generator, most: int,
+    costs: Comparison, gradients: Comparison, hessians: Comparison,
+) -> None:  # fmt: skip
     """All others, all actions being moved together in one random direction."""
     stencil = f.stencil(y, _random(rng, y))
     if stencil is None:
@@ -119,7 +121,8 @@ def _apart(into: Comparison, given: float, size: float, found: tuple[float, floa
     value, error = found
     size = max(size, abs(value))
     allowed = ALLOWED * size + _SAFETY * error
-    if _SAFETY * error > _VAGUE * size and abs(given - value) <= allowed:
+    vague = _SAFETY * error > _VAGUE * size
+    if vague and given != 0.0 and abs(given - value) <= allowed:
         return False
     return into.add(abs(given - value), size, allowed)
 

@@ -14,7 +14,7 @@ _ROUNDING = 16.0 * np.finfo(np.float64).eps
 
 def steps(reach: float) -> Array:
     """The steps h of a stencil whose greatest is ``reach``, shape (STEPS,)."""
-    return reach / _RATIO ** np.arange(STEPS)
+    return np.array([reach / _RATIO**n for n in range(STEPS)])
 
 
 def derivative(ahead: Array, behind: Array, h: Array) -> tuple[float, float]:

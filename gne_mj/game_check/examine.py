@@ -79,7 +79,7 @@ class _Examination:
         self.f, self.points, self.most = Functions(game), points, most
         self.rng = np.random.default_rng(0)
         self.failures: list[str] = []
-        absent = "central differences stand for it"
+        absent = "there is none, and central differences stand for it"
         second, bend = self.f.has_cost_hessian, self.f.has_constraint_hessian
         self.in_cost = Comparison("in_cost", "what functions read")
         self.in_constraint = Comparison("in_constraint", "what functions read")

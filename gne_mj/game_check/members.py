@@ -11,6 +11,7 @@ from gne_mj.game_check.functions import Functions, shown_profile
 from gne_mj.game_check.report import Comparison
 
 Array = NDArray[np.float64]
+Entries = NDArray[np.int64]
 
 # A change that is smaller than this, relative to the values, is taken for rounding
 _ROUNDING = 1e-8
@@ -63,7 +64,7 @@ def constraints(f: Functions, y: Array, rng: np.random.Generator, most: int,
                 )
 
 
-def _moved(f: Functions, y: Array, entries: Array, rng: np.random.Generator) -> list[Array]:
+def _moved(f: Functions, y: Array, entries: Entries, rng: np.random.Generator) -> list[Array]:
     """Two profiles inside that differ from y in these entries only."""
     direction = np.zeros_like(y)
     direction[entries] = rng.uniform(0.5, 1.0, len(entries)) * rng.choice([-1.0, 1.0], len(entries))
@@ -96,7 +97,7 @@ def _whom(f: Functions, value: object, y: Array, there: Array) -> str:
 
 
 def _adding(
-    f: Functions, i: int, own: list[int], others: Array, y: Array, rng: np.random.Generator,
+    f: Functions, i: int, own: list[int], others: Entries, y: Array, rng: np.random.Generator,
     into: Comparison,
 ) -> None:  # fmt: skip
     for a in own:

@@ -18,7 +18,7 @@ class Comparison:
         worst_relative: the same against the size of what is compared.
         difference: (key, value, expected) of the worst one that cannot be rounding, as
             :class:`gne_mj.errors.InvalidInput` takes them; None if there is none.
-        note: why nothing was compared.
+        note: why something was not compared.
     """
 
     what: str
@@ -101,7 +101,7 @@ class Report:
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
             for row in rows
         ]
-        lines += [f"{c.what}: not compared, {c.note}" for c in self.comparisons if c.note]
+        lines += [f"{c.what}: {c.note}" for c in self.comparisons if c.note]
         lines += [said for c in self.comparisons if (said := sentence(c)) is not None]
         return [*lines, *self.failures]
 

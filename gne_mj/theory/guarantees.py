@@ -10,6 +10,7 @@ from gne_mj.game import Box
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
+from gne_mj.theory.constants import told
 from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.held import Held
 from gne_mj.theory.periods import linear_period, push_period
@@ -114,7 +115,10 @@ def _constants(theorem: Theorem) -> dict[str, Any]:
     box = slopes.box
     instead = theorem.under_partial_information
     return {
-        **{name: asdict(getattr(slopes, name)) for name in ("mu", "theta_1", "theta_2")},
+        **{
+            name: {**asdict(getattr(slopes, name)), "told": told(name, slopes.label)}
+            for name in ("mu", "theta_1", "theta_2")
+        },
         "convention": CONVENTION,
         "domain": "everywhere"
         if slopes.label == "exact"

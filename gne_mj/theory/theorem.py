@@ -10,7 +10,7 @@ from gne_mj.game import Box
 from gne_mj.graph import complete
 from gne_mj.system import System
 from gne_mj.theory import assumptions
-from gne_mj.theory.assumptions import Assumption
+from gne_mj.theory.assumption import Assumption
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.gain import Gain, required_gain

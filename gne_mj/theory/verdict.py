@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.system import System
-from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.held import Held
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 
