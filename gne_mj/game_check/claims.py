@@ -5,7 +5,9 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
+from gne_mj.errors import UserCodeError
 from gne_mj.game_check.derivatives import chosen
 from gne_mj.game_check.functions import Functions, shown_profile, unit
 from gne_mj.game_check.report import Comparison
@@ -18,6 +20,10 @@ _STRAIGHT = 1e-6
 _ROUNDING = 1e-12
 # Constraints whose second derivative is built entry by entry
 _SMALL = 24
+# Constraints up to which extremes of actions are searched
+_FEW = 100
+# Actions of which extremes are searched
+_EXTREMES = 4
 
 
 def affine(f: Functions, points: Points, rng: np.random.Generator, most: int) -> Comparison:
@@ -114,12 +120,43 @@ def box(f: Functions, points: Points, rng: np.random.Generator, most: int) -> Co
             found = f.inside([beyond])
             if into.add(float(found), 1.0, 0.0):
                 a = int(np.argmax(np.maximum(lower - beyond, beyond - upper)))
-                into.difference = (
-                    "game.box", [float(lower[a]), float(upper[a])],
-                    f"the constraints do not imply these bounds of y_{a + 1}: y ="
-                    f" {shown_profile(beyond)} is inside all of them",
-                )  # fmt: skip
+                into.difference = _unbounded(f, a, beyond)
+    if into.difference is None and game.actions <= _SMALL and game.constraints_count <= _FEW:
+        for a in chosen(rng, game.actions, _EXTREMES):
+            for sign in (1.0, -1.0):
+                farthest = _farthest(f, points[-1], a, sign)
+                found = bool(farthest[a] > upper[a] if sign > 0 else farthest[a] < lower[a])
+                if into.add(float(found), 1.0, 0.0):
+                    into.difference = _unbounded(f, a, farthest)
     return into
+
+
+def _unbounded(f: Functions, a: int, y: Array) -> tuple[str, list[float], str]:
+    assert f.game.box is not None
+    return (
+        "game.box",
+        [float(bound[a]) for bound in f.game.box],
+        f"the constraints do not imply these bounds of y_{a + 1}: y = {shown_profile(y)} is inside"
+        " all of them",
+    )
+
+
+def _farthest(f: Functions, y: Array, a: int, sign: float) -> Array:
+    """A profile strictly inside with y_a as great (sign 1) or small (-1) as a search finds it."""
+    game, goal = f.game, -sign * unit(len(y), a)
+    try:
+        found = minimize(
+            lambda at: goal @ at, y, jac=lambda at: goal, method="SLSQP",
+            constraints={
+                "type": "ineq",
+                "fun": lambda at: -game.constraints(at),
+                "jac": lambda at: -game.constraint_jacobian(at),
+            },
+        )  # fmt: skip
+    except UserCodeError:  # a constraint fails outside
+        return y
+    nearer = y + (1.0 - 1e-7) * (found.x - y)
+    return nearer if f.inside([nearer]) else y
 
 
 def jacobian_bounds(
@@ -187,13 +224,17 @@ def gap_bounds(f: Functions, points: Points, rng: np.random.Generator, most: int
             slope = np.array([f.constraint_slope(k, int(a), y) for a in own])
             least = f.constraint(k, y) - 0.5 * slope @ np.linalg.pinv(curvature, 1e-6) @ slope
             size = float(bounds[k]) ** 2
-            if into.add(abs(least + size), size, 1e-5 * max(size, abs(f.constraint(k, y)))):
+            values = np.linalg.eigvalsh(curvature)
+            off = abs(least + size)
+            if values[0] < -1e-5 * values[-1]:
+                off = np.inf
+            if into.add(off, size, 1e-5 * max(size, abs(f.constraint(k, y)))):
                 into.difference = (
                     "game.gap_bounds", float(bounds[k]),
-                    f"constraint '{game.constraint_names[k]}' is no bound on a gap's square: its"
-                    f" least value would be {-size:.6g}, and is {least:.6g}",
+                    f"constraint '{game.constraint_names[k]}' is no bound on a gap's square: that"
+                    f" is convex with a least value of {-size:.6g}, and this is"
+                    + (" not convex" if np.isinf(off) else f"'s is {least:.6g}"),
                 )  # fmt: skip
-            values = np.linalg.eigvalsh(curvature)
             if game.affine_constraints is not None and len(own) > 1:
                 into.count += 1
                 if abs(values[-2]) > 1e-5 * abs(values[-1]):

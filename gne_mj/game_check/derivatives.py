@@ -17,6 +17,8 @@ ALLOWED = 1e-5
 _SAFETY = 20.0
 # Where differences are this uncertain, nothing is compared
 _VAGUE = 1e-2
+# By which shorter stencils a difference is confirmed
+_FINER = (1e-2, 1e-4)
 # Rows of one constraint's second derivative looked at for one profile
 _ROWS = 4
 
@@ -39,10 +41,10 @@ def cost_gradients(f: Functions, y: Array, rng: np.random.Generator, most: int,
         stencil = f.stencil(y, unit(len(y), a), own.tolist())
         if stencil is None:
             continue
-        found, given = stencil.derivative(partial(f.cost, i)), f.slope(i, a, y)
-        if _apart(into, given, abs(given), found):
-            what = f"agent {i + 1}, dJ_{i + 1}/dy_{a + 1}"
-            into.difference = _difference("cost_gradient", given, what, y, "cost", found[0])
+        value, given = partial(f.cost, i), f.slope(i, a, y)
+        if _apart(f, into, given, abs(given), stencil, value):
+            what, there = f"agent {i + 1}, dJ_{i + 1}/dy_{a + 1}", stencil.derivative(value)[0]
+            into.difference = _difference("cost_gradient", given, what, y, "cost", there)
 
 
 def second_derivatives(
@@ -67,7 +69,7 @@ def _cost_hessians(
     for a in rows:
         i = int(f.game.agent_of_action[a])
         slope, row = partial(f.slope, i, a), f.row(i, a, y)
-        if _row_apart(into, row, stencil, slope):
+        if _row_apart(f, into, row, stencil, slope):
             b, given, value = _entry(f, slope, y, row, range(len(y)))
             what = f"agent {i + 1}, d2J_{i + 1}/dy_{a + 1} dy_{b + 1}"
             into.difference = _difference(
@@ -80,7 +82,7 @@ def _constraint_gradient(
 ) -> None:
     own, value, row = _own(f, k), partial(f.constraint, k), np.zeros_like(y)
     row[own] = [f.constraint_slope(k, int(a), y) for a in own]
-    if _row_apart(into, row, stencil, value):
+    if _row_apart(f, into, row, stencil, value):
         a, given, there = _entry(f, value, y, row, own)
         what = f"constraint '{f.game.constraint_names[k]}', dg_{k + 1}/dy_{a + 1}"
         into.difference = _difference("constraint_gradient", given, what, y, "constraint", there)
@@ -93,7 +95,7 @@ def _constraint_hessian(
     for a in own[chosen(rng, len(own), _ROWS)]:
         slope, row = partial(f.constraint_slope, k, int(a)), np.zeros_like(y)
         row[own] = [f.constraint_curvature(k, int(a), int(b), y) for b in own]
-        if _row_apart(into, row, stencil, slope):
+        if _row_apart(f, into, row, stencil, slope):
             b, given, value = _entry(f, slope, y, row, own)
             name = f.game.constraint_names[k]
             what = f"constraint '{name}', d2g_{k + 1}/dy_{a + 1} dy_{b + 1}"
@@ -108,23 +110,42 @@ def _own(f: Functions, k: int) -> NDArray[np.int64]:
 
 
 def _row_apart(
-    into: Comparison, row: Array, stencil: Stencil, function: Callable[[Array], float]
+    f: Functions, into: Comparison, row: Array, stencil: Stencil, function: Callable[[Array], float]
 ) -> bool:
     """Compare a row of derivatives along a stencil's direction."""
     direction = stencil.direction
     size = float(np.abs(row) @ np.abs(direction))
-    return _apart(into, float(row @ direction), size, stencil.derivative(function))
+    return _apart(f, into, float(row @ direction), size, stencil, function)
 
 
-def _apart(into: Comparison, given: float, size: float, found: tuple[float, float]) -> bool:
+def _apart(
+    f: Functions, into: Comparison, given: float, size: float, stencil: Stencil,
+    function: Callable[[Array], float],
+) -> bool:  # fmt: skip
     """Compare, where differences are good enough; whether it is the worst difference so far."""
-    value, error = found
-    size = max(size, abs(value))
-    allowed = ALLOWED * size + _SAFETY * error
-    vague = _SAFETY * error > _VAGUE * size
-    if vague and given != 0.0 and abs(given - value) <= allowed:
+    error, size, allowed = _compared(given, size, stencil.derivative(function))
+    if error is None:
         return False
-    return into.add(abs(given - value), size, allowed)
+    for factor in _FINER if error > allowed else ():  # a ripple that long steps missed?
+        finer = f.finer(stencil, factor)
+        if finer is not None:
+            there, size_there, allowed_there = _compared(given, size, finer.derivative(function))
+            if there is not None and there <= allowed_there:
+                error, size, allowed = there, size_there, allowed_there
+    return into.add(error, size, allowed)
+
+
+def _compared(
+    given: float, size: float, found: tuple[float, float]
+) -> tuple[float | None, float, float]:
+    """(error, size, what it may be); no error where the difference is too uncertain to tell."""
+    value, uncertain = found
+    error, size = abs(given - value), max(size, abs(value))
+    allowed = ALLOWED * size + _SAFETY * uncertain
+    vague = _SAFETY * uncertain > _VAGUE * size
+    if vague and (given != 0.0 or error > allowed):
+        return None, size, allowed
+    return error, size, allowed
 
 
 def _entry(

@@ -125,7 +125,16 @@ class Functions:
             reach *= 0.5
         if reach < 1e-10 * max(1.0, float(np.max(np.abs(y)))):
             return None
-        return Stencil(direction, h, ahead, behind)
+        return Stencil(y, direction, h, ahead, behind)
+
+    def finer(self, stencil: "Stencil", factor: float) -> "Stencil | None":
+        """The same with steps that are shorter by a factor; None where one is outside."""
+        h = factor * stencil.h
+        ahead = _readonly(stencil.middle + h[:, None] * stencil.direction)
+        behind = _readonly(stencil.middle - h[:, None] * stencil.direction)
+        if not self.inside((*ahead, *behind)):
+            return None
+        return Stencil(stencil.middle, stencil.direction, h, ahead, behind)
 
     def _call(self, name: str, *arguments: Any) -> Any:
         function = getattr(self._module, name)
@@ -163,11 +172,13 @@ class Stencil:
     """Profiles on both sides of one, all inside.
 
     Attributes:
+        middle: (m,).
         direction: (m,).
         h: (STEPS,) how far from the middle.
         ahead, behind: (STEPS, m).
     """
 
+    middle: Array
     direction: Array
     h: Array
     ahead: Array

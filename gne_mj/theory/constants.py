@@ -248,7 +248,10 @@ def profiles(
         good = np.all(game.constraints(trial) < 0.0, axis=1)
         inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
     ways = np.where(np.arange(count) % 2, rng.uniform(size=count), 1.0) * inside
-    return center + ways[:, None] * (ends - center)
+    found = center + ways[:, None] * (ends - center)
+    # In a set that is not convex a part of the way can be outside where its end is not
+    good = np.all(game.constraints(found) < 0.0, axis=1)
+    return np.where(good[:, None], found, center + inside[:, None] * (ends - center))
 
 
 def positive_definite(matrices: NDArray[np.float64]) -> bool:
