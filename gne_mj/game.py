@@ -97,8 +97,7 @@ class Game:
             declare is "assumed" in certificates, where it is "met" of tested ones.
 
     Attributes:
-        functions: the module that was given as ``kernels``.
-        numbers: the parameters that were given, q.
+        written: kernels and parameters as they were given, before plain functions got addresses.
 
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
@@ -126,16 +125,16 @@ class Game:
     constraint_class: ConstraintClass | None = None
     smooth: bool = False
     tested: bool = False
-    functions: ModuleType = field(init=False, repr=False)
-    numbers: NDArray[np.float64] = field(init=False, repr=False)
+    written: tuple[ModuleType, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._check()
         self._check_declarations()
-        object.__setattr__(self, "functions", self.kernels)
-        object.__setattr__(self, "numbers", np.asarray(self.parameters, dtype=np.float64))
+        object.__setattr__(self, "written", (self.kernels, self.parameters))
         if is_plain(self.kernels):
-            kernels, addresses, kept = plain_kernels(self.kernels, self.numbers)
+            kernels, addresses, kept = plain_kernels(
+                self.kernels, np.asarray(self.parameters, dtype=np.float64)
+            )
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
             object.__setattr__(self, "_kept", kept)

@@ -66,7 +66,7 @@ def _key(game: Game) -> int:
     gaps = None if game.gap_bounds is None else np.asarray(game.gap_bounds).tobytes()
     return hash(
         (
-            id(game.functions), game.numbers.tobytes(), game.sizes,
+            id(game.written[0]), np.asarray(game.written[1], float).tobytes(), game.sizes,
             tuple(map(tuple, game.in_cost)), tuple(map(tuple, game.in_constraint)),
             game.affine, tuple(box), id(game.jacobian_bounds), game.row_scaled, gaps,
             game.affine_constraints, game.constraint_class,

@@ -30,7 +30,8 @@ class Functions:
 
     def __init__(self, game: Game) -> None:
         self.game = game
-        self._module, self._q = game.functions, game.numbers.copy()
+        self._module, parameters = game.written
+        self._q = np.array(parameters, dtype=np.float64)
         self._q.flags.writeable = False
         self._margins, self._violated = game.margins, 0
         self._all = range(game.constraints_count)

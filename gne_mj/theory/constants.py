@@ -105,8 +105,7 @@ class Slopes:
         the entries alone: that of their centre less the spectral norm of their radius.
         """
         if self.ends is not None:
-            least = float(_monotonicity(self.ends).min())
-            return self._constant(0.0 if abs(least) <= self.floor else least, "mu")
+            return self._constant(float(_monotonicity(self.ends).min()), "mu")
         if self._bounds is None:
             return Constant(self.samples["mu"], SAMPLED)
         lower, upper = self._bounds
@@ -141,9 +140,7 @@ class Slopes:
         """Whether F is certainly strongly monotone over the set: mu > 0 beyond rounding."""
         if self.label == SAMPLED:
             return False
-        if self.ends is None:
-            return self.mu.value > self.floor
-        return positive_definite(_symmetric(self.ends) - self.floor * np.eye(self.game.actions))
+        return self.mu.value > self.floor
 
     @property
     def merely_monotone(self) -> bool:
@@ -171,7 +168,9 @@ class Slopes:
         }
 
     def _constant(self, value: float, name: str) -> Constant:
-        return Constant(value, self.label, None if self._affine else self.samples[name])
+        if not self._affine:
+            return Constant(value, self.label, self.samples[name])
+        return Constant(0.0 if abs(value) <= self.floor else value, self.label)
 
     @cached_property
     def _seen(self) -> NDArray[np.float64]:

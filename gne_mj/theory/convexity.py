@@ -185,7 +185,7 @@ def shown(y: Array) -> str:
 
 def _given(game: Game, name: str) -> bool:
     """Whether the author gave a second derivative, or differences stand for it."""
-    return hasattr(game.functions, name)
+    return hasattr(game.written[0], name)
 
 
 def _tolerance(game: Game, name: str) -> float:
@@ -196,7 +196,7 @@ def _samples(game: Game, start: Array, box: Box | None = None, feasible: bool = 
     """Profiles to look at: random ones, near the boundary and towards the corners of the box."""
     members = np.diff(game.actions_in_constraints[0])
     each = float(np.sum(members**2)) + game.actions**2
-    entries = _ENTRIES if game.kernels is game.functions else _PLAIN_ENTRIES
+    entries = _ENTRIES if game.kernels is game.written[0] else _PLAIN_ENTRIES
     count = int(np.clip(entries / each, 4, SAMPLES))
     points = profiles(game, start, game.box if box is None else box, count, feasible)
     if not feasible:
