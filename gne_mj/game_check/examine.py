@@ -1,5 +1,8 @@
 """All comparisons of one game, at the same profiles every time."""
 
+from types import ModuleType
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +19,8 @@ _AT_LOAD = (3, 8)
 _ASKED = (20, 40)
 _HALVINGS = 60
 
-_compared: set[int] = set()  # keys of games that were compared at load
+# What was compared at load of each module of functions: keys of games
+_compared: WeakKeyDictionary[ModuleType, set[int]] = WeakKeyDictionary()
 
 
 def examine(game: Game, start: Array, points: int = _ASKED[0], most: int = _ASKED[1]) -> Report:
@@ -49,26 +53,26 @@ def refuse(game: Game, start: Array, key: str) -> None:
     """
     if game.tested or game.__dict__.get("_compared"):
         return
-    same = _key(game)
-    if same not in _compared:
+    done = _compared.setdefault(game.written[0], set())
+    if _key(game) not in done:
         report = examine(game, start, *_AT_LOAD)
         for comparison in report.comparisons:
             if comparison.difference is not None:
                 name, value, expected = comparison.difference
                 raise InvalidInput(f"{key}.{name}", value, expected)
-        _compared.add(same)
+        done.add(_key(game))
     object.__setattr__(game, "_compared", True)
 
 
 def _key(game: Game) -> int:
-    """The same for games of one file with the same numbers, lists and declarations."""
+    """The same for games of one module with the same numbers, lists and declarations."""
     box = () if game.box is None else (bound.tobytes() for bound in game.box)
     gaps = None if game.gap_bounds is None else np.asarray(game.gap_bounds).tobytes()
     return hash(
         (
-            id(game.written[0]), np.asarray(game.written[1], float).tobytes(), game.sizes,
+            np.asarray(game.written[1], float).tobytes(), game.sizes,
             tuple(map(tuple, game.in_cost)), tuple(map(tuple, game.in_constraint)),
-            game.affine, tuple(box), id(game.jacobian_bounds), game.row_scaled, gaps,
+            game.affine, tuple(box), game.jacobian_bounds is None, game.row_scaled, gaps,
             game.affine_constraints, game.constraint_class,
         )
     )  # fmt: skip

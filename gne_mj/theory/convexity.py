@@ -7,10 +7,12 @@ derivatives are known (affine, or bounded over the set), or where a tested game 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from gne_mj.errors import UserCodeError
 from gne_mj.game import Box, Game
@@ -20,7 +22,7 @@ from gne_mj.theory.constants import EXACT, Slopes, positive_definite, profiles
 
 Array = NDArray[np.float64]
 
-SAMPLES = 40
+SAMPLES, _FEW = 40, 4
 # How many entries of second derivatives may be computed, by kernels and by plain functions
 _ENTRIES, _PLAIN_ENTRIES = 2e7, 2e5
 # Rounding in second derivatives, relative to their size, and of those that are differences
@@ -49,8 +51,13 @@ class Counterexample:
 
 def convex_constraints(system: System) -> Assumption:
     """Convex constraints: without them the set need not be, and phi not either."""
-    game, label = system.game, "convex constraints"
-    points = _samples(game, system.start)
+    return _constraints_of(system.game, system.start.tobytes())
+
+
+@lru_cache(maxsize=16)  # several conditions rest on it
+def _constraints_of(game: Game, start: bytes) -> Assumption:
+    label = "convex constraints"
+    points = _samples(game, np.frombuffer(start))
     found = counterexample(game, points)
     if found is not None:
         name, where = game.constraint_names[found.constraint], shown(found.profile)
@@ -167,13 +174,13 @@ def strictly_convex_barrier(system: System) -> bool:
     """
     game = system.game
     span = np.zeros((game.actions, game.actions))
-    for y in _samples(game, system.start)[-5:]:
+    for y in _samples(game, system.start, most=_FEW):
         slopes = game.constraint_jacobian(y)
         sizes = np.linalg.norm(slopes, axis=1)
-        unit = slopes / np.where(sizes > 0.0, sizes, 1.0)[:, None]
+        unit = csr_array(slopes / np.where(sizes > 0.0, sizes, 1.0)[:, None])
         curved = game.weighted_constraint_hessian(y, np.ones(game.constraints_count))
         size = float(np.max(np.abs(curved)))
-        span += unit.T @ unit + (curved / size if size > 0.0 else 0.0)
+        span += (unit.T @ unit).toarray() + (curved / size if size > 0.0 else 0.0)
     floor = (1e-12 if _given(game, "constraint_hessian") else 1e-7) * np.max(np.abs(span))
     return positive_definite(span - floor * np.eye(game.actions))
 
@@ -192,12 +199,18 @@ def _tolerance(game: Game, name: str) -> float:
     return _ROUNDING if _given(game, name) else _DIFFERENCED
 
 
-def _samples(game: Game, start: Array, box: Box | None = None, feasible: bool = True) -> Array:
+def _samples(
+    game: Game,
+    start: Array,
+    box: Box | None = None,
+    feasible: bool = True,
+    most: int = SAMPLES,
+) -> Array:
     """Profiles to look at: random ones, near the boundary and towards the corners of the box."""
     members = np.diff(game.actions_in_constraints[0])
     each = float(np.sum(members**2)) + game.actions**2
     entries = _ENTRIES if game.kernels is game.written[0] else _PLAIN_ENTRIES
-    count = int(np.clip(entries / each, 4, SAMPLES))
+    count = int(np.clip(entries / each, _FEW, most))
     points = profiles(game, start, game.box if box is None else box, count, feasible)
     if not feasible:
         return points
