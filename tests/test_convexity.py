@@ -226,7 +226,9 @@ def test_sampled_constants_are_told_as_what_they_are():
     assert 1.0 - 1e-6 <= mu["value"] < 2.0
     assert (theta["label"], theta["told"]) == ("sampled", "at least")
     assert 10.0 < theta["value"] <= 13.0 + 1e-6
+    assert report.to_dict()["constants"]["c_lambda_2_needed"] == {"printed": None, "rigorous": None}
     text = "\n".join(words(report))
+    assert "if partial" not in text
     assert re.search(r"mu +1[.\d]* \(sampled, at most\)", text)
     assert re.search(r"theta_1 +1\d[.\d]* \(sampled, at least\)", text)
     bounded = certify(osnr_system(integrators(10), FullInformation(), 0.1), STEP)

@@ -309,7 +309,7 @@ def test_what_is_no_number_at_the_start_is_the_users_mistake():
     assert "not a finite number" in report.failures[0]
 
 
-def test_kernels_are_compared_without_compiling():
+def test_kernels_are_called_as_the_python_that_they_are():
     game, y = replace(cournot_game(3), tested=False), np.full(3, 20.0)
     assert examine(game, y).holds
     shorter = replace(game, parameters=game.written[1][:-1])  # reads beyond its end

@@ -1,7 +1,7 @@
 """A game's functions as its author wrote them, called one by one at profiles inside the set.
 
-Kernels are plain Python functions too, and called as such: nothing is compiled, and an entry
-beyond an array's end is noticed.
+Kernels are plain Python functions too, and called as such: hardly anything is compiled, and an
+entry beyond an array's end is noticed.
 """
 
 import math
@@ -33,6 +33,7 @@ class Functions:
         self._module, parameters = game.written
         self._q = np.array(parameters, dtype=np.float64)
         self._q.flags.writeable = False
+        self._native = game.kernels is self._module
         self._margins, self._violated = game.margins, 0
         self._all = range(game.constraints_count)
         self.has_cost_hessian = hasattr(self._module, "add_cost_hessian")
@@ -79,10 +80,12 @@ class Functions:
 
         Where a constraint fails or is no number, a profile is not.
         """
-        which = self._all if constraints is None else constraints
         t = self._margins
+        if constraints is None and self._native:  # compiled anyway, to look at the start
+            return bool(np.all(self.game.constraints(np.array(list(profiles))) + t < 0.0))
+        which = self._all if constraints is None else constraints
         try:
-            for y in profiles:
+            for y in map(_readonly, profiles):
                 for k in (self._violated, *which):  # what stopped the last one often stops the next
                     if not self.constraint(k, y) + t[k] < 0.0:
                         self._violated = k
