@@ -1,5 +1,6 @@
 """What is said of convexity and monotonicity, against second derivatives worked out by hand."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -190,6 +191,22 @@ def test_a_pole_among_the_estimates():
     inside = pole(0.1)
     assert assumption(inside, "asmp:cost").status == "met"
     assert condition(inside, "costs convex in own actions")["status"] == "met"
+
+
+def test_a_function_that_fails_at_the_estimates():
+    """J_i = y_i^2 + y_i log y_j, with Python's log, others being taken for -1."""
+    game = boxed(
+        lambda i, y: y[i] ** 2 + y[i] * math.log(y[1 - i]),
+        lambda i, y: 2 * y[i] + math.log(y[1 - i]), 3.0,
+        box=(np.zeros(2), np.full(2, 3.0)),
+    )  # fmt: skip
+    law = PartialInformation(graphs.complete(2), 9.0)
+    for estimate, status in ((-1.0, "not met"), (0.5, "assumed")):
+        start = np.array([1.0, 2.0])
+        system = of(game, start, law, memory=law.initial_memory(start, estimate))
+        found = assumption(system, "asmp:cost")
+        assert found.status == status
+        assert ("is not a number" in found.why) == (status == "not met")
 
 
 def test_own_rows_hold_over_all_of_the_box_where_f_need_not_be_monotone():

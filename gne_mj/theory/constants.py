@@ -16,6 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.errors import UserCodeError
 from gne_mj.game import Box, Game
 
 EXACT, BOUNDED, SAMPLED = "exact", "bounded", "sampled"
@@ -178,9 +179,18 @@ class Slopes:
         m = self.game.actions
         count = int(np.clip(_WORK / (50.0 * m**3), 2, SAMPLES))
         points = profiles(self.game, self.center, self.box, count, self.feasible)
-        slopes = np.array([self.game.pseudo_gradient_jacobian(y) for y in points])
+        slopes = np.array([self._slope(y) for y in points])
         found: NDArray[np.float64] = slopes[np.all(np.isfinite(slopes), axis=(1, 2))]
         return found
+
+    def _slope(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """dF/dy (m, m); not numbers where a function fails at estimates outside the set."""
+        try:
+            return self.game.pseudo_gradient_jacobian(y)
+        except UserCodeError:
+            if self.feasible:
+                raise
+            return np.full((self.game.actions,) * 2, np.nan)
 
     @cached_property
     def _variation(self) -> float:

@@ -212,10 +212,11 @@ def _samples(
     entries = _ENTRIES if game.kernels is game.written[0] else _PLAIN_ENTRIES
     count = int(np.clip(entries / each, _FEW, most))
     points = profiles(game, start, game.box if box is None else box, count, feasible)
-    if not feasible:
-        return points
-    # Differences need room: a little away from the boundary, where the way there is inside
+    # Functions need not be numbers on the boundary itself, and differences need room: a little
+    # away from it, where the way there is inside
     nearer = start + 0.98 * (points - start)
+    if not feasible:
+        return nearer
     inside = np.all(game.constraints(nearer) < 0.0, axis=1)
     return np.where(inside[:, None], nearer, points)
 
