@@ -153,13 +153,20 @@ def interior_profiles(
     while len(found) < count:
         direction = rng.normal(size=len(start))
         direction *= size / np.linalg.norm(direction)
-        length = 1.0
-        for _ in range(_HALVINGS):
-            if f.inside([center + length * direction]):
-                break
-            length *= 0.5
-        y = center + rng.uniform(0.3, 0.9) * length * direction
+        # The longer of both ways, which leads away from a start that is near a bound
+        length, sign = max((_room(f, center, sign * direction), sign) for sign in (1.0, -1.0))
+        y = center + sign * rng.uniform(0.3, 0.7) * length * direction
         y.flags.writeable = False
-        found.append(y if f.inside([y]) else center)
-        center = y if f.inside([y]) else center  # walks away from a start that is near a bound
+        center = y if f.inside([y]) else center
+        found.append(center)
     return found
+
+
+def _room(f: Functions, y: Array, direction: Array) -> float:
+    """A length, at most 1, that y may go in a direction; at least half of what it may if less."""
+    length = 1.0
+    for _ in range(_HALVINGS):
+        if f.inside([y + length * direction]):
+            return length
+        length *= 0.5
+    return 0.0
