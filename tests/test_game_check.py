@@ -95,7 +95,7 @@ MISTAKES = {
     "cost": (scaled("cost", 1.001), "cost_gradient", "dJ_"),
     "cost_gradient": (scaled("cost_gradient", 1.001), "cost_gradient", "difference quotient of"),
     "cross term": ({"add_cost_hessian": forgets_cross_term}, "add_cost_hessian", "dy_"),
-    "constraint_gradient": (scaled("constraint_gradient", 0.999), "constraint_gradient", "'ball'"),
+    "constraint_gradient": (scaled("constraint_gradient", 0.999), "constraint_gradient", "dg_"),
     "constraint_hessian": (scaled("constraint_hessian", -1.0), "constraint_hessian", "d2g_"),
     "overwrites": ({"add_cost_hessian": overwrites}, "add_cost_hessian", "must add"),
     "ignores scale": ({"add_cost_hessian": ignores_scale}, "add_cost_hessian", "must add"),
