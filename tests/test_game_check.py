@@ -137,6 +137,9 @@ def test_lists_that_leave_out_an_agent_are_refused():
 
 
 WRONG = {
+    "box of another place": (
+        {"box": (np.full(4, -2.0), np.array([2.0, 2.0, 0.4, 2.0]))}, "box", "bounds of y_3",
+    ),
     "affine": ({"affine": True}, "affine", "not affine"),
     "box": ({"box": (np.full(4, -1.2), np.full(4, 2.1))}, "box", "do not imply"),
     "corner": ({"box": (np.full(4, -2.0), np.array([2.0, 2.0, 2.0, 1.9]))}, "box", "y_4"),

@@ -105,9 +105,7 @@ def box(f: Functions, points: Points, rng: np.random.Generator, most: int) -> Co
     for y in points:
         if np.any(y < lower) or np.any(y > upper):
             into.add(1.0, 1.0, 0.0)
-            into.difference = (
-                "game.box", None, f"y = {shown_profile(y)} is inside all constraints and not in it"
-            )  # fmt: skip
+            into.difference = _unbounded(f, int(np.argmax(np.maximum(lower - y, y - upper))), y)
             continue
         ways = [sign * unit(len(y), a) for a in chosen(rng, len(y), most) for sign in (1.0, -1.0)]
         ways += list(np.where(rng.random((2 * most, len(y))) < 0.5, upper - y, lower - y))
