@@ -20,10 +20,10 @@ agent, a and b entries of a profile (a belonging to agent i) and l a constraint,
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,9 @@ from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
+# What all constraints of a game are: each includes the one before, see Game.constraint_class
+ConstraintClass = Literal["affine", "quadratic", "convex"]
+CLASSES: tuple[ConstraintClass, ...] = ("affine", "quadratic", "convex")
 
 
 class GameData(NamedTuple):
@@ -78,7 +81,8 @@ class Game:
             rows lies between the two that the bounds' entries make up.
         gap_bounds: delta_l, shape (p,), of a game whose constraints read |gap_l|^2 <= delta_l^2.
         affine_constraints: how many affine constraints describe the same set by the same barrier,
-            where the game's own are not affine; None if none do.
+            where the game's own are not affine: twice p where all bound gaps of one entry (with
+            ``gap_bounds``); None if none do.
         agent_name: what an agent is, e.g. "robot".
         axes: names of the entries of an agent's action; "1", "2", ... if left out.
         quantities: what follows from the actions and is recorded and drawn beside them.
@@ -86,6 +90,16 @@ class Game:
             constraints' own units: it guards g + t < 0. None for 0.
         feasible_jacobian_bounds: (lower, upper) bounds of every entry of dF/dy over the feasible
             profiles, each (m, m), where they are known to be closer than those over ``box``.
+        constraint_class: what the author says of all constraints: "affine", "quadratic" (convex,
+            their second derivatives the same everywhere) or "convex"; None says nothing.
+        smooth: whether the author says that F is twice continuously differentiable.
+        tested: whether the author's own tests compare the functions with each other and with what
+            is declared here. The package's games say so: comparing them again at every load would
+            only cost time. Of others :mod:`gne_mj.game_check` compares at load, and what they
+            declare is "assumed" in certificates, where it is "met" of tested ones.
+
+    Attributes:
+        written: kernels and parameters as they were given, before plain functions got addresses.
 
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
@@ -111,9 +125,15 @@ class Game:
     quantities: tuple[Quantity, ...] = ()
     tightening: NDArray[np.float64] | None = None
     feasible_jacobian_bounds: Box | None = None
+    constraint_class: ConstraintClass | None = None
+    smooth: bool = False
+    tested: bool = False
+    written: tuple[ModuleType, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._check()
+        self._check_declarations()
+        object.__setattr__(self, "written", (self.kernels, self.parameters))
         if is_plain(self.kernels):
             kernels, addresses, kept = plain_kernels(
                 self.kernels, np.asarray(self.parameters, dtype=np.float64)
@@ -148,6 +168,37 @@ class Game:
                     )
         if not all(len(members) for members in self.in_constraint):
             raise InvalidInput("game.in_constraint", [], "every constraint contains an agent")
+
+    def _check_declarations(self) -> None:
+        m, p = sum(self.sizes), len(self.in_constraint)
+        if self.constraint_class not in (None, *CLASSES):
+            raise InvalidInput(
+                "game.constraint_class",
+                self.constraint_class,
+                f"it must be one of {', '.join(CLASSES)}, or None",
+            )
+        if self.box is not None:
+            shapes = [np.shape(bound) for bound in self.box]
+            if shapes != [(m,), (m,)] or not np.all(np.less(*self.box)):
+                raise InvalidInput(
+                    "game.box",
+                    self.box,
+                    f"it must be (lower, upper), each of {m} numbers, lower below upper",
+                )
+        bounds = self.gap_bounds
+        if bounds is not None and (np.shape(bounds) != (p,) or not np.all(np.asarray(bounds) > 0)):
+            raise InvalidInput(
+                "game.gap_bounds", bounds, f"it must list {p} positive numbers, one a constraint"
+            )
+        if self.affine_constraints is not None and (
+            bounds is None or self.affine_constraints != 2 * p
+        ):
+            raise InvalidInput(
+                "game.affine_constraints",
+                self.affine_constraints,
+                f"it goes with gap_bounds, where {p} bounds on gaps of one entry are {2 * p} affine"
+                " constraints",
+            )
 
     def tightened(self, tightening: ArrayLike) -> Self:
         """The same game with a barrier of g + t < 0; t >= 0, one number or (p,)."""
@@ -267,6 +318,15 @@ class Game:
         raise_pending()
         return out
 
+    def constraint_hessian(self, constraint: int, y: ArrayLike) -> NDArray[np.float64]:
+        """d2g_l/dy2 in the actions of the constraint's own agents, in their order: (m_l, m_l)."""
+        start, actions = self.actions_in_constraints
+        own = actions[start[constraint] : start[constraint + 1]]
+        out = np.zeros((len(own), len(own)))
+        _native(self.kernels).constraint_hessian(self.data, self._profile(y), constraint, own, out)
+        raise_pending()
+        return out
+
     def tightest(self, y: ArrayLike) -> tuple[int, float]:
         """The constraint with the greatest g_l(y) and that value (negative inside)."""
         values = self.constraints(y)
@@ -352,6 +412,14 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
                             second = kernels.constraint_hessian(data.parameters, k, a, b, y)
                             out[a, b] += weights[k] * second
 
+    @compiled
+    def constraint_hessian(data, y, k, own, out):
+        _ = source
+        for row in range(len(own)):
+            for column in range(len(own)):
+                a, b = own[row], own[column]
+                out[row, column] = kernels.constraint_hessian(data.parameters, k, a, b, y)
+
     return SimpleNamespace(
         costs=costs,
         pseudo_gradient=pseudo_gradient,
@@ -359,4 +427,5 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         pseudo_gradient_jacobian=pseudo_gradient_jacobian,
         constraint_jacobian=constraint_jacobian,
         weighted_hessian=weighted_hessian,
+        constraint_hessian=constraint_hessian,
     )

@@ -226,9 +226,7 @@ def piece_of(rate, g, y, h):
     """What division.judge says of one Runge-Kutta piece of y' = rate(y) with constraints g."""
     y = np.asarray(y, dtype=float)
     m, p = len(y), len(g(y))
-    work = SimpleNamespace(
-        y=np.zeros(m), g=np.zeros(p), division=np.zeros(division.length(m, p))
-    )
+    work = SimpleNamespace(y=np.zeros(m), g=np.zeros(p), division=np.zeros(division.length(m, p)))
     data = SimpleNamespace(
         tightening=np.zeros(p), member_pointer=m * np.arange(p + 1),
         member_index=np.tile(np.arange(m), p), offsets=np.arange(m + 1),

@@ -41,7 +41,7 @@ from gne_mj.summary import summary
 from gne_mj.system import System
 from gne_mj.system.first_input import first_input, law_at_start, limits_at
 from gne_mj.theory import Held, Theorem, certify, words
-from gne_mj.theory.assumptions import ASSUMED, FAILS, MET
+from gne_mj.theory.assumption import ASSUMED, FAILS, MET
 
 H = 0.01
 APPENDAGES = [-20.0, 20.0, -20.0, 20.0, -20.0]

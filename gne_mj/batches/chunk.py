@@ -124,9 +124,7 @@ class Runner:
         key, combination = prepared.key, prepared.combination
         if key not in self._structures:
             assert combination.system is not None
-            self._structures[key] = Structure(
-                combination.system, combination.clock, self.threads
-            )
+            self._structures[key] = Structure(combination.system, combination.clock, self.threads)
             while len(self._structures) > _STRUCTURES:
                 self._structures.popitem(last=False)
         self._structures.move_to_end(key)

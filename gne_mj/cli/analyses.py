@@ -128,6 +128,29 @@ def certify(
 
 
 @app.command()
+def check(scenario: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
+    """Compare what is written twice in a scenario's games: derivatives, lists, declarations.
+
+    Derivatives are compared with differences at profiles strictly inside. Exit status 1 if anything
+    differs or a function fails.
+    """
+    from gne_mj.game_check import examine
+    from gne_mj.scenario import load_scenario
+
+    loaded = load_scenario(scenario, settings(set_))
+    reports = {}
+    for name, table in loaded.systems.items():
+        with working(as_json, PREPARING):
+            reports[name] = examine(*table.game_and_start(name))
+        if not as_json:
+            head = f"\n{name}: {reports[name].game}, {reports[name].points} profiles"
+            print("\n".join([head, *(f"  {line}" for line in reports[name].summary())]))
+    if as_json:
+        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+    raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
+
+
+@app.command()
 def passivity(
     scenario: SCENARIO,
     system: Annotated[

@@ -70,6 +70,9 @@ def cournot_game(
         affine=True,
         box=(lower.copy(), upper.copy()),
         agent_name="firm",
+        constraint_class="affine",
+        smooth=True,
+        tested=True,
     )
 
 

@@ -94,6 +94,9 @@ def osnr_game(
         feasible_jacobian_bounds=_slope_bounds(
             weight, response, noise, noise + total_power_limit * np.max(response, axis=1)
         ),
+        constraint_class="affine",
+        smooth=True,
+        tested=True,
     )
 
 

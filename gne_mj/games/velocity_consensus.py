@@ -101,6 +101,9 @@ def velocity_consensus_game(
         # A disc is no polygon; only on a line are its bounds affine.
         affine_constraints=2 * len(rows) if dimension == 1 else None,
         agent_name="robot",
+        constraint_class="quadratic",
+        smooth=True,
+        tested=True,
         axes=("x", "y", "z")[:dimension] if 1 < dimension <= 3 else (),
         quantities=(
             Quantity(

@@ -81,6 +81,9 @@ def velocity_game(
         affine_constraints=2 * agents,  # -delta_i <= gap_i <= delta_i
         agent_name="robot",
         quantities=(gaps,),
+        constraint_class="quadratic",
+        smooth=True,
+        tested=True,
     )
 
 

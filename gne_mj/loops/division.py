@@ -84,9 +84,7 @@ def stages_of(division, m, p):
     return Stages(division[HEADER:at], division[at : at + 4 * p])
 
 
-def typical_sizes(
-    outputs: NDArray[np.float64], slacks: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def typical_sizes(outputs: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.float64]:
     """What errors are compared with: (1 + p,), the outputs' size and that of each slack.
 
     Args:

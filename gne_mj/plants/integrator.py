@@ -63,6 +63,7 @@ def storage(q, x, rest):
     """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
     return 0.5 * (x[0] - rest[0]) ** 2
 
+
 @kernel
 def shared(q, x):
     """Nothing that both the rate and V need is worth keeping."""

@@ -76,6 +76,7 @@ def storage(q, x, rest):
     """Not known: nothing is measured."""
     return 0.0
 
+
 @kernel
 def shared(q, x):
     """Nothing that both the rate and V need is worth keeping."""

@@ -70,6 +70,7 @@ def storage(q, x, rest):
     output, integral = x[0] - rest[0], x[1] - rest[1]
     return 0.5 * (output * output + r * (output - integral) ** 2)
 
+
 @kernel
 def shared(q, x):
     """Nothing that both the rate and V need is worth keeping."""

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
 from gne_mj.errors import InvalidInput, nearest
+from gne_mj.game import Game
 from gne_mj.loops.base import Present
 from gne_mj.margins import with_margin
 from gne_mj.plants import flexible_robot
@@ -40,6 +41,7 @@ from gne_mj.scenario_tables.games import (
 )
 from gne_mj.scenario_tables.table import PerAction, Sizes, Table, per_action
 from gne_mj.simulation import Simulation
+from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System
 from gne_mj.theory.periods import least_rho
 
@@ -151,6 +153,33 @@ class SystemTable(Table):
         """A controller that does not say what it knows knows everything, as if left out."""
         given = isinstance(table, Mapping) and "information" not in table
         return {"information": "full", **table} if given else table
+
+    def game_and_start(self, name: str) -> tuple[Game, NDArray[np.float64]]:
+        """The game alone with a profile strictly inside: y(0) or, if it is not, one near it.
+
+        Args:
+            name: of the system.
+
+        Raises:
+            InvalidInput: no game can be made, or no such profile was found.
+        """
+        count, given = self.agents.count, self.initial.action
+        try:
+            game = self.game.build(count)
+            if given is not None:
+                y = per_action("initial.action", given, game.sizes)
+            elif self.game.type == "custom":  # it has no default start
+                y = (
+                    np.zeros(game.actions)
+                    if game.box is None
+                    else 0.5 * (game.box[0] + game.box[1])
+                )
+            else:
+                y = self.game.default_start(count)
+            inside = bool(np.all(game.constraints(y) < 0.0))
+            return game, y if inside else interior_profile(game, y)
+        except InvalidInput as error:
+            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
 
     def build(self, name: str, simulation: "SimulationTable", at: Present | None = None) -> System:
         """The system, with the simulation's integrator unless it names its own.

@@ -23,6 +23,7 @@ from gne_mj.faults import (
     strikes_messages,
 )
 from gne_mj.game import Game
+from gne_mj.game_check import refuse
 from gne_mj.loops import explicit, faultless, joint, local
 from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
@@ -93,6 +94,7 @@ class System:
         object.__setattr__(self, "barrier", LogBarrier(self.game, self.rho))
         checks.check_parts(self)
         checks.check_start(self)
+        refuse(self.game, self.start, f"systems.{self.name}")
         expected = self.law.initial_memory(self.start)
         if not len(self.memory):
             object.__setattr__(self, "memory", expected)

@@ -1,105 +1,49 @@
 """The paper's assumptions, one by one, for one system."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from gne_mj.controllers import FullyDistributed
+from gne_mj.margins import is_affine
 from gne_mj.system import System
-from gne_mj.theory.constants import BOUNDED, EXACT, Slopes, positive_definite, profiles
+from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
+from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
+from gne_mj.theory.convexity import convex_constraints, own_convexity, strictly_convex_barrier
 from gne_mj.theory.gain import Gain, types
-
-MET, ASSUMED, UNKNOWN, FAILS = "met", "assumed", "unknown", "not met"
-
-
-@dataclass(frozen=True)
-class Assumption:
-    """One assumption.
-
-    Attributes:
-        label: the paper's, e.g. "asmp:cost".
-        status: "met"; "assumed" (the author of the game or law answers for it; nothing that was
-            looked at speaks against it); "unknown" (not certified); or "not met".
-        why: one sentence.
-    """
-
-    label: str
-    status: str
-    why: str
-
-    @property
-    def granted(self) -> bool:
-        """Whether conclusions may be drawn from it."""
-        return self.status in (MET, ASSUMED)
 
 
 def costs(system: System, slopes: Slopes) -> Assumption:
-    """[asmp:cost]: convex costs; convex constraints, affine or one strictly; compact, Slater."""
-    game = system.game
-    label = "asmp:cost"
-    if not slopes.monotone:
-        status = FAILS if slopes.refuted and slopes.label == EXACT else UNKNOWN
-        return Assumption(label, status, "convexity of the costs is not certain where mu is not")
-    # What the barrier's curvature spans does not depend on how near each bound is: all weigh alike.
-    slopes_of = game.constraint_jacobian(system.start)
-    ones = np.ones(game.constraints_count)
-    span = slopes_of.T @ slopes_of + game.weighted_constraint_hessian(system.start, ones)
-    floor = 1e-12 * np.max(np.abs(span))
-    if not positive_definite(span - floor * np.eye(game.actions)):
+    """[asmp:cost]: convex costs; convex constraints, affine or one strictly; compact, Slater.
+
+    Slater's condition is the start's.
+    """
+    game, label = system.game, "asmp:cost"
+    own, constraints = own_convexity(system, slopes), convex_constraints(system)
+    parts = [own, constraints]
+    for part in parts:
+        if part.status == FAILS:
+            return Assumption(label, FAILS, part.why)
+    strict = strictly_convex_barrier(system)
+    if not strict:
         return Assumption(
             label, FAILS, "phi is not strictly convex: some actions are in no constraint's reach"
         )
-    compact = "" if game.box is not None else "; that the feasible set is compact is taken on trust"
-    status = MET if game.box is not None else ASSUMED
-    if game.gap_bounds is not None:
-        if game.affine_constraints is not None:
-            reading = (
-                f"by the {game.affine_constraints} affine constraints of the same set and barrier;"
-                " the squared gaps as printed are neither affine nor is any strictly convex"
-            )
-        else:
-            reading = (
-                "in substance: no squared gap is strictly convex, but phi is, which is what the"
-                " proofs use"
-            )
-        return Assumption(label, status, reading + compact)
-    points = profiles(game, system.start, game.box, 20, feasible=True)
-    curvature = [_curvatures(system, y) for y in points]
-    if all(np.all(c == 0.0) for c in curvature):
-        own = game.kernels.__name__.startswith("gne_mj.games.")
-        seen = "" if own else f" at {len(points)} sampled profiles, which is no proof"
-        return Assumption(
-            label, status if own else ASSUMED, f"costs convex, constraints affine{seen}{compact}"
+    status = UNKNOWN if UNKNOWN in (own.status, constraints.status) else MET
+    if status == MET and (ASSUMED in (own.status, constraints.status) or game.box is None):
+        status = ASSUMED
+    why = f"{own.why}; {constraints.why}"
+    if game.affine_constraints is not None:
+        why += (
+            f"; by the {game.affine_constraints} affine constraints of the same set and barrier,"
+            " since the squared gaps as printed are neither affine nor is any strictly convex"
         )
-    least = min(float(np.linalg.eigvalsh(c).min()) for c in curvature)
-    if least < -1e-6:
-        return Assumption(label, FAILS, f"a constraint's second derivative has {least:.3g}")
-    return Assumption(
-        label,
-        ASSUMED,
-        f"constraints convex at {len(points)} sampled profiles, which is no proof" + compact,
-    )
-
-
-def _curvatures(system: System, y: np.ndarray) -> np.ndarray:
-    """Second derivatives of each constraint, (p, m, m), for small games; else of their sum."""
-    p, m = system.game.constraints_count, system.game.actions
-    weights = np.eye(p) if p * m * m <= 1e6 else np.ones((1, p))
-    return np.array([system.game.weighted_constraint_hessian(y, w) for w in weights])
-
-
-def convex_constraints(system: System) -> Assumption:
-    """Convex constraints, which shares of their slacks rest on."""
-    game, label = system.game, "convex constraints"
-    if game.gap_bounds is not None:
-        return Assumption(label, MET, "bounds on gaps are")
-    points = profiles(game, system.start, game.box, 20, feasible=True)
-    curvature = [_curvatures(system, y) for y in points]
-    if min(float(np.linalg.eigvalsh(c).min()) for c in curvature) < -1e-6:
-        return Assumption(label, FAILS, "a constraint curves the other way at a sampled profile")
-    if game.kernels.__name__.startswith("gne_mj.games."):
-        return Assumption(label, MET, "they are affine")
-    return Assumption(label, ASSUMED, f"at {len(points)} sampled profiles, which is no proof")
+    elif game.gap_bounds is not None:
+        why += (
+            "; in substance: no squared gap is strictly convex, but phi is, which is what the"
+            " proofs use"
+        )
+    if game.box is None:
+        why += "; that the feasible set is compact is taken on trust"
+    return Assumption(label, status, why)
 
 
 def pseudo_gradient(system: System, slopes: Slopes, strong: bool) -> Assumption:
@@ -110,6 +54,10 @@ def pseudo_gradient(system: System, slopes: Slopes, strong: bool) -> Assumption:
         return Assumption(label, MET, f"F is strongly monotone {where[slopes.label]}")
     if slopes.refuted:
         return Assumption(label, FAILS, "F is not monotone: dF/dy has a negative direction")
+    if slopes.merely_monotone:
+        return Assumption(
+            label, FAILS, "mu = 0, F is merely monotone: the equilibrium need not be unique"
+        )
     reason = (
         "bounds of dF/dy are too coarse"
         if slopes.label == BOUNDED
@@ -152,9 +100,9 @@ def output_to_state(gain: Gain) -> Assumption:
 
 def smooth(system: System) -> Assumption:
     """[asmp:C2]: f and F twice, V three times continuously differentiable."""
-    own = system.game.kernels.__name__.startswith("gne_mj.games.")
+    game = system.game
     known = all(hasattr(kind, "energy_balance") for kind, _ in types(system.agents))
-    if known and (own or system.game.affine):
+    if known and (game.affine or (game.smooth and game.tested)):
         return Assumption("asmp:C2", MET, "agents and game are smooth")
     return Assumption("asmp:C2", ASSUMED, "smoothness is the author's duty")
 
@@ -185,7 +133,7 @@ def estimates_start(system: System) -> Assumption:
 def _distance_to_boundary(system: System) -> float | None:
     """From y(0), where it is known: for affine constraints."""
     game, y = system.game, system.start
-    if np.any(_curvatures(system, y)):
+    if not is_affine(game, y):
         return None
     slope = np.linalg.norm(game.constraint_jacobian(y), axis=1)
     return float(np.min(-game.constraints(y) / slope))

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.errors import UserCodeError
 from gne_mj.game import Box, Game
 from gne_mj.theory.monotonicity import Bound, least_eigenvalue
 
@@ -32,7 +33,8 @@ class Constant:
     """One constant and what it rests on.
 
     Attributes:
-        value: a lower bound of mu, or an upper bound of theta; nan if nothing is known.
+        value: of mu a lower bound, of a theta an upper one; if "sampled" the other way round, see
+            :func:`told`; nan if nothing is known.
         label: "exact" (F affine: eigenvalues or singular values), "bounded" (rigorous bounds of
             dF/dy over a box, up to rounding) or "sampled" (never to be taken as certain).
         sampled: what samples showed, beside a bound: mu is at most this, theta at least this.
@@ -46,6 +48,16 @@ class Constant:
     def certified(self) -> bool:
         """Whether it may be relied on."""
         return self.label != SAMPLED
+
+
+def told(name: str, label: str) -> str:
+    """How a constant's value is to be read: "exact", "at least" or "at most".
+
+    Samples miss the least mu and the greatest theta; rigorous bounds err on the other side.
+    """
+    if label == EXACT:
+        return EXACT
+    return "at most" if (name == "mu") == (label == SAMPLED) else "at least"
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,27 +133,37 @@ class Slopes:
             return Constant(self.samples["theta_2"], SAMPLED)
         return self._constant(float(np.max(_row_norms(self.game, self._greatest))), "theta_2")
 
+    @cached_property
+    def floor(self) -> float:
+        """What may be rounding in mu: rounding itself and, of an affine F, how far dF/dy varies."""
+        size = float(np.max(np.abs(self._greatest), initial=0.0))
+        varies = 10.0 * self.game.actions * self._variation if self._affine else 0.0
+        return max(1e-12 * size, varies)
+
     @property
     def monotone(self) -> bool:
         """Whether F is certainly strongly monotone over the set: mu > 0 beyond rounding."""
         if self.label == SAMPLED:
             return False
-        return self.mu.value > 1e-12 * float(np.max(np.abs(self._greatest)))
+        return self.mu.value > self.floor
+
+    @property
+    def merely_monotone(self) -> bool:
+        """Whether F is certainly monotone, and certainly neither strongly nor strictly so."""
+        return self.label == EXACT and self.mu.value == 0.0
 
     @property
     def refuted(self) -> bool:
-        """Whether F is certainly not strongly monotone: a negative direction was met."""
-        met = self.mu.value if self.label != BOUNDED else self.samples["mu"]
-        return met < -1e-9 * max(1.0, self.theta_1.value)
+        """Whether F is certainly not monotone: a negative direction was met."""
+        if self.label == EXACT:
+            return self.mu.value < 0.0
+        met = self.samples["mu"]
+        return met < -1e-9 * self.samples["theta_1"]
 
     @cached_property
     def samples(self) -> dict[str, float]:
         """mu, theta_1 and theta_2 over sampled profiles only."""
-        m = self.game.actions
-        count = int(np.clip(_WORK / (50.0 * m**3), 2, SAMPLES))
-        points = profiles(self.game, self.center, self.box, count, self.feasible)
-        slopes = np.array([self.game.pseudo_gradient_jacobian(y) for y in points])
-        slopes = slopes[np.all(np.isfinite(slopes), axis=(1, 2))]
+        slopes = self._seen
         if not len(slopes):
             return {"mu": np.nan, "theta_1": np.nan, "theta_2": np.nan}
         return {
@@ -151,7 +173,37 @@ class Slopes:
         }
 
     def _constant(self, value: float, name: str) -> Constant:
-        return Constant(value, self.label, None if self._affine else self.samples[name])
+        if not self._affine:
+            return Constant(value, self.label, self.samples[name])
+        return Constant(0.0 if abs(value) <= self.floor else value, self.label)
+
+    @cached_property
+    def _seen(self) -> NDArray[np.float64]:
+        """dF/dy at sampled profiles, where it is finite: (count, m, m)."""
+        m = self.game.actions
+        count = int(np.clip(_WORK / (50.0 * m**3), 2, SAMPLES))
+        points = profiles(self.game, self.center, self.box, count, self.feasible)
+        slopes = np.array([self._slope(y) for y in points])
+        found: NDArray[np.float64] = slopes[np.all(np.isfinite(slopes), axis=(1, 2))]
+        return found
+
+    def _slope(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """dF/dy (m, m); not numbers where a function fails at estimates outside the set."""
+        try:
+            return self.game.pseudo_gradient_jacobian(y)
+        except UserCodeError:
+            if self.feasible:
+                raise
+            return np.full((self.game.actions,) * 2, np.nan)
+
+    @cached_property
+    def _variation(self) -> float:
+        """How much an entry of dF/dy varies between some profiles; 0 up to rounding if affine."""
+        here = self.game.pseudo_gradient_jacobian(self.center)
+        others = profiles(self.game, self.center, self.box, 3, self.feasible)
+        away = 0.9 * (others - self.center)  # not to the boundary, where no step has room
+        slopes = [self.game.pseudo_gradient_jacobian(self.center + way) for way in away]
+        return max(float(np.max(np.abs(slope - here))) for slope in slopes)
 
     @cached_property
     def _affine(self) -> bool:
@@ -159,22 +211,22 @@ class Slopes:
         if not self.game.affine:
             return False
         here = self.game.pseudo_gradient_jacobian(self.center)
-        others = profiles(self.game, self.center, self.box, 3, self.feasible)
-        scale = max(1.0, float(np.max(np.abs(here))))
-        return all(
-            np.max(np.abs(self.game.pseudo_gradient_jacobian(y) - here)) <= 1e-6 * scale
-            for y in others
-        )
+        return self._variation <= 1e-6 * float(np.max(np.abs(here)))
 
     @cached_property
     def _bounds(self) -> Box | None:
+        """The game's bounds of dF/dy, if they are finite and no sample lies beyond them."""
         if self.game.jacobian_bounds is None or self.box is None:
             return None
         lower, upper = self.game.jacobian_bounds(self.box)
         closer = self.game.feasible_jacobian_bounds
         if self.feasible and closer is not None:
             lower, upper = np.maximum(lower, closer[0]), np.minimum(upper, closer[1])
-        return (lower, upper) if np.all(np.isfinite(lower) & np.isfinite(upper)) else None
+        if not np.all(np.isfinite(lower) & np.isfinite(upper)):
+            return None
+        slack = 1e-9 * np.maximum(np.abs(lower), np.abs(upper))
+        within = np.all((self._seen >= lower - slack) & (self._seen <= upper + slack))
+        return (lower, upper) if within else None
 
     @property
     def _greatest(self) -> NDArray[np.float64]:
@@ -212,7 +264,10 @@ def profiles(
         good = np.all(game.constraints(trial) < 0.0, axis=1)
         inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
     ways = np.where(np.arange(count) % 2, rng.uniform(size=count), 1.0) * inside
-    return center + ways[:, None] * (ends - center)
+    found = center + ways[:, None] * (ends - center)
+    # In a set that is not convex a part of the way can be outside where its end is not
+    good = np.all(game.constraints(found) < 0.0, axis=1)
+    return np.where(good[:, None], found, center + inside[:, None] * (ends - center))
 
 
 def positive_definite(matrices: NDArray[np.float64]) -> bool:

@@ -11,6 +11,7 @@ from gne_mj.margins import epsilon_bounds
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
+from gne_mj.theory.constants import SAMPLED, told
 from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
@@ -114,11 +115,15 @@ def certify(system: System, clock: Clock) -> Guarantees:
 
 def _constants(theorem: Theorem) -> dict[str, Any]:
     slopes = theorem.slopes
-    printed, rigorous = needed_connectivity(slopes)
+    certain = slopes.label != SAMPLED  # of samples nothing follows that would suffice
+    printed, rigorous = needed_connectivity(slopes) if certain else (np.nan, np.nan)
     box = slopes.box
     instead = theorem.under_partial_information
     return {
-        **{name: asdict(getattr(slopes, name)) for name in ("mu", "theta_1", "theta_2")},
+        **{
+            name: {**asdict(getattr(slopes, name)), "told": told(name, slopes.label)}
+            for name in ("mu", "theta_1", "theta_2")
+        },
         "convention": CONVENTION,
         "domain": "everywhere"
         if slopes.label == "exact"

@@ -15,7 +15,8 @@ from gne_mj.margins import Disturbance, Influence, influence, largest_push
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
 from gne_mj.system.first_input import first_input, law_at_start
-from gne_mj.theory.assumptions import ASSUMED, FAILS, MET, UNKNOWN, Assumption, convex_constraints
+from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
+from gne_mj.theory.convexity import convex_constraints, own_convexity
 from gne_mj.theory.demand import Demand, limited
 from gne_mj.theory.disturbances import strength
 from gne_mj.theory.theorem import Theorem
@@ -57,9 +58,13 @@ class Held:
     @property
     def conditions(self) -> tuple[Assumption, ...]:
         """What the promise rests on."""
-        found = [self._law(), self._monotone(), self._slopes(), self._inputs()]
-        if self.system.decentralised:
-            found.append(convex_constraints(self.system))
+        found = [
+            self._law(),
+            convex_constraints(self.system),
+            self._monotone(),
+            self._slopes(),
+            self._inputs(),
+        ]
         if self.system.disturbance is not None or self.system.faults:
             found.append(self._disturbances())
         return tuple(found)
@@ -126,15 +131,15 @@ class Held:
 
     def _monotone(self) -> Assumption:
         label, system = "monotone", self.system
-        alone = system.decentralised or system.law.graph is not None
-        if alone:  # only own derivatives of the costs enter
-            return Assumption(label, ASSUMED if not _ours(system) else MET, "costs convex in own"
-                              " actions")  # fmt: skip
         slopes = Theorem(system).slopes
+        if system.decentralised or system.law.graph is not None:
+            return own_convexity(system, slopes)  # only own derivatives of the costs enter
         if slopes.monotone:
             return Assumption(label, MET, "F is strongly monotone")
+        if slopes.merely_monotone:
+            return Assumption(label, MET, "F is merely monotone (mu = 0), which is enough here")
         if slopes.refuted:
-            return Assumption(label, FAILS, "F is not monotone at a sampled profile")
+            return Assumption(label, FAILS, "F is not monotone: dF/dy has a negative direction")
         return Assumption(label, ASSUMED, "F monotone, which nothing that was looked at refutes")
 
     def _slopes(self) -> Assumption:
@@ -199,13 +204,10 @@ class Held:
                 f"sensors are {struck.delay} periods late, and the margin covers {bound.delay}",
             )
         why = "the barrier is tightened by what they can do within a control period"
-        if system.game.gap_bounds is None and not _ours(system):
-            return Assumption(label, ASSUMED, f"{why}, the constraints being affine")
-        return Assumption(label, MET, why)
-
-
-def _ours(system: System) -> bool:
-    return system.game.kernels.__name__.startswith("gne_mj.games.")
+        if system.game.tested:
+            return Assumption(label, MET, why)
+        kind = "affine" if system.game.gap_bounds is None else "bounds on gaps"
+        return Assumption(label, ASSUMED, f"{why}, the constraints being {kind}")
 
 
 def _harmless(delay: int) -> str:

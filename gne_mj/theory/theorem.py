@@ -11,7 +11,7 @@ from gne_mj.graph import complete
 from gne_mj.system import System
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
-from gne_mj.theory.assumptions import Assumption
+from gne_mj.theory.assumption import Assumption
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.demand import Demand, limited

@@ -2,7 +2,7 @@
 
 from gne_mj.margins import epsilon_bounds
 from gne_mj.system import System
-from gne_mj.theory.assumptions import ASSUMED
+from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem

@@ -67,8 +67,11 @@ def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("mu", "theta_1", "theta_2"):
         constant = constants[name]
         text = f"{_number(constant['value'], '.7g')} ({constant['label']}"
+        if constant["told"] != "exact":
+            text += f", {constant['told']}"
         if constant["label"] != "sampled" and constant["sampled"] is not None:
-            text += f"; sampled {constant['sampled']:.7g}"
+            other = "at most" if constant["told"] == "at least" else "at least"
+            text += f"; sampled {constant['sampled']:.7g}, {other}"
         yield name, text + ")" + (f", {constants['convention']}" if name == "mu" else "")
     yield "domain", _domain(constants)
     instead = constants["under_partial_information"]
