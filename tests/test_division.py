@@ -36,7 +36,7 @@ NEAR = 0.999 * 3.0 * -np.arange(1.0, 6.0) + V0  # each gap 0.1% from its bound
 
 
 def solution(rate, inside, x0, times):
-    """States (times, n) by an implicit method with small errors; ``inside`` is where rate is defined."""
+    """States (times, n) by an implicit method; ``inside`` is where the rate is defined."""
 
     def rate_inside(t, x):
         return rate(x) if inside(x) else np.full_like(x, np.nan)

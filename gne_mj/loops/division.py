@@ -2,22 +2,22 @@
 
 Where the barrier is stiff a whole step of an explicit method leaves the set that the law keeps. A
 step is then taken in pieces of 1/2, 1/4, ... 1/4096 of it. Each piece is looked at when it is done.
-It is *ordinary* if its end has changed every slack -g - t by little, and (Runge-Kutta 4) if for the
-outputs Y1 ... Y4 of its stages |Y4 - 2 Y3 + Y1| is little beside |Y3 - Y2|, output by output: the
-second and third stage are both of the middle, so that the ratio z of these two is the piece's length
-times the closed loop's rate. An ordinary piece stands. Of any other
+It is *ordinary* if its end has changed every slack -g - t by little, and (Runge-Kutta 4) if for
+the outputs Y1 ... Y4 of its stages |Y4 - 2 Y3 + Y1| is little beside |Y3 - Y2|, output by output:
+the second and third stage are both of the middle, so that the ratio z of these two is the piece's
+length times the closed loop's rate. An ordinary piece stands. Of any other
 
 - neither a stage nor the end may use up more than a quarter of any slack, nor more than double it;
-- Runge-Kutta 4: each slack's error must be small, with the z of the constraint's own outputs about
-  |g(Y3) - g(Y2)| z^3 / 30, as of a linear law, and s z r^4 / 50 if the slack s changes by a part r,
-  as of the barrier's gradient 1/s under Simpson's rule;
-- Euler: half of what a slack's rate has changed by since the piece before, times the length, must be
-  small.
+- Runge-Kutta 4: each slack's error must be small. With the z of the constraint's own outputs it is
+  about |g(Y3) - g(Y2)| z^3 / 30, as of a linear law, and s z r^4 / 50 if the slack s changes by a
+  part r, as of the barrier's gradient 1/s under Simpson's rule;
+- Euler: half of what a slack's rate has changed by since the piece before, times the length, must
+  be small.
 
-A piece that fails is taken back and halved. One that succeeds by far is followed by one of twice its
-length, where that lies on the coarser grid and no piece has failed lately. All this depends on the
-present state alone, which ``work.division`` is part of, so that a run comes out the same however it
-is cut into calls.
+A piece that fails is taken back and halved. One that succeeds by far is followed by one of twice
+its length, where that lies on the coarser grid and no piece has failed lately. All this depends on
+the present state alone, which ``work.division`` is part of, so that a run comes out the same however
+it is cut into calls.
 
 Outputs, slacks and (in runs without faults) the law are evaluated at a piece's end to be looked at;
 the next piece begins with them in place of evaluating them again.
@@ -53,8 +53,8 @@ NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what th
 # slack that changes. Its error is below 1e-7 of that slack.
 MILD, TINY, LITTLE = 0.1, 1e-10, 0.02
 USE, GAIN = 0.25, 1.0  # the greatest parts of a slack that another may use up, and add to it
-# The greatest error of a slack in a piece of Runge-Kutta 4, relative to the slack and to its typical
-# size; and in a finest piece, after which there is nothing finer to try
+# The greatest error of a slack in a piece of Runge-Kutta 4, relative to the slack and to its
+# typical size; and in a finest piece, after which there is nothing finer to try
 OF_SLACK, OF_SIZE = 3e-6, 3e-8
 OF_SLACK_AT_LAST, OF_SIZE_AT_LAST = 1e-2, 1e-6
 OF_SLACK_EULER = 0.01

@@ -6,7 +6,6 @@ not use costs nothing.
 
 from gne_mj.native import copy, kernel
 
-
 # Whether the law's action follows from the present state alone, whichever step comes next
 KNOWN_AHEAD = True
 

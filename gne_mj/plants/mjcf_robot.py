@@ -75,21 +75,3 @@ def equilibrium(q, y, out):
 def storage(q, x, rest):
     """Not known: nothing is measured."""
     return 0.0
-
-
-@kernel
-def shared(q, x):
-    """Nothing that both the rate and V need is worth keeping."""
-    return 0.0
-
-
-@kernel
-def rate_given(q, x, u, known, out):
-    """As :func:`rate`, with what :func:`shared` returned."""
-    rate(q, x, u, out)
-
-
-@kernel
-def storage_given(q, x, rest, known):
-    """As :func:`storage`, likewise."""
-    return storage(q, x, rest)
