@@ -16,8 +16,8 @@ length times the closed loop's rate. An ordinary piece stands. Of any other
 
 A piece that fails is taken back and halved. One that succeeds by far is followed by one of twice
 its length, where that lies on the coarser grid and no piece has failed lately. All this depends on
-the present state alone, which ``work.division`` is part of, so that a run comes out the same however
-it is cut into calls.
+the present state alone, which ``work.division`` is part of, so that a run comes out the same
+however it is cut into calls.
 
 Outputs, slacks and (in runs without faults) the law are evaluated at a piece's end to be looked at;
 the next piece begins with them in place of evaluating them again.
