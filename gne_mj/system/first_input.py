@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.controllers.settings import LINKS, PENALTY
+from gne_mj.controllers.settings import LINKS, PENALTY, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Saturation, strikes_messages
 from gne_mj.loops import monitor as watch
@@ -26,27 +26,38 @@ def law_at_start(system: System) -> Array:
 
     Faults of sensors are left out. Not a number where the law has no action.
     """
-    game, law = system.game, system.law
-    rho = system.rho if system.schedule is None else system.schedule.start
-    y, memory = system.start.copy(), system.loop_memory.copy()
-    settings = law.settings(rho)
-    if strikes_messages(system.faults):
-        settings[LINKS] = len(system.memory)
-    problem = Problem(
-        data=game.data,
-        graph=law.graph_data,
-        settings=settings,
-        limit=system.agents.input_limit,
-        equilibrium=y,  # nothing is measured from it here
-        propagator=no_propagator(),
-    )
+    return law_at(system, system.start)
+
+
+def law_at(system: System, y: Array) -> Array:
+    """The same at other outputs y (m,), strictly inside, at the start's memory."""
+    game, problem = system.game, problem_at_start(system)
+    rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now[PENALTY] = rho
     weights = rho / -(game.constraints(y) + game.margins)
     u = np.full(game.actions, np.nan)
-    left = _native(law.kernels, game.kernels)(problem, y, weights, memory, scratch, u)
+    left = _native(system.law.kernels, game.kernels)(
+        problem, y.copy(), weights, system.loop_memory.copy(), scratch, u
+    )
     raise_pending()
     return u if left < 0 else np.full(game.actions, np.nan)
+
+
+def problem_at_start(system: System) -> Problem:
+    """What the law reads at the start, and what the division of steps does."""
+    settings = system.law.settings(system.rho if system.schedule is None else system.schedule.start)
+    if strikes_messages(system.faults):
+        settings[LINKS] = len(system.memory)
+    return Problem(
+        data=system.game.data,
+        graph=system.law.graph_data,
+        settings=settings,
+        limit=system.agents.input_limit,
+        equilibrium=system.start,  # nothing is measured from it here
+        propagator=no_propagator(),
+        size=system.typical_sizes,
+    )
 
 
 def first_input(system: System, clock: Clock) -> Array:

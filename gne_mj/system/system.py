@@ -225,7 +225,7 @@ class System:
             settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.equilibrium.action,
-            size=self._typical_sizes,
+            size=self.typical_sizes,
             propagator=(
                 no_propagator()
                 if self.mode == "continuous"
@@ -248,8 +248,8 @@ class System:
         )
 
     @property
-    def _typical_sizes(self) -> NDArray[np.float64]:
-        """Of outputs and slacks, at the start and at the equilibrium."""
+    def typical_sizes(self) -> NDArray[np.float64]:
+        """Of outputs and slacks (1 + p,), at the start and at the equilibrium."""
         ends = np.stack([self.start, self.equilibrium.action])
         return typical_sizes(ends, -self.game.constraints(ends) - self.game.margins)
 

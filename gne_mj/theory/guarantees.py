@@ -16,6 +16,7 @@ from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
 from gne_mj.theory.periods import linear_period, push_period
+from gne_mj.theory.pieces import forecast
 from gne_mj.theory.theorem import HELD, Theorem
 
 CONVENTION = "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2, where the paper's definition has mu/2"
@@ -41,6 +42,7 @@ class Guarantees:
     equilibrium: dict[str, Any]
     inputs: dict[str, Any]
     periods: dict[str, Any]
+    division: dict[str, Any] | None
     held: dict[str, Any] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
@@ -57,7 +59,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock."""
     theorem = Theorem(system)
     held = Held(system, clock) if system.mode == "implicit" else None
-    law, game = system.law, system.game
+    law, game, pieces = system.law, system.game, forecast(system, clock)
     return Guarantees(
         system={
             "name": system.name,
@@ -103,13 +105,14 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "timestep": clock.timestep,
             "largest_timestep_for_estimates": largest_step(system),
         },
+        division=None if pieces is None else asdict(pieces),
         held=None
         if held is None
         else {**held.report(), "period_search": None, "push_search": None},
         lyapunov_claimed=theorem.lyapunov,
         guaranteed=verdict.guaranteed(theorem, held),
-        measured=verdict.measured(theorem),
-        not_certified=verdict.not_certified(theorem, held),
+        measured=verdict.measured(theorem, pieces),
+        not_certified=verdict.not_certified(theorem, held, pieces),
     )
 
 

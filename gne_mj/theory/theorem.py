@@ -8,6 +8,7 @@ import numpy as np
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.game import Box
 from gne_mj.graph import complete
+from gne_mj.loops.feedback import LARGEST_INPUT
 from gne_mj.system import System
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
@@ -131,6 +132,11 @@ class Theorem:
             found.append("the scenario has faults, and the theorems have none")
         if self.system.mode != "implicit" and limited(self.system) and self.demand.exceeded:
             found.append(f"{self.demand.exceeded}, and the theorems have inputs without limits")
+        if self.system.mode == "continuous" and np.any(self.demand.asked >= LARGEST_INPUT):
+            found.append(
+                f"the law at the start asks for {np.max(self.demand.asked):.3g}, and a run ends as"
+                f" diverged from {LARGEST_INPUT:g} on"
+            )
         return tuple(found)
 
     @property

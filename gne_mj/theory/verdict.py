@@ -5,6 +5,7 @@ from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
+from gne_mj.theory.pieces import Pieces
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 
 
@@ -53,19 +54,36 @@ def _limit(system: System) -> str:
     return f"{limit}, and over its own constraints each agent's <= {bound['largest_own_bound']:g}"
 
 
-def measured(theorem: Theorem) -> list[str]:
+def measured(theorem: Theorem, pieces: Pieces | None = None) -> list[str]:
     """What a run tells beyond that."""
     found = ["margins of all constraints, V and the distance to y*, at every integration step"]
     if theorem.status == CERTIFIED:
         found.append("how closely the integrator follows continuous time, near the boundary too")
+    if pieces is not None:
+        found.append(
+            f"how finely steps are divided on the way; where 1/{pieces.finest} of the timestep does"
+            " not do, the run ends as step_too_small"
+        )
     if theorem.status == CONDITIONAL:
         found.append("whether the given epsilon is below epsilon*: from this start, by running")
     return found
 
 
-def not_certified(theorem: Theorem, held: Held | None = None) -> list[str]:
+def not_certified(
+    theorem: Theorem, held: Held | None = None, pieces: Pieces | None = None
+) -> list[str]:
     """What cannot be certified, and why."""
     found = list(theorem.obstacles)
+    places = (
+        [] if pieces is None else [("start", pieces.start), ("equilibrium", pieces.equilibrium)]
+    )
+    found += [
+        f"that this run goes on to its end: at the {place} pieces finer than 1/{pieces.finest} of the"
+        " timestep are needed, and it ends there as step_too_small (mode 'implicit', a larger rho or"
+        " a smaller timestep can go on)"
+        for place, count in places
+        if pieces is not None and count is None
+    ]
     if not theorem.continuous:
         mode = theorem.system.mode
         what = f"mode '{mode}'" if mode != "continuous" else "Euler's method"

@@ -52,6 +52,8 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "epsilon of y*", _bounds(g["equilibrium"])
     yield "inputs", _inputs(g["inputs"])
     yield "sampling", _periods(g)
+    if g["division"] is not None:
+        yield "steps", _division(g["division"])
     if g["held"] is not None:
         yield from _held(g["held"])
     for n, sentence in enumerate(g["guaranteed"]):
@@ -203,6 +205,15 @@ def _periods(g: dict[str, Any]) -> str:
         text += f". Estimates under {g['system']['integrator']}: steps up to {largest:.3g} s"
         text += f", here {periods['timestep']:g} s"
     return text
+
+
+def _division(division: dict[str, Any]) -> str:
+    def told(count: int | None) -> str:
+        if count is None:
+            return f"would have to be divided more finely than into {division['finest']}"
+        return "whole" if count == 1 else f"divided into about {count}"
+
+    return f"{told(division['start'])} at the start, {told(division['equilibrium'])} at y*"
 
 
 def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
