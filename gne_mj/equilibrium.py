@@ -23,9 +23,9 @@ from gne_mj.interior_point import Free, Iterate, Path, Work
 from gne_mj.plain import raise_pending
 
 TOLERANCE = 1e-12
-FIRST_RHO, LAST_RHO = 1.0, 1e-11  # of the path to rho -> 0
-# There only the order of lambda_l s_l counts, so that it may be off by half.
-TO_ZERO = Path(FIRST_RHO, LAST_RHO, TOLERANCE, 0.5)
+# The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
+# order of lambda_l s_l counts, so that it may be off by half.
+TO_ZERO = Path(0.0, 1e-12, TOLERANCE, 0.5, True)
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,11 @@ def penalised_equilibrium(
         InfeasibleStart: ``start`` is not strictly inside.
         SolverError: the tolerance was not reached.
     """
-    highest = start.rho if isinstance(start, Equilibrium) else FIRST_RHO
     rho = float(rho)
-    return _solver(game).follow(start, Path(max(highest, rho), rho, tolerance, tolerance))
+    if not 0.0 < rho < np.inf:
+        raise InvalidInput("barrier.rho", rho, "it must be positive and finite")
+    first = max(start.rho, rho) if isinstance(start, Equilibrium) else 0.0
+    return _solver(game).follow(start, Path(first, rho, tolerance, tolerance, False))
 
 
 def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibrium]:
@@ -87,18 +89,16 @@ def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibriu
         yield start
 
 
-def variational_equilibrium(
-    game: Game, start: Start, *, rho: float = FIRST_RHO, last_rho: float = LAST_RHO
-) -> Equilibrium:
+def variational_equilibrium(game: Game, start: Start) -> Equilibrium:
     """The variational GNE with its multipliers [eq:vGNE], by following the path rho -> 0.
 
-    The result lies strictly inside, within about ``last_rho`` of the boundaries that bind:
-    p * last_rho bounds what any agent could still gain. From an equilibrium the path starts at
-    that one's rho. Raises as :func:`penalised_equilibrium` does.
+    The result lies strictly inside, within about 1e-11 (relative to the size of the actions and of
+    the forces at hand, not of their units) of the boundaries that bind, also of those that bind
+    with a multiplier of zero. p times its rho bounds what any agent could still gain. From an
+    equilibrium the path starts at that one's rho. Raises as :func:`penalised_equilibrium` does.
     """
-    if isinstance(start, Equilibrium):
-        rho = max(start.rho, last_rho)
-    return _solver(game).follow(start, TO_ZERO._replace(rho=rho, last_rho=last_rho))
+    rho = start.rho if isinstance(start, Equilibrium) else 0.0
+    return _solver(game).follow(start, TO_ZERO._replace(rho=rho))
 
 
 def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
@@ -156,6 +156,8 @@ class Solver:
             trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
             g=np.zeros(p),
             size=np.zeros(p),
+            unit=np.zeros(m),
+            share=np.zeros(p),
             row=np.zeros(p + 1, dtype=np.int64),
             column=np.zeros(entries, dtype=np.int64),
             jacobian=np.zeros(entries),
@@ -177,14 +179,11 @@ class Solver:
             path: from which rho to which, and how accurately.
 
         Raises:
-            InvalidInput: a rho that is not positive and finite.
             InfeasibleStart: ``start`` is not strictly inside.
             SolverError: the tolerance was not reached.
         """
         known = isinstance(start, Equilibrium)
         y = self._profile(start.action if isinstance(start, Equilibrium) else start)
-        if not 0.0 < path.last_rho <= path.rho < np.inf:
-            raise InvalidInput("barrier.rho", path.last_rho, "it must be positive and finite")
         with self._lock:
             self._point.y[:] = y
             if isinstance(start, Equilibrium):
@@ -195,7 +194,7 @@ class Solver:
             )  # fmt: skip
             if ended != method.CONVERGED:
                 self._fail(ended, y)
-            return self._result(path.last_rho, self._point.y.copy(), self._point.multipliers.copy())
+            return self._result(self._point.y.copy(), self._point.multipliers.copy())
 
     def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
         """The best response of one agent, which minimises alone, from y and nothing else.
@@ -220,7 +219,7 @@ class Solver:
                 self._fail(ended, y)
             multipliers = np.zeros(len(point.multipliers))
             multipliers[own] = point.multipliers[: len(own)]
-            return self._result(LAST_RHO, point.y.copy(), multipliers)
+            return self._result(point.y.copy(), multipliers)
 
     def cost(self, agent: int, y: NDArray[np.float64]) -> float:
         """J_i(y); y of shape (m,)."""
@@ -233,9 +232,9 @@ class Solver:
         return profile
 
     def _result(
-        self, rho: float, action: NDArray[np.float64], multipliers: NDArray[np.float64]
+        self, action: NDArray[np.float64], multipliers: NDArray[np.float64]
     ) -> Equilibrium:
-        iterations, _, residual, complementarity = self._report.tolist()
+        iterations, _, residual, complementarity, rho = self._report.tolist()
         return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
 
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
