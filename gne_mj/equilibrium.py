@@ -17,10 +17,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from gne_mj import interior_point as method
+from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
 from gne_mj.interior_point import Free, Iterate, Path, Work
-from gne_mj.plain import raise_pending
+from gne_mj.plain import check_numbers, forgive_pending, raise_pending
 
 TOLERANCE = 1e-12
 # The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
@@ -104,8 +105,11 @@ def variational_equilibrium(game: Game, start: Start) -> Equilibrium:
 def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     """An agent's own minimiser of J_i over its feasible actions, the others' held at y (m,).
 
-    Found by the same path, for this agent alone; y must be strictly inside. The multipliers are
-    those of the agent's own problem, zero for constraints that do not contain its action.
+    Found by the same path, for this agent alone, from y (strictly inside) and from the least costs
+    on lines through it: for an action of one entry that is the whole feasible interval around y_i,
+    as finely as :mod:`gne_mj.lines` looks; for others a few directions, so that where J_i is not
+    convex in y_i a better one may exist. The multipliers are those of the agent's own problem, zero
+    for constraints that do not contain its action.
     """
     return _solver(game).respond(y, agent)
 
@@ -113,12 +117,17 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     """What each agent could gain by deviating alone from y: J_i(y) - min J_i, shape (N,).
 
-    At the penalised equilibrium it is at most p_i * rho, with p_i the constraints that contain
-    y_i, and so at most p * rho [lemma:epsilon].
+    At the penalised equilibrium it is at most p_i * rho if J_i and the constraints are convex in
+    y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
     """
     solver, costs = _solver(game), game.costs(y)
     least = [solver.cost(i, solver.respond(y, i).action) for i in range(game.agents)]
     return np.maximum(costs - least, 0.0)
+
+
+def middle(game: Game, y: ArrayLike) -> NDArray[np.float64]:
+    """A profile (m,) well inside, from one strictly inside: the middle along each action."""
+    return _solver(game).middle(y)
 
 
 _SOLVERS: WeakKeyDictionary[Game, "Solver"] = WeakKeyDictionary()
@@ -142,6 +151,7 @@ class Solver:
         m, p = game.actions, game.constraints_count
         self._data = game.data
         self._name, self._constraint_names = game.name, game.constraint_names
+        self._written = game.written
         self._kernels, self._native = game.kernels, method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
@@ -151,6 +161,7 @@ class Solver:
         self._everyone = Free(agents, constraints, position)
         self._nobody = Free(agents, constraints, np.full(m, -1))
         self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
+        self._direction, self._found = np.zeros(m), np.zeros(lines.COUNT)
         entries = len(game.actions_in_constraints[1])
         self._work = Work(
             trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
@@ -194,6 +205,7 @@ class Solver:
             )  # fmt: skip
             if ended != method.CONVERGED:
                 self._fail(ended, y)
+            forgive_pending()
             return self._result(self._point.y.copy(), self._point.multipliers.copy())
 
     def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
@@ -201,9 +213,58 @@ class Solver:
 
         Raises:
             InfeasibleStart: y is not strictly inside.
-            SolverError: the minimiser was not found.
+            SolverError: no minimiser was found.
         """
         y = self._profile(y)
+        best, least, failure = None, np.inf, None
+        starts, single = self._lowest(y, agent)
+        for start, cost in [(y, np.inf), *starts]:
+            if single and least <= cost:  # nothing on the interval is lower
+                continue
+            try:
+                found = self._respond(start, agent)
+            except SolverError as error:
+                failure = failure or error
+                continue
+            reached = self.cost(agent, found.action)
+            if best is None or reached < least:
+                best, least = found, reached
+        if best is None:
+            assert failure is not None
+            raise failure
+        return best
+
+    def _lowest(
+        self, y: NDArray[np.float64], agent: int
+    ) -> tuple[list[tuple[NDArray[np.float64], float]], bool]:
+        """Where an agent's cost is least on lines through y, and that; if there is one line only.
+
+        The lines go along its entries, and if they are several in as many other directions.
+        """
+        data = self._data
+        first, last = int(data.offsets[agent]), int(data.offsets[agent + 1])
+        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
+        directions = np.eye(last - first)
+        if last - first > 1:
+            random = np.random.default_rng(agent).normal(size=(last - first, last - first))
+            directions = np.concatenate([directions, random])
+        starts = []
+        for direction in directions:
+            with self._lock:
+                self._direction[first:last] = direction
+                self._native.lowest(
+                    data, agent, own, y, self._direction, self._work.trial.y, self._found
+                )
+                self._direction[first:last] = 0.0
+                cost, place = self._found.tolist()
+            if place != 0.0:
+                start = y.copy()
+                start[first:last] += place * direction
+                starts.append((start, cost))
+        return starts, last - first == 1
+
+    def _respond(self, y: NDArray[np.float64], agent: int) -> Equilibrium:
+        """What an agent's own path from y leads to."""
         data, point, position = self._data, self._point, self._nobody.position
         own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
         alone = Free(self._nobody.agents[agent : agent + 1], own, position)
@@ -217,9 +278,18 @@ class Solver:
             )
             if ended != method.CONVERGED:
                 self._fail(ended, y)
+            forgive_pending()
             multipliers = np.zeros(len(point.multipliers))
             multipliers[own] = point.multipliers[: len(own)]
             return self._result(point.y.copy(), multipliers)
+
+    def middle(self, y: ArrayLike) -> NDArray[np.float64]:
+        """A profile well inside, from one strictly inside."""
+        moved = self._profile(y).copy()
+        with self._lock:
+            self._native.to_middle(self._data, moved, self._direction, self._work.trial.y)
+        forgive_pending()
+        return moved
 
     def cost(self, agent: int, y: NDArray[np.float64]) -> float:
         """J_i(y); y of shape (m,)."""
@@ -247,6 +317,7 @@ class Solver:
             raise InfeasibleStart(
                 self._name, "start", self._constraint_names[worst], float(g[worst])
             )
+        check_numbers(*self._written, self._data, self._point.y)
         reason = {
             method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name} game",
             method.NO_WAY_ON: f"Newton's method found no way on in the {self._name} game",

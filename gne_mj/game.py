@@ -20,7 +20,7 @@ agent, a and b entries of a profile (a belonging to agent i) and l a constraint,
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
 from typing import NamedTuple, Self
@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
-from gne_mj.plain import is_plain, plain_kernels, raise_pending
+from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
@@ -85,6 +85,9 @@ class Game:
         tightening: t >= 0, shape (p,), by which the barrier keeps farther away, in the
             constraints' own units: it guards g + t < 0. None for 0.
 
+    Attributes:
+        written: kernels and parameters as they were given, before plain functions got addresses.
+
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
     """
@@ -108,12 +111,18 @@ class Game:
     axes: tuple[str, ...] = ()
     quantities: tuple[Quantity, ...] = ()
     tightening: NDArray[np.float64] | None = None
+    written: tuple[ModuleType, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._check()
+        object.__setattr__(self, "written", (self.kernels, self.parameters))
         if is_plain(self.kernels):
+            own = [
+                [k for k, members in enumerate(self.in_constraint) if i in members]
+                for i in self.agent_of_action.tolist()
+            ]
             kernels, addresses, kept = plain_kernels(
-                self.kernels, np.asarray(self.parameters, dtype=np.float64)
+                self.kernels, np.asarray(self.parameters, dtype=np.float64), own
             )
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
@@ -263,6 +272,14 @@ class Game:
         _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
         raise_pending()
         return out
+
+    def check_numbers(self, y: ArrayLike) -> None:
+        """Call the game's functions at a profile (m,), each as it was written.
+
+        Raises:
+            UserCodeError: one raises, or returns what is not a finite number.
+        """
+        check_numbers(*self.written, self.data, self._profile(y).copy())
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:
         """The constraint with the greatest g_l(y) and that value (negative inside)."""

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gne_mj import banded, scales
+from gne_mj import banded, lines, scales
 from gne_mj.native import compiled, copy, kernel, source_key
 
 # How an iteration ended
@@ -472,7 +472,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
 
 @cache
 def build(game: ModuleType) -> SimpleNamespace:
-    """``run`` and ``cost`` of a game's kernels, compiled at their first call."""
+    """The native functions of a game's kernels, compiled at their first call."""
     source = source_key(game)
 
     @compiled
@@ -488,4 +488,16 @@ def build(game: ModuleType) -> SimpleNamespace:
         _ = source
         return game.cost(data.parameters, i, y)
 
-    return SimpleNamespace(run=run, cost=cost)
+    @compiled
+    def lowest(data, i, own, y, direction, trial, found):
+        """``lines.lowest``."""
+        _ = source
+        lines.lowest(game, data, i, own, y, direction, trial, found)
+
+    @compiled
+    def to_middle(data, y, direction, trial):
+        """``lines.to_middle``."""
+        _ = source
+        lines.to_middle(game, data, y, direction, trial)
+
+    return SimpleNamespace(run=run, cost=cost, lowest=lowest, to_middle=to_middle)
