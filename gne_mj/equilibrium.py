@@ -219,7 +219,7 @@ class Solver:
         best, least, failure = None, np.inf, None
         starts, single = self._lowest(y, agent)
         for start, cost in [(y, np.inf), *starts]:
-            if single and least <= cost:  # nothing on the interval is lower
+            if single and best is not None and least <= cost:  # nothing on the interval is lower
                 continue
             try:
                 found = self._respond(start, agent)

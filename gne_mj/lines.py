@@ -13,7 +13,7 @@ from gne_mj.native import copy, kernel
 # costs are compared at these places and at POINTS equal distances.
 FIRST, FARTHEST, POINTS = 1e-6, 1e6, 32
 HALVINGS = 50
-SWEEPS = 3  # over all actions, on the way to the middle
+SWEEPS = 10  # over all actions, on the way to the middle
 COST, PLACE, COUNT = range(3)  # entries of what was found on a line
 
 
@@ -97,6 +97,8 @@ def to_middle(game, data, y, direction, trial):
                 above = end(game, data, i, own, y, direction, 1.0, length, trial)
                 below = end(game, data, i, own, y, direction, -1.0, length, trial)
                 direction[a] = 0.0
-                most = max(length, min(above, below))
-                y[a] += 0.5 * (min(above, most) - min(below, most))
+                if max(above, below) > 0.25 * FARTHEST * length:  # no bound on this side
+                    most = max(length, min(above, below))
+                    above, below = min(above, most), min(below, most)
+                y[a] += 0.5 * (above - below)
                 place(data, i, y, direction, 0.0, trial)
