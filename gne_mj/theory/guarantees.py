@@ -53,7 +53,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock."""
     theorem = Theorem(system)
     held = Held(system, clock) if system.mode == "implicit" else None
-    law, game = system.law, system.game
+    law, game, known = system.law, system.game, system.known_equilibrium
     return Guarantees(
         system={
             "name": system.name,
@@ -88,7 +88,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         else None,
         start=_start(system, theorem.slopes.box),
         equilibrium={
-            "penalised": system.equilibrium.action.tolist(),
+            "penalised": None if known is None else known.action.tolist(),
             **verdict.epsilon_bounds(system),
         },
         periods={
@@ -163,9 +163,10 @@ def _start(system: System, box: Box | None) -> dict[str, Any]:
 
 
 def _at_both(system: System, rule: Any) -> dict[str, float | None]:
+    known = system.known_equilibrium
     return {
         "start": rule(system, system.start),
-        "equilibrium": rule(system, system.equilibrium.action),
+        "equilibrium": None if known is None else rule(system, known.action),
     }
 
 
