@@ -1,5 +1,6 @@
 """What one system's run showed, measured at every integration step: status and certificate."""
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -31,9 +32,9 @@ class Certificate:
         epsilon: what agents could gain at the penalised equilibrium, against p rho and p_i rho.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
-            whether it is known (not of MJCF robots, nor without a y*), and whether the theory claims that it never
-            rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long as no input limit is
-            met.
+            whether it is known (not of MJCF robots, nor without a y*), and whether the theory
+            claims that it never rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long
+            as no input limit is met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         exit: where the run left, the law and the input that led there; None if it did not.
         implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, how far
@@ -172,8 +173,8 @@ def _status(
     if system.known_equilibrium is None:
         return (
             "completed",
-            f"ran its {duration:g} s inside the set; no penalised equilibrium was found, so that how"
-            " far it is, how soon the run settles and V are not known",
+            f"ran its {duration:g} s inside the set; no penalised equilibrium was found, so that"
+            " how far it is, how soon the run settles and V are not known",
         )
     return (
         "completed",
@@ -339,10 +340,8 @@ def _epsilon(system: System) -> dict[str, Any]:
     affine, known = game.affine_constraints, system.known_equilibrium
     measured = None
     if known is not None:
-        try:
+        with suppress(SolverError):
             measured = float(np.max(measured_epsilon(game, known.action)))
-        except SolverError:
-            pass
     return {
         "measured": measured,
         "p_rho": game.constraints_count * system.rho,

@@ -27,6 +27,8 @@ TOLERANCE = 1e-12
 # The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
 # order of lambda_l s_l counts, so that it may be off by half.
 TO_ZERO = Path(0.0, 1e-12, TOLERANCE, 0.5, True)
+# Random lines for each entry of an action of several, on which a best response is looked for
+RANDOM_LINES = 4
 
 
 @dataclass(frozen=True)
@@ -239,14 +241,15 @@ class Solver:
     ) -> tuple[list[tuple[NDArray[np.float64], float]], bool]:
         """Where an agent's cost is least on lines through y, and that; if there is one line only.
 
-        The lines go along its entries, and if they are several in as many other directions.
+        The lines go along its entries, and if they are several in random directions too.
         """
         data = self._data
         first, last = int(data.offsets[agent]), int(data.offsets[agent + 1])
         own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
         directions = np.eye(last - first)
         if last - first > 1:
-            random = np.random.default_rng(agent).normal(size=(last - first, last - first))
+            shape = (RANDOM_LINES * (last - first), last - first)
+            random = np.random.default_rng(agent).normal(size=shape)
             directions = np.concatenate([directions, random])
         starts = []
         for direction in directions:
@@ -301,9 +304,7 @@ class Solver:
             raise ValueError(f"y must have shape {self._point.y.shape}, not {profile.shape}")
         return profile
 
-    def _result(
-        self, action: NDArray[np.float64], multipliers: NDArray[np.float64]
-    ) -> Equilibrium:
+    def _result(self, action: NDArray[np.float64], multipliers: NDArray[np.float64]) -> Equilibrium:
         iterations, _, residual, complementarity, rho = self._report.tolist()
         return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
 

@@ -57,9 +57,7 @@ class UserCodeError(GneError, RuntimeError):
 
     status = "user_code_failed"
 
-    def __init__(
-        self, function: Callable[..., Any], error: Exception | str, at: str = ""
-    ) -> None:
+    def __init__(self, function: Callable[..., Any], error: Exception | str, at: str = "") -> None:
         inner = function.func if isinstance(function, partial) else function
         name = getattr(inner, "__name__", repr(inner))
         code = getattr(inner, "__code__", None)

@@ -38,7 +38,6 @@ DECREASE = 1e-4  # of the merit, relative to the step's length
 MERIT = 0.1  # weight of the stationarity residual in it, for the length of a profile
 ROUNDING = 1e-14  # of the terms of g
 NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
-ALIGNED = 0.7  # cosine between -F and dphi from which on a point counts as near the path
 SHRINK = 0.1  # of rho, from one equilibrium to the next
 # So many steps in a row shorter than SHORT make the method careful: damped steps at one rho,
 # multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; if that
@@ -270,10 +269,12 @@ def solve(free, count, rho, length, point, b, work):
         for entry in range(work.row[k], work.row[k + 1]):
             work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
+    longest = 0.0
     for r in range(count):
-        if not abs(work.step[r]) <= FAR * length:
-            return False
-    return True
+        size = abs(work.step[r])
+        if not size <= longest:  # nor if it is not a number
+            longest = size
+    return longest <= FAR * length
 
 
 @kernel
@@ -324,27 +325,6 @@ def accept(data, free, point, trial):
 
 
 @kernel
-def balance(count, constraints, free, highest, work):
-    """Near the path its own rho, at which the barrier pushes as hard as F pulls; else ``highest``.
-
-    Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
-    stationarity residual must be F alone.
-    """
-    pull, push, along = 0.0, 0.0, 0.0
-    for r in range(count):
-        pull += work.stationarity[r] ** 2
-        work.step[r] = 0.0
-    for k in range(constraints):
-        for entry in range(work.row[k], work.row[k + 1]):
-            work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
-    for r in range(count):
-        push += work.step[r] ** 2
-        along -= work.stationarity[r] * work.step[r]
-    aligned = along > ALIGNED * np.sqrt(pull * push)
-    return min(np.sqrt(pull / push), highest) if aligned else highest
-
-
-@kernel
 def begin(game, data, free, count, b, path, known, point, work):
     """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
 
@@ -367,7 +347,7 @@ def begin(game, data, free, count, b, path, known, point, work):
         return path.rho, length, size
     last = path.last_rho * size if path.to_zero else path.last_rho
     highest = path.rho if path.rho > 0.0 else scales.pull(count, work) * length
-    rho = max(last, balance(count, constraints, free, max(highest, last), work))
+    rho = max(last, scales.balance(count, constraints, free, max(highest, last), work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
@@ -442,9 +422,8 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             ):
                 evaluate(game, data, free, work.trial, work)
                 then = merit(count, constraints, rho, length, work.trial, work)
-                found = (
-                    then <= (1.0 - 2.0 * DECREASE * share) * now
-                    or (careful or max(residual, off) <= NEAR) and then < np.inf
+                found = then <= (1.0 - 2.0 * DECREASE * share) * now or (
+                    (careful or max(residual, off) <= NEAR) and then < np.inf
                 )
                 if found:
                     break

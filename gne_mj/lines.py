@@ -1,10 +1,8 @@
-"""Lines of one agent's actions through a profile: how far they stay inside, where its cost is least.
+"""Lines of an agent's actions through a profile: how far they stay inside, where it costs least.
 
 A best response that is found by Newton's method is a stationary point near where it began. Along
 lines, costs are compared: for an action of one entry, on all of the feasible interval.
 """
-
-import numpy as np
 
 from gne_mj import scales
 from gne_mj.native import copy, kernel

@@ -27,9 +27,9 @@ class Optimality:
         active: the constraints that bind with a positive multiplier.
         weakly_active: those that bind with none.
         curvature: least eigenvalue of each agent's own second derivatives of its Lagrangian along
-            the bounds that bind, shape (N,), relative to the greatest second derivative of J_i or,
-            if that is less, of the terms that bounds add; infinite where bounds leave it no
-            direction. Negative: what the agent does is no minimum.
+            the bounds that bind, shape (N,), relative to the greatest second derivative in it;
+            infinite where bounds leave the agent no direction. Negative: what it does is no
+            minimum.
         monotonicity: least eigenvalue of the symmetric part of dF/dy there, relative to the
             greatest magnitude of one; None if it was not looked at.
     """

@@ -110,12 +110,12 @@ def check_numbers(module: ModuleType, q: Array, data: Any, y: Array) -> None:
             for a in range(at[i], at[i + 1]):
                 _check(module, "constraint_gradient", q, k, a, y)
     for i in range(len(at) - 1):
-        _check(module, "cost", q, i, y)
         for a in range(at[i], at[i + 1]):
             _check(module, "cost_gradient", q, i, a, y)
             if hasattr(module, "add_cost_hessian"):
                 row[:] = 0.0
                 _check(module, "add_cost_hessian", q, i, a, y, 1.0, row)
+        _check(module, "cost", q, i, y)
 
 
 def _check(module: ModuleType, name: str, q: Array, number: int, *rest: Any) -> None:
@@ -320,7 +320,7 @@ class Stencils:
         own: Sequence[Sequence[int]],
     ) -> None:
         self._constraint, self._slope, self._own = constraint, slope, own
-        self._at, self._found = b"", dict[int, list[tuple[float, Array]]]()
+        self._at, self._found = b"", dict[int, tuple[Array, list[tuple[float, Array]]]]()
 
     def slope(self, function: Callable[[Array], float], y: Array, b: int) -> float:
         """df/dy_b to second order in the step."""
@@ -329,24 +329,25 @@ class Stencils:
             self._at, self._found = at, {}
         if b not in self._found:
             self._found[b] = self._stencil(y, b)
-        return float(sum(weight * function(point) for weight, point in self._found[b]))
+        base, others = self._found[b]
+        value = function(base)
+        return float(sum(weight * (function(point) - value) for weight, point in others))
 
-    def _stencil(self, y: Array, b: int) -> list[tuple[float, Array]]:
-        """Weights and profiles: one on either side, or two on the side that is inside."""
+    def _stencil(self, y: Array, b: int) -> tuple[Array, list[tuple[float, Array]]]:
+        """A profile, and weights of differences to others: on the other side, or of two inside."""
         scale = self._scale(y, b)
         step = _DIFFERENCE * scale
         inside = self._inside(y, b)
         while True:
             above, below = _shifted(y, b, step), _shifted(y, b, -step)
             up, down = self._inside(above, b), self._inside(below, b)
-            if up and down or not inside or step < _SHORTEST * scale:
-                across = above[b] - below[b]
-                return [(1.0 / across, above), (-1.0 / across, below)]
+            if (up and down) or not inside or step < _SHORTEST * scale:
+                return below, [(1.0 / (above[b] - below[b]), above)]
             near, sign = (above, 1.0) if up else (below, -1.0)
             far = _shifted(y, b, 2.0 * sign * step)
             if (up or down) and self._inside(far, b):
                 along = near[b] - y[b]
-                return [(-1.5 / along, y.copy()), (2.0 / along, near), (-0.5 / along, far)]
+                return y.copy(), [(2.0 / along, near), (-0.5 / along, far)]
             step *= 0.5
 
     def _scale(self, y: Array, b: int) -> float:

@@ -15,6 +15,7 @@ from gne_mj.native import kernel
 
 WIDEST = 1e6  # profiles; a bound farther than that says nothing of the length
 NARROWEST = 1e-5  # of the first length, below which a length does not fall
+ALIGNED = 0.7  # cosine between -F and dphi from which on a point counts as near the path
 SHARP = 10.0  # times the share of the costs' size that rho falls to
 
 
@@ -85,6 +86,27 @@ def pull(count, work):
     for r in range(count):
         value = max(value, abs(work.stationarity[r]))
     return value
+
+
+@kernel
+def balance(count, constraints, free, highest, work):
+    """Near the path its own rho, at which the barrier pushes as hard as F pulls; else ``highest``.
+
+    Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
+    stationarity residual must be F alone.
+    """
+    pull, push, along = 0.0, 0.0, 0.0
+    for r in range(count):
+        pull += work.stationarity[r] ** 2
+        work.step[r] = 0.0
+    for k in range(constraints):
+        for entry in range(work.row[k], work.row[k + 1]):
+            work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
+    for r in range(count):
+        push += work.step[r] ** 2
+        along -= work.stationarity[r] * work.step[r]
+    aligned = along > ALIGNED * np.sqrt(pull * push)
+    return min(np.sqrt(pull / push), highest) if aligned else highest
 
 
 @kernel

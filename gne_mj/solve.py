@@ -21,7 +21,6 @@ from gne_mj.game import Game
 from gne_mj.optimality import FLAT, Optimality, examine
 from gne_mj.system import System
 
-
 # A gain up to so many times the variational equilibrium's own rho is one by rounding.
 ROUNDING = 1e4
 
@@ -231,7 +230,8 @@ def summary(solution: Solution) -> list[str]:
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
             f" p rho = {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
-            + "; the lemma does not hold: not every J_i is convex in y_i" * more,
+            + "; the lemma does not hold: not every J_i is convex in y_i"
+            * more,
             f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
     active = [

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-
 UNKNOWN = "not known: no penalised equilibrium was found"
 
 

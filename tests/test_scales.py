@@ -67,7 +67,7 @@ def test_units_of_costs_and_constraints_do_not_matter(name, exponent, seed):
         0.05: [penalised_equilibrium(g, r, start) for g, r in ((game, 0.05), (other, 0.05 * cost))],
         0.0: [variational_equilibrium(g, start) for g in (game, other)],
     }.items():
-        assert np.allclose(two.action, one.action, rtol=1e-9, atol=0)
+        assert np.allclose(two.action, one.action, rtol=1e-9, atol=1e-12)
         back = two.multipliers * units / cost
         assert np.allclose(back, one.multipliers, rtol=1e-6 if rho else 1e-2, atol=1e-9)
         assert two.iterations <= one.iterations + 3
@@ -136,9 +136,7 @@ def one_agent(gradient, second, bounds, value=lambda y: 0.0):
 @pytest.mark.parametrize("push", [0.0, 1e-7, -1e-7])
 def test_a_bound_with_a_multiplier_of_zero_is_found(unit, push):
     """J = (y/unit - 1 - push)^2 / 2 below y = unit: the path itself ends at sqrt(rho)."""
-    game = one_agent(
-        lambda y: (y / unit - 1.0 - push) / unit, lambda y: 1.0 / unit**2, (0.0, unit)
-    )
+    game = one_agent(lambda y: (y / unit - 1.0 - push) / unit, lambda y: 1.0 / unit**2, (0.0, unit))
     result = variational_equilibrium(game, [0.3 * unit])
     assert 0.0 < 1.0 - result.action[0] / unit + min(push, 0.0) < 1e-9
     assert result.multipliers[1] * unit == pytest.approx(max(push, 0.0), abs=1e-9)

@@ -209,14 +209,13 @@ class SystemTable(Table):
         floor = least_rho(system, period if system.mode == "sampled" else simulation.timestep)
         return replace(system, rho=floor, schedule=self.barrier.build(floor))
 
-
     def build_inside(
         self, name: str, simulation: "SimulationTable"
     ) -> tuple[System, dict[str, Any] | None]:
-        """The system and, where no start is given or that one is not inside, what was done about it.
+        """The system and what was done where no start is given, or one that is not inside.
 
-        It then starts at an interior profile that was looked for, with estimates that fit. What was
-        done has ``why`` in words and the ``action`` (m,) that was found.
+        It then starts at an interior profile that was looked for, with estimates that fit, and
+        what was done has ``why`` in words and the ``action`` (m,) that was found; else it is None.
 
         Raises:
             InvalidInput: see :class:`gne_mj.system.System`; no interior profile was found.
