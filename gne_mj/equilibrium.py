@@ -39,8 +39,9 @@ class Equilibrium:
         action: y, shape (m,), strictly inside: every g_l(y) is negative.
         multipliers: lambda_l >= 0, shape (p,).
         rho: the penalty parameter it was computed with.
-        residual: greatest entry of |F(y) + sum_l lambda_l dg_l(y)|, relative to the size of the
-            terms that must cancel where that exceeds 1.
+        residual: greatest entry of |F(y) + sum_l lambda_l dg_l(y)|, relative to its row's size
+            (:mod:`gne_mj.scales`): that of the terms that must cancel, and of what the cost's
+            second derivatives make of the profile.
         complementarity: greatest lambda_l * s_l, with s_l = -g_l; it is rho along the path.
         iterations: Newton steps in all.
     """

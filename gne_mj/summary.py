@@ -57,9 +57,12 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             if implicit[key]:
                 rows["held inputs"] += f"; {implicit[key]} {what}"
     if epsilon["measured"] is not None:
+        allowed = epsilon["p_rho"] + epsilon["of_margin"]
+        beyond = epsilon["measured"] > (1.0 + 1e-6) * allowed
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium; p rho ="
             f" {epsilon['p_rho']:g}, largest p_i rho = {epsilon['largest_own_p_rho']:g}"
             + (f", and {epsilon['of_margin']:.3g} for the margin" if epsilon["of_margin"] else "")
+            + ("; the lemma does not hold: not every J_i is convex in y_i" * beyond)
         )
     return rows

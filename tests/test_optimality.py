@@ -80,6 +80,8 @@ def test_a_maximum_is_no_equilibrium(tmp_path):
     assert told.returncode == 1
     for words in ("no equilibrium", "agents 1, 2", "gains 2.1", "own second derivative"):
         assert words in told.stdout
+    ran = gne("run", scenario(tmp_path))
+    assert "the lemma does not hold: not every J_i is convex in y_i" in ran.stdout
     assert "variational GNE\n" not in told.stdout.replace("to the variational GNE\n", "")
 
 
