@@ -114,7 +114,7 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     convex in y_i a better one may exist. The multipliers are those of the agent's own problem, zero
     for constraints that do not contain its action.
     """
-    return _solver(game).respond(y, agent)
+    return _solver(game).respond(y, agent)[0]
 
 
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
@@ -124,7 +124,7 @@ def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
     """
     solver, costs = _solver(game), game.costs(y)
-    least = [solver.cost(i, solver.respond(y, i).action) for i in range(game.agents)]
+    least = [solver.respond(y, i)[1] for i in range(game.agents)]
     return np.maximum(costs - least, 0.0)
 
 
@@ -211,8 +211,8 @@ class Solver:
             forgive_pending()
             return self._result(self._point.y.copy(), self._point.multipliers.copy())
 
-    def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
-        """The best response of one agent, which minimises alone, from y and nothing else.
+    def respond(self, y: ArrayLike, agent: int) -> tuple[Equilibrium, float]:
+        """The best response of one agent, which minimises alone, from y and nothing else; its cost.
 
         Raises:
             InfeasibleStart: y is not strictly inside.
@@ -221,8 +221,10 @@ class Solver:
         y = self._profile(y)
         best, least, failure = None, np.inf, None
         starts, single = self._lowest(y, agent)
+        own = int(self._data.own_pointer[agent + 1] - self._data.own_pointer[agent])
         for start, cost in [(y, np.inf), *starts]:
-            if single and best is not None and least <= cost:  # nothing on the interval is lower
+            # By the lemma a response is only so far from the least cost of its own valley.
+            if single and best is not None and cost > least - 2.0 * own * best.rho:
                 continue
             try:
                 found = self._respond(start, agent)
@@ -235,7 +237,7 @@ class Solver:
         if best is None:
             assert failure is not None
             raise failure
-        return best
+        return best, least
 
     def _lowest(
         self, y: NDArray[np.float64], agent: int
