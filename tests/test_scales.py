@@ -179,3 +179,32 @@ def test_a_merely_monotone_game_has_some_equilibrium_found():
         assert np.sum(result.action) == pytest.approx(2.0, abs=1e-9)
         assert np.max(np.abs(result.action)) < 100.0
         assert abs(examine(game, result).monotonicity) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("matrix", "shift", "limit", "expected", "multiplier"),
+    [
+        # Harker 1991: the equilibrium (5, 9) lies inside
+        ([[2.0, 8 / 3], [1.25, 2.0]], [34.0, 24.25], 15.0, [5.0, 9.0], 0.0),
+        # Facchinei and Kanzow's A.11: (y_1 - 1)^2, (y_2 - 1/2)^2, y_1 + y_2 <= 1
+        ([[2.0, 0.0], [0.0, 2.0]], [2.0, 1.0], 1.0, [0.75, 0.25], 0.5),
+    ],
+    ids=["Harker", "A.11"],
+)
+def test_known_games(matrix, shift, limit, expected, multiplier):
+    matrix = np.array(matrix)
+    module = ModuleType("known")
+    module.cost = lambda q, i, y: (
+        y[i] * (0.5 * matrix[i, i] * y[i] + matrix[i, 1 - i] * y[1 - i] - shift[i])
+    )
+    module.cost_gradient = lambda q, i, a, y: matrix[i] @ y - shift[i]
+    module.constraint = lambda q, k, y: y[0] + y[1] - limit
+    module.constraint_gradient = lambda q, k, a, y: 1.0
+    game = Game(
+        name="known", kernels=module, parameters=np.zeros(1), sizes=(1, 1), in_cost=[[0, 1]] * 2,
+        in_constraint=[[0, 1]], constraint_names=("sum",),
+    )  # fmt: skip
+    result = variational_equilibrium(game, [0.1, 0.1])
+    assert np.allclose(result.action, expected, rtol=1e-9)
+    assert result.multipliers[0] == pytest.approx(multiplier, abs=1e-9)
+    assert np.max(measured_epsilon(game, result.action)) < 1e-9
