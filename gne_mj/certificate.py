@@ -1,5 +1,6 @@
 """What one system's run showed, measured at every integration step: status and certificate."""
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from gne_mj import verdicts
 from gne_mj.controllers import FullyDistributed
-from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
+from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
@@ -35,9 +36,9 @@ class Certificate:
             :func:`gne_mj.margins.epsilon_bounds`.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
-            whether it is known (not of MJCF robots), and whether the theory claims that it never
-            rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long as no input limit is
-            met.
+            whether it is known (not of MJCF robots, nor without a y*), and whether the theory
+            claims that it never rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long
+            as no input limit is met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         exit: where the run left, the law and the input that led there; None if it did not.
         division: mode continuous with a fixed step: how many steps were divided near the boundary
@@ -104,7 +105,9 @@ def certify_run(
         interrupted: the user stopped it.
         intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
     """
-    distance = np.max(np.abs(action - system.equilibrium.action), axis=1)
+    known = system.known_equilibrium
+    middle = np.nan if known is None else known.action
+    distance = np.max(np.abs(action - middle), axis=1)
     (settled,) = verdicts.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
@@ -119,7 +122,7 @@ def certify_run(
         worst_constraint=_worst_constraint(system, monitor),
         worst_gap=_worst_gap(system, monitor),
         equilibrium=_equilibrium(system, action[-1]),
-        epsilon=_epsilon(system, system.equilibrium),
+        epsilon=_epsilon(system),
         settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
@@ -177,6 +180,12 @@ def _status(
             "converged",
             f"within {tail:.2g} of the penalised equilibrium over the last"
             f" {TAIL * duration:g} s (tolerance {tolerance:g})",
+        )
+    if system.known_equilibrium is None:
+        return (
+            "completed",
+            f"ran its {duration:g} s inside the set; no penalised equilibrium was found, so that"
+            " how far it is, how soon the run settles and V are not known",
         )
     return (
         "completed",
@@ -337,7 +346,13 @@ def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] |
 
 
 def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
-    penalised = system.equilibrium
+    penalised = system.known_equilibrium
+    if penalised is None:
+        keys = (
+            "penalised", "multipliers", "residual", "final_distance", "variational",
+            "final_distance_to_variational",
+        )  # fmt: skip
+        return dict.fromkeys(keys)
     result: dict[str, Any] = {
         "penalised": penalised.action.tolist(),
         "multipliers": penalised.multipliers.tolist(),
@@ -353,28 +368,34 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
     return result
 
 
-def _epsilon(system: System, equilibrium: Equilibrium) -> dict[str, Any]:
+def _epsilon(system: System) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
-    try:
-        gains = measured_epsilon(of_the_set(system.game), equilibrium.action)
-        measured = float(np.max(gains))
-    except SolverError:
-        measured = None
-    return {"measured": measured, **epsilon_bounds(system.game, equilibrium)}
+    known, measured = system.known_equilibrium, None
+    if known is not None:
+        with suppress(SolverError):
+            measured = float(np.max(measured_epsilon(of_the_set(system.game), known.action)))
+    return {
+        "measured": measured,
+        **epsilon_bounds(system.game, system.rho, None if known is None else known.multipliers),
+    }
 
 
 def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) -> dict[str, Any]:
     start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
+    about = system.known_equilibrium is not None  # V is about y*
+    known = about and system.agents.knows_storage
     unhindered = bool(monitor[watch.STARTED]) and not monitor[watch.SATURATED]
-    claimed = unhindered and not intervened and Theorem(system).lyapunov
+    claimed = known and unhindered and not intervened and Theorem(system).lyapunov
     return {
         "claimed": claimed,
-        "known": system.agents.knows_storage,
-        "start": start,
-        "final": float(monitor[watch.STORAGE]),
-        "largest_rise": rise,
-        "largest_rise_time": float(monitor[watch.STORAGE_RISE_TIME]) if rise > 0 else None,
-        "monotone": rise <= ROUNDING * max(start, 1.0),
+        "known": known,
+        "start": start if about else None,
+        "final": float(monitor[watch.STORAGE]) if about else None,
+        "largest_rise": rise if about else None,
+        "largest_rise_time": float(monitor[watch.STORAGE_RISE_TIME])
+        if about and rise > 0
+        else None,
+        "monotone": rise <= ROUNDING * max(start, 1.0) if about else None,
         "observed_until": float(monitor[watch.TIME]),
         "left": bool(monitor[watch.EXIT] != watch.INSIDE),
     }

@@ -17,15 +17,18 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from gne_mj import interior_point as method
+from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
 from gne_mj.interior_point import Free, Iterate, Path, Work
-from gne_mj.plain import raise_pending
+from gne_mj.plain import check_numbers, forgive_pending, raise_pending
 
 TOLERANCE = 1e-12
-FIRST_RHO, LAST_RHO = 1.0, 1e-11  # of the path to rho -> 0
-# There only the order of lambda_l s_l counts, so that it may be off by half.
-TO_ZERO = Path(FIRST_RHO, LAST_RHO, TOLERANCE, 0.5)
+# The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
+# order of lambda_l s_l counts, so that it may be off by half.
+TO_ZERO = Path(0.0, 1e-12, TOLERANCE, 0.5, True)
+# Random lines for each entry of an action of several, on which a best response is looked for
+RANDOM_LINES = 4
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,9 @@ class Equilibrium:
         action: y, shape (m,), strictly inside: every g_l(y) is negative.
         multipliers: lambda_l >= 0, shape (p,).
         rho: the penalty parameter it was computed with.
-        residual: greatest entry of |F(y) + sum_l lambda_l dg_l(y)|, relative to the size of the
-            terms that must cancel where that exceeds 1.
+        residual: greatest entry of |F(y) + sum_l lambda_l dg_l(y)|, relative to its row's size
+            (:mod:`gne_mj.scales`): that of the terms that must cancel, and of what the cost's
+            second derivatives make of the profile.
         complementarity: greatest lambda_l * s_l, with s_l = -g_l; it is rho along the path.
         iterations: Newton steps in all.
     """
@@ -71,9 +75,11 @@ def penalised_equilibrium(
         InfeasibleStart: ``start`` is not strictly inside.
         SolverError: the tolerance was not reached.
     """
-    highest = start.rho if isinstance(start, Equilibrium) else FIRST_RHO
     rho = float(rho)
-    return _solver(game).follow(start, Path(max(highest, rho), rho, tolerance, tolerance))
+    if not 0.0 < rho < np.inf:
+        raise InvalidInput("barrier.rho", rho, "it must be positive and finite")
+    first = max(start.rho, rho) if isinstance(start, Equilibrium) else 0.0
+    return _solver(game).follow(start, Path(first, rho, tolerance, tolerance, False))
 
 
 def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibrium]:
@@ -87,38 +93,44 @@ def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibriu
         yield start
 
 
-def variational_equilibrium(
-    game: Game, start: Start, *, rho: float = FIRST_RHO, last_rho: float = LAST_RHO
-) -> Equilibrium:
+def variational_equilibrium(game: Game, start: Start) -> Equilibrium:
     """The variational GNE with its multipliers [eq:vGNE], by following the path rho -> 0.
 
-    The result lies strictly inside, within about ``last_rho`` of the boundaries that bind:
-    p * last_rho bounds what any agent could still gain. From an equilibrium the path starts at
-    that one's rho. Raises as :func:`penalised_equilibrium` does.
+    The result lies strictly inside, within about 1e-11 (relative to the size of the actions and of
+    the forces at hand, not of their units) of the boundaries that bind, also of those that bind
+    with a multiplier of zero. p times its rho bounds what any agent could still gain. From an
+    equilibrium the path starts at that one's rho. Raises as :func:`penalised_equilibrium` does.
     """
-    if isinstance(start, Equilibrium):
-        rho = max(start.rho, last_rho)
-    return _solver(game).follow(start, TO_ZERO._replace(rho=rho, last_rho=last_rho))
+    rho = start.rho if isinstance(start, Equilibrium) else 0.0
+    return _solver(game).follow(start, TO_ZERO._replace(rho=rho))
 
 
 def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     """An agent's own minimiser of J_i over its feasible actions, the others' held at y (m,).
 
-    Found by the same path, for this agent alone; y must be strictly inside. The multipliers are
-    those of the agent's own problem, zero for constraints that do not contain its action.
+    Found by the same path, for this agent alone, from y (strictly inside) and from the least costs
+    on lines through it: for an action of one entry that is the whole feasible interval around y_i,
+    as finely as :mod:`gne_mj.lines` looks; for others a few directions, so that where J_i is not
+    convex in y_i a better one may exist. The multipliers are those of the agent's own problem, zero
+    for constraints that do not contain its action.
     """
-    return _solver(game).respond(y, agent)
+    return _solver(game).respond(y, agent)[0]
 
 
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     """What each agent could gain by deviating alone from y: J_i(y) - min J_i, shape (N,).
 
-    At the penalised equilibrium it is at most p_i * rho, with p_i the constraints that contain
-    y_i, and so at most p * rho [lemma:epsilon].
+    At the penalised equilibrium it is at most p_i * rho if J_i and the constraints are convex in
+    y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
     """
     solver, costs = _solver(game), game.costs(y)
-    least = [solver.cost(i, solver.respond(y, i).action) for i in range(game.agents)]
+    least = [solver.respond(y, i)[1] for i in range(game.agents)]
     return np.maximum(costs - least, 0.0)
+
+
+def middle(game: Game, y: ArrayLike) -> NDArray[np.float64]:
+    """A profile (m,) well inside, from one strictly inside: the middle along each action."""
+    return _solver(game).middle(y)
 
 
 _SOLVERS: WeakKeyDictionary[Game, "Solver"] = WeakKeyDictionary()
@@ -142,6 +154,7 @@ class Solver:
         m, p = game.actions, game.constraints_count
         self._data = game.data
         self._name, self._constraint_names = game.name, game.constraint_names
+        self._written = game.written
         self._kernels, self._native = game.kernels, method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
@@ -151,11 +164,14 @@ class Solver:
         self._everyone = Free(agents, constraints, position)
         self._nobody = Free(agents, constraints, np.full(m, -1))
         self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
+        self._direction, self._found = np.zeros(m), np.zeros(lines.COUNT)
         entries = len(game.actions_in_constraints[1])
         self._work = Work(
             trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
             g=np.zeros(p),
             size=np.zeros(p),
+            unit=np.zeros(m),
+            share=np.zeros(p),
             row=np.zeros(p + 1, dtype=np.int64),
             column=np.zeros(entries, dtype=np.int64),
             jacobian=np.zeros(entries),
@@ -177,14 +193,11 @@ class Solver:
             path: from which rho to which, and how accurately.
 
         Raises:
-            InvalidInput: a rho that is not positive and finite.
             InfeasibleStart: ``start`` is not strictly inside.
             SolverError: the tolerance was not reached.
         """
         known = isinstance(start, Equilibrium)
         y = self._profile(start.action if isinstance(start, Equilibrium) else start)
-        if not 0.0 < path.last_rho <= path.rho < np.inf:
-            raise InvalidInput("barrier.rho", path.last_rho, "it must be positive and finite")
         with self._lock:
             self._point.y[:] = y
             if isinstance(start, Equilibrium):
@@ -195,16 +208,69 @@ class Solver:
             )  # fmt: skip
             if ended != method.CONVERGED:
                 self._fail(ended, y)
-            return self._result(path.last_rho, self._point.y.copy(), self._point.multipliers.copy())
+            forgive_pending()
+            return self._result(self._point.y.copy(), self._point.multipliers.copy())
 
-    def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
-        """The best response of one agent, which minimises alone, from y and nothing else.
+    def respond(self, y: ArrayLike, agent: int) -> tuple[Equilibrium, float]:
+        """The best response of one agent, which minimises alone, from y and nothing else; its cost.
 
         Raises:
             InfeasibleStart: y is not strictly inside.
-            SolverError: the minimiser was not found.
+            SolverError: no minimiser was found.
         """
         y = self._profile(y)
+        best, least, failure = None, np.inf, None
+        starts, single = self._lowest(y, agent)
+        own = int(self._data.own_pointer[agent + 1] - self._data.own_pointer[agent])
+        for start, cost in [(y, np.inf), *starts]:
+            # By the lemma a response is only so far from the least cost of its own valley.
+            if single and best is not None and cost > least - 2.0 * own * best.rho:
+                continue
+            try:
+                found = self._respond(start, agent)
+            except SolverError as error:
+                failure = failure or error
+                continue
+            reached = self.cost(agent, found.action)
+            if best is None or reached < least:
+                best, least = found, reached
+        if best is None:
+            assert failure is not None
+            raise failure
+        return best, least
+
+    def _lowest(
+        self, y: NDArray[np.float64], agent: int
+    ) -> tuple[list[tuple[NDArray[np.float64], float]], bool]:
+        """Where an agent's cost is least on lines through y, and that; if there is one line only.
+
+        The lines go along its entries, and if they are several in random directions too.
+        """
+        data = self._data
+        first, last = int(data.offsets[agent]), int(data.offsets[agent + 1])
+        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
+        directions = np.eye(last - first)
+        if last - first > 1:
+            shape = (RANDOM_LINES * (last - first), last - first)
+            random = np.random.default_rng(agent).normal(size=shape)
+            directions = np.concatenate([directions, random])
+        starts = []
+        for direction in directions:
+            with self._lock:
+                self._direction[first:last] = direction
+                self._native.lowest(
+                    data, agent, own, y, self._direction, self._work.trial.y, self._found
+                )
+                self._direction[first:last] = 0.0
+                cost, place = self._found.tolist()
+            if place != 0.0:
+                start = y.copy()
+                start[first:last] += place * direction
+                starts.append((start, cost))
+        return starts, last - first == 1
+
+    def _respond(self, y: NDArray[np.float64], agent: int) -> Equilibrium:
+        """What an agent's own path from y leads to."""
         data, point, position = self._data, self._point, self._nobody.position
         own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
         alone = Free(self._nobody.agents[agent : agent + 1], own, position)
@@ -218,9 +284,18 @@ class Solver:
             )
             if ended != method.CONVERGED:
                 self._fail(ended, y)
+            forgive_pending()
             multipliers = np.zeros(len(point.multipliers))
             multipliers[own] = point.multipliers[: len(own)]
-            return self._result(LAST_RHO, point.y.copy(), multipliers)
+            return self._result(point.y.copy(), multipliers)
+
+    def middle(self, y: ArrayLike) -> NDArray[np.float64]:
+        """A profile well inside, from one strictly inside."""
+        moved = self._profile(y).copy()
+        with self._lock:
+            self._native.to_middle(self._data, moved, self._direction, self._work.trial.y)
+        forgive_pending()
+        return moved
 
     def cost(self, agent: int, y: NDArray[np.float64]) -> float:
         """J_i(y); y of shape (m,)."""
@@ -232,10 +307,8 @@ class Solver:
             raise ValueError(f"y must have shape {self._point.y.shape}, not {profile.shape}")
         return profile
 
-    def _result(
-        self, rho: float, action: NDArray[np.float64], multipliers: NDArray[np.float64]
-    ) -> Equilibrium:
-        iterations, _, residual, complementarity = self._report.tolist()
+    def _result(self, action: NDArray[np.float64], multipliers: NDArray[np.float64]) -> Equilibrium:
+        iterations, _, residual, complementarity, rho = self._report.tolist()
         return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
 
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
@@ -248,6 +321,7 @@ class Solver:
             raise InfeasibleStart(
                 self._name, "start", self._constraint_names[worst], float(g[worst])
             )
+        check_numbers(*self._written, self._data, self._point.y)
         reason = {
             method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name} game",
             method.NO_WAY_ON: f"Newton's method found no way on in the {self._name} game",

@@ -52,11 +52,12 @@ class UserCodeError(GneError, RuntimeError):
     Args:
         function: the user's.
         error: what it raised, or a sentence about what it returned.
+        at: for what it was called, e.g. "for agent 2 at y = [0.5, -0.1]".
     """
 
     status = "user_code_failed"
 
-    def __init__(self, function: Callable[..., Any], error: Exception | str) -> None:
+    def __init__(self, function: Callable[..., Any], error: Exception | str, at: str = "") -> None:
         inner = function.func if isinstance(function, partial) else function
         name = getattr(inner, "__name__", repr(inner))
         code = getattr(inner, "__code__", None)
@@ -68,7 +69,7 @@ class UserCodeError(GneError, RuntimeError):
                 line = next((f.lineno for f in lines[::-1] if f.filename == code.co_filename), line)
             where = f"{Path(code.co_filename).name}, line {line}, in {name}: "
         what = f"{type(error).__name__}: {error}" if isinstance(error, Exception) else error
-        super().__init__(where + " ".join(what.split()))
+        super().__init__(where + " ".join(f"{what} {at}".split()))
 
 
 class EngineError(GneError, RuntimeError):

@@ -170,7 +170,7 @@ def summary(cells: Sequence[Cell]) -> Iterator[str]:
 def _rays(system: System, grid: Grid) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """For each run a way from y* to the boundary, (m,), and signs of the agents' pushes (m,)."""
     rng = np.random.default_rng(grid.seed)
-    game, middle = system.game, system.equilibrium.action
+    game, middle = system.game, system.centre
     found = []
     for _ in range(grid.runs):
         ray = rng.normal(size=game.actions)
@@ -192,7 +192,7 @@ def _at(
     system: System, mode: str, ray: NDArray[np.float64], margin: float, push: NDArray[np.float64]
 ) -> System | None:
     """The system at rest at that part of the way, pushed; None if rounding puts it outside."""
-    y = system.equilibrium.action + (1.0 - margin) * ray
+    y = system.centre + (1.0 - margin) * ray
     state = system.agents.equilibrium(y)
     memory = system.law.initial_memory(y)
     try:

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
-from gne_mj.plain import is_plain, plain_kernels, raise_pending
+from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
@@ -135,8 +135,12 @@ class Game:
         self._check_declarations()
         object.__setattr__(self, "written", (self.kernels, self.parameters))
         if is_plain(self.kernels):
+            own = [
+                [k for k, members in enumerate(self.in_constraint) if i in members]
+                for i in self.agent_of_action.tolist()
+            ]
             kernels, addresses, kept = plain_kernels(
-                self.kernels, np.asarray(self.parameters, dtype=np.float64)
+                self.kernels, np.asarray(self.parameters, dtype=np.float64), own
             )
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
@@ -326,6 +330,14 @@ class Game:
         _native(self.kernels).constraint_hessian(self.data, self._profile(y), constraint, own, out)
         raise_pending()
         return out
+
+    def check_numbers(self, y: ArrayLike) -> None:
+        """Call the game's functions at a profile (m,), each as it was written.
+
+        Raises:
+            UserCodeError: one raises, or returns what is not a finite number.
+        """
+        check_numbers(*self.written, self.data, self._profile(y).copy())
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:
         """The constraint with the greatest g_l(y) and that value (negative inside)."""

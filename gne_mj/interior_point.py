@@ -8,6 +8,10 @@ its terms. Iterates stay strictly inside.
 
 Steps are Newton's, shortened until the residuals' norm falls. Where only tiny steps do (along
 curved bounds, far from the path), the method goes back to a higher rho and is careful for a while.
+Where the matrix is singular, as in merely monotone games, its diagonal is raised a little.
+
+Nothing depends on the units of costs, constraints or actions: all is measured by the problem's own
+sizes (:mod:`gne_mj.scales`).
 
 Newton's matrix dF/dy + sum_l lambda_l d2g_l + dg' diag(lambda / s) dg couples actions of agents
 that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.banded`).
@@ -19,26 +23,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gne_mj import banded
+from gne_mj import banded, lines, scales
 from gne_mj.native import compiled, copy, kernel, source_key
 
 # How an iteration ended
 CONVERGED, OUTSIDE, SINGULAR, NO_WAY_ON, TOO_MANY = range(5)
 # Entries of a report
-ITERATIONS, ERROR, STATIONARITY, COMPLEMENTARITY, COUNT = range(5)
+ITERATIONS, ERROR, STATIONARITY, COMPLEMENTARITY, RHO, COUNT = range(6)
 
 LARGEST_COUNT = 300
 ACCEPTED = 100.0  # tolerances, where rounding ends the progress before
 TO_BOUNDARY = 0.005  # share of a slack or multiplier that one step leaves at least
 DECREASE = 1e-4  # of the merit, relative to the step's length
+MERIT = 0.1  # weight of the stationarity residual in it, for the length of a profile
 ROUNDING = 1e-14  # of the terms of g
 NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
-ALIGNED = 0.7  # cosine between -F and dphi from which on a point counts as near the path
 SHRINK = 0.1  # of rho, from one equilibrium to the next
 # So many steps in a row shorter than SHORT make the method careful: damped steps at one rho,
 # multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; if that
 # takes more than LONG steps, rho grows by GROW.
 PATIENCE, SHORT, CENTRED, LONG, GROW = 3, 0.1, 0.3, 30, 10.0
+# What is added to the diagonal of a matrix that is singular, or whose step is longer than FAR
+# profiles, relative to the rows' own slopes: SHIFT, and so many times HIGHER.
+SHIFT, HIGHER, SHIFTS, FAR = 1e-12, 1e3, 5, 1e6
 
 
 class Free(NamedTuple):
@@ -52,14 +59,15 @@ class Free(NamedTuple):
 class Path(NamedTuple):
     """From which rho to which (a start without multipliers may take a lower one), and when it ends.
 
-    There g + s and the stationarity residual must be within ``tolerance`` (relative to their terms
-    where they exceed 1), and lambda_l s_l within ``spread * last_rho`` of last_rho.
+    There the stationarity residual must be within ``tolerance`` of its rows' sizes
+    (:mod:`gne_mj.scales`), and lambda_l s_l within ``spread * last_rho`` of last_rho.
     """
 
-    rho: float
+    rho: float  # 0 for one that suits the costs
     last_rho: float
     tolerance: float
     spread: float
+    to_zero: bool  # last_rho is a share of the costs' size, and no bound is to look blurred there
 
 
 class Iterate(NamedTuple):
@@ -81,6 +89,8 @@ class Work(NamedTuple):
     jacobian: np.ndarray  # dg_l/dy_a for them
     stationarity: np.ndarray  # (n,) F + sum_l lambda_l dg_l
     terms: np.ndarray  # (n,) sum of the magnitudes of its terms
+    unit: np.ndarray  # (n,) size of each row's terms
+    share: np.ndarray  # (q,) lambda_l s_l is to be this share of rho
     step: np.ndarray  # (n,)
     step_slack: np.ndarray  # (q,)
     step_multipliers: np.ndarray  # (q,)
@@ -140,44 +150,37 @@ def evaluate(game, data, free, point, work):
 
 
 @kernel
-def merit(count, constraints, rho, point, work):
-    """Squared norm of all residuals, complementarity measured from rho."""
+def merit(count, constraints, rho, length, point, work):
+    """Squared norm of all residuals in units of cost, complementarity measured from rho."""
     total = 0.0
     for r in range(count):
-        total += work.stationarity[r] ** 2
+        total += (MERIT * length * work.stationarity[r]) ** 2
     for k in range(constraints):
-        total += (work.g[k] + point.slack[k]) ** 2
-        total += (point.multipliers[k] * point.slack[k] - rho) ** 2
+        total += (point.multipliers[k] * point.slack[k] - work.share[k] * rho) ** 2
     return total
 
 
 @kernel
 def stationarity_error(count, work):
-    """Greatest residual of F + sum_l lambda_l dg_l, relative to its terms where they exceed 1."""
+    """Greatest residual of F + sum_l lambda_l dg_l, relative to its row's size."""
     worst = 0.0
     for r in range(count):
-        error = abs(work.stationarity[r]) / max(1.0, work.terms[r])
+        error = abs(work.stationarity[r])
+        if error != 0.0:
+            error /= max(work.unit[r], work.terms[r])
         if not error <= worst:
             worst = error
     return worst
 
 
 @kernel
-def slack_error(constraints, point, work):
-    """Greatest |g + s|, relative to the terms of g where they exceed 1."""
+def spread(constraints, rho, point, work):
+    """Greatest distance of lambda_l s_l from what it is to be, relative to that."""
     worst = 0.0
     for k in range(constraints):
-        worst = max(worst, abs(work.g[k] + point.slack[k]) / max(1.0, work.size[k]))
+        own = work.share[k] * rho
+        worst = max(worst, abs(point.multipliers[k] * point.slack[k] - own) / own)
     return worst
-
-
-@kernel
-def spread(constraints, rho, point):
-    """Greatest |lambda_l s_l - rho| / rho."""
-    worst = 0.0
-    for k in range(constraints):
-        worst = max(worst, abs(point.multipliers[k] * point.slack[k] - rho))
-    return worst / rho
 
 
 @kernel
@@ -192,7 +195,7 @@ def correct(constraints, rho, least, factor, before, point, work):
             point.slack[k] = -work.g[k]
         if not point.slack[k] >= least * before.slack[k]:
             return False
-        centre = rho / point.slack[k]
+        centre = work.share[k] * rho / point.slack[k]
         point.multipliers[k] = min(max(point.multipliers[k], centre / factor), centre * factor)
     return True
 
@@ -207,22 +210,16 @@ def complementarity(constraints, point):
 
 
 @kernel
-def assemble(game, data, free, point, b, work):
-    """Fill the band with Newton's matrix; its rows are in the order of ``free.position``."""
-    q, at, position, band = data.parameters, data.offsets, free.position, work.band
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        for a in range(at[i], at[i + 1]):
-            r = position[a]
-            for c in range(3 * b + 1):
-                band[r, c] = 0.0
-            game.add_cost_hessian(q, i, a, point.y, 1.0, work.hessian_row)
-            for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
-                j = data.cost_index[member]
-                for c in range(at[j], at[j + 1]):
-                    if position[c] >= 0:
-                        band[r, position[c] - r + b] += work.hessian_row[c]
-                    work.hessian_row[c] = 0.0
+def assemble(game, data, free, count, length, shift, point, b, work):
+    """Fill the band with Newton's matrix, rows in the order of ``free.position``; the costs' size.
+
+    ``shift`` is added to the diagonal, relative to the rows' own slopes.
+    """
+    position, band = free.position, work.band
+    size = scales.add_costs(game, data, free, length, point.y, b, work)
+    if shift > 0.0:
+        for r in range(count):
+            band[r, b] += shift * work.unit[r] / length
     for k in range(len(free.constraints)):
         l = free.constraints[k]
         weight = point.multipliers[k]
@@ -233,32 +230,51 @@ def assemble(game, data, free, point, b, work):
             slope = ratio * work.jacobian[entry]
             for other in range(work.row[k], work.row[k + 1]):
                 c = work.column[other]
-                second = weight * game.constraint_hessian(q, l, a, c, point.y)
+                second = weight * game.constraint_hessian(data.parameters, l, a, c, point.y)
                 band[r, position[c] - r + b] += second + slope * work.jacobian[other]
+    return size
 
 
 @kernel
-def newton(game, data, free, count, rho, point, b, work):
-    """Fill the steps of y, s and lambda towards lambda_l s_l = rho; False if singular."""
-    assemble(game, data, free, point, b, work)
-    if not banded.factorise(work.band, count, b, work.pivots):
-        return False
-    for r in range(count):
-        work.step[r] = -work.stationarity[r]
-    for k in range(len(free.constraints)):
-        # What lambda_l must change by if y stays
-        change = (rho + point.multipliers[k] * work.g[k]) / point.slack[k]
-        work.step_multipliers[k] = change
-        for entry in range(work.row[k], work.row[k + 1]):
-            work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
-    banded.solve(work.band, count, b, work.pivots, work.step)
+def newton(game, data, free, count, rho, length, point, b, work):
+    """Fill the steps of y, s and lambda towards their rho; the costs' size, -1 if singular."""
+    shift, solved, size = 0.0, False, 0.0
+    for _ in range(SHIFTS):
+        size = assemble(game, data, free, count, length, shift, point, b, work)
+        solved = banded.factorise(work.band, count, b, work.pivots)
+        if solved:
+            solved = solve(free, count, rho, length, point, b, work)
+        if solved:
+            break
+        shift = max(SHIFT, HIGHER * shift)
+    if not solved:
+        return -1.0
     for k in range(len(free.constraints)):
         along = 0.0
         for entry in range(work.row[k], work.row[k + 1]):
             along += work.jacobian[entry] * work.step[free.position[work.column[entry]]]
         work.step_slack[k] = -(work.g[k] + point.slack[k]) - along
         work.step_multipliers[k] += point.multipliers[k] / point.slack[k] * along
-    return True
+    return size
+
+
+@kernel
+def solve(free, count, rho, length, point, b, work):
+    """Fill the step of y, and lambda's if y stayed; False if it leads nowhere near."""
+    for r in range(count):
+        work.step[r] = -work.stationarity[r]
+    for k in range(len(free.constraints)):
+        change = (work.share[k] * rho + point.multipliers[k] * work.g[k]) / point.slack[k]
+        work.step_multipliers[k] = change
+        for entry in range(work.row[k], work.row[k + 1]):
+            work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
+    banded.solve(work.band, count, b, work.pivots, work.step)
+    longest = 0.0
+    for r in range(count):
+        size = abs(work.step[r])
+        if not size <= longest:  # nor if it is not a number
+            longest = size
+    return longest <= FAR * length
 
 
 @kernel
@@ -309,51 +325,36 @@ def accept(data, free, point, trial):
 
 
 @kernel
-def balance(count, constraints, free, highest, work):
-    """Near the path its own rho, at which the barrier pushes as hard as F pulls; else ``highest``.
-
-    Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
-    stationarity residual must be F alone.
-    """
-    pull, push, along = 0.0, 0.0, 0.0
-    for r in range(count):
-        pull += work.stationarity[r] ** 2
-        work.step[r] = 0.0
-    for k in range(constraints):
-        for entry in range(work.row[k], work.row[k + 1]):
-            work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
-    for r in range(count):
-        push += work.step[r] ** 2
-        along -= work.stationarity[r] * work.step[r]
-    aligned = along > ALIGNED * np.sqrt(pull * push)
-    return min(np.sqrt(pull / push), highest) if aligned else highest
-
-
-@kernel
-def begin(game, data, free, count, path, known, point, work):
+def begin(game, data, free, count, b, path, known, point, work):
     """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
 
-    Unknown multipliers are rho / s, with a rho that suits y.
+    Unknown multipliers are rho / s, with a rho that suits y. Besides, the length of the problem
+    and the costs' size.
     """
     constraints = len(free.constraints)
-    if not known:
-        for k in range(constraints):
+    for k in range(constraints):
+        work.share[k] = 1.0
+        if not known:
             point.multipliers[k] = 0.0
     if not inside(game, data, free, point.y, work):
-        return 0.0
+        return 0.0, 1.0, 1.0
     evaluate(game, data, free, point, work)
     for k in range(constraints):
         point.slack[k] = -work.g[k]
+    length = scales.length_at(count, constraints, free, point.y, work)
+    size = scales.add_costs(game, data, free, length, point.y, b, work)
     if known:
-        return path.rho
-    rho = max(path.last_rho, balance(count, constraints, free, path.rho, work))
+        return path.rho, length, size
+    last = path.last_rho * size if path.to_zero else path.last_rho
+    highest = path.rho if path.rho > 0.0 else scales.pull(count, work) * length
+    rho = max(last, scales.balance(count, constraints, free, max(highest, last), work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
             r = free.position[work.column[entry]]
             work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
             work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
-    return rho
+    return rho, length, size
 
 
 @kernel
@@ -365,61 +366,73 @@ def follow(game, data, free, half_band, path, known, point, work, report):
         count += data.offsets[i + 1] - data.offsets[i]
     b = min(half_band, max(count - 1, 0))
     find_entries(data, free, work)
-    rho = begin(game, data, free, count, path, known, point, work)
+    rho, whole, size = begin(game, data, free, count, b, path, known, point, work)
     if rho == 0.0:
         return OUTSIDE
+    least = max(scales.NARROWEST * whole, scales.largest_held(free, point.y))
+    length = whole
+    last = path.last_rho * size if path.to_zero else path.last_rho
+    distance = np.inf
     before, stalled = np.inf, 0
     highest, shrink, slow, careful = max(rho, path.rho), SHRINK, 0, False
     for iteration in range(LARGEST_COUNT):
         residual = stationarity_error(count, work)
-        feasible = max(residual, slack_error(constraints, point, work))
-        off, near_enough = spread(constraints, rho, point), False
+        off, near_enough = spread(constraints, rho, point, work), False
+        if path.to_zero and path.last_rho * size < 0.5 * last:
+            last = path.last_rho * size
         if not careful:
             # On the way only nearness to the path matters.
-            while rho > path.last_rho and feasible <= 10.0 * rho and off <= 0.9:
+            while rho > last and residual <= 10.0 * rho / size and off <= 0.9:
                 highest = rho
-                rho = max(path.last_rho, min(shrink * rho, rho * np.sqrt(rho)))
-                off = spread(constraints, rho, point)
-            error = max(feasible, off * (path.tolerance / path.spread))
+                rho = max(last, min(shrink * rho, rho * np.sqrt(rho / size)))
+                off = spread(constraints, rho, point, work)
+            error = max(residual, off * (path.tolerance / path.spread))
             report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
-            report[COMPLEMENTARITY] = complementarity(constraints, point)
-            if rho == path.last_rho:
+            report[COMPLEMENTARITY], report[RHO] = complementarity(constraints, point), rho
+            if rho <= last:
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 before = error
                 enough = ACCEPTED * path.tolerance
-                near_enough = feasible <= enough and off <= max(8.0 * path.spread, enough)
-                if error <= path.tolerance or (stalled >= 2 and near_enough):
-                    return CONVERGED
-        if not newton(game, data, free, count, rho, point, b, work):
+                near_enough = residual <= enough and off <= max(8.0 * path.spread, enough)
+                near_enough = near_enough or distance <= path.tolerance
+                # A residual that is small beside steep terms, as by a pole, does not tell enough.
+                done = error <= path.tolerance and distance <= CENTRED
+                if done or (stalled >= 2 and near_enough):
+                    if not path.to_zero or not scales.sharpen(
+                        constraints, free, path.last_rho, length, point, work
+                    ):
+                        return CONVERGED
+                    before, stalled = np.inf, 0
+        length = max(least, scales.largest_free(data, free, point.y))
+        size = newton(game, data, free, count, rho, length, point, b, work)
+        if size < 0.0:
             return SINGULAR
-        now = merit(count, constraints, rho, point, work)
+        now = merit(count, constraints, rho, length, point, work)
         distance = local_length(constraints, point, work)
         if careful:
-            keep, factor, length = CENTRED, 1.0, 1.0 / (1.0 + distance)
+            keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
         else:
-            keep, factor = min(TO_BOUNDARY, rho), np.inf
-            length = longest(constraints, keep, point, work)
+            keep, factor = min(TO_BOUNDARY, rho / size), np.inf
+            share = longest(constraints, keep, point, work)
         found = False
         for _ in range(60):
-            move(data, free, length, point, work)
+            move(data, free, share, point, work)
             if inside(game, data, free, work.trial.y, work) and correct(
                 constraints, rho, keep, factor, point, work.trial, work
             ):
                 evaluate(game, data, free, work.trial, work)
-                found = (
-                    careful
-                    or max(feasible, off) <= NEAR
-                    or merit(count, constraints, rho, work.trial, work)
-                    <= (1.0 - 2.0 * DECREASE * length) * now
+                then = merit(count, constraints, rho, length, work.trial, work)
+                found = then <= (1.0 - 2.0 * DECREASE * share) * now or (
+                    (careful or max(residual, off) <= NEAR) and then < np.inf
                 )
                 if found:
                     break
-            length *= 0.5
+            share *= 0.5
         if found:
             accept(data, free, point, work.trial)
         elif near_enough:
             return CONVERGED
-        slow = slow + 1 if careful or length < SHORT else 0
+        slow = slow + 1 if careful or share < SHORT else 0
         if careful:
             careful = distance > CENTRED
             if slow >= LONG:
@@ -431,14 +444,14 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             slow, rho = 0, highest
             inside(game, data, free, point.y, work)
             for k in range(constraints):
-                point.multipliers[k] = rho / point.slack[k]
+                point.multipliers[k] = work.share[k] * rho / point.slack[k]
             evaluate(game, data, free, point, work)
     return TOO_MANY
 
 
 @cache
 def build(game: ModuleType) -> SimpleNamespace:
-    """``run`` and ``cost`` of a game's kernels, compiled at their first call."""
+    """The native functions of a game's kernels, compiled at their first call."""
     source = source_key(game)
 
     @compiled
@@ -454,4 +467,16 @@ def build(game: ModuleType) -> SimpleNamespace:
         _ = source
         return game.cost(data.parameters, i, y)
 
-    return SimpleNamespace(run=run, cost=cost)
+    @compiled
+    def lowest(data, i, own, y, direction, trial, found):
+        """``lines.lowest``."""
+        _ = source
+        lines.lowest(game, data, i, own, y, direction, trial, found)
+
+    @compiled
+    def to_middle(data, y, direction, trial):
+        """``lines.to_middle``."""
+        _ = source
+        lines.to_middle(game, data, y, direction, trial)
+
+    return SimpleNamespace(run=run, cost=cost, lowest=lowest, to_middle=to_middle)

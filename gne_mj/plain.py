@@ -7,14 +7,15 @@ functions run in, some hundred times slower. Putting ``@kernel`` (:mod:`gne_mj.n
 of the same functions gives full speed.
 
 An exception inside a native loop cannot be raised there. It is kept, the function's value becomes
-"not a number", which ends a run, and :func:`raise_pending` raises it afterwards. Arrays that a
+"not a number", which ends a run, and :func:`raise_pending` raises it afterwards; so is a value that
+is not a number. Arrays that a
 plain function only reads are handed to it read-only, and are valid during the call.
 """
 
 import ctypes
 import inspect
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -40,7 +41,8 @@ FUNCTIONS = {
     "constraint_hessian": ("q", "l", "a", "b", "y"),
 }
 _OPTIONAL = ("add_cost_hessian", "constraint_hessian")
-_DIFFERENCE = 6e-6  # step of central differences, relative to the entry's size where that exceeds 1
+_DIFFERENCE = 6e-6  # step of differences, relative to the entry's size
+_SHORTEST = 1e-13  # beyond which it is not shortened
 
 # double f(integers a, b, c; double scale; arrays x, y, z, each an address and a length)
 _SIGNATURE = ctypes.CFUNCTYPE(
@@ -50,7 +52,7 @@ _SIGNATURE = ctypes.CFUNCTYPE(
     *(ctypes.c_int64,) * 6,
 )
 _VIEWS = 1000  # arrays whose views are kept for the next call
-_pending: list[tuple[Callable[..., Any], BaseException]] = []
+_pending: list[tuple[Callable[..., Any], BaseException, str]] = []
 
 
 def raise_pending() -> None:
@@ -60,18 +62,86 @@ def raise_pending() -> None:
         UserCodeError: names the function, its file and line.
     """
     if _pending:
-        function, error = _pending[0]
+        function, error, at = _pending[0]
         _pending.clear()
         if isinstance(error, Exception) and not isinstance(error, UserCodeError):
-            raise UserCodeError(function, error) from error
+            raise UserCodeError(function, error, at) from error
         raise error
 
 
-def callable_address(function: Callable[..., float], own: Callable[..., Any]) -> tuple[float, Any]:
+def forgive_pending() -> None:
+    """Forget what plain functions raised, where a solver found its way around such a profile."""
+    if _pending:
+        _pending[:] = [each for each in _pending if not isinstance(each[1], Exception)]
+
+
+def not_a_number(function: Callable[..., Any], call: Callable[[], Any], at: str) -> UserCodeError:
+    """The error to raise where a user's function returned something that is not a number.
+
+    Args:
+        function: the user's.
+        call: calls it once more as it was called, to find the line.
+        at: for what it was called.
+    """
+    try:
+        with np.errstate(divide="raise", invalid="raise"):
+            call()
+    except Exception as error:
+        return UserCodeError(function, error, at)
+    return UserCodeError(function, "what it returns is not a number", at)
+
+
+def check_numbers(module: ModuleType, q: Array, data: Any, y: Array) -> None:
+    """Call a game's functions at a profile, each as it was written.
+
+    Args:
+        module: with the functions.
+        q: the game's own numbers.
+        data: its :class:`gne_mj.game.GameData`.
+        y: (m,), a copy.
+
+    Raises:
+        UserCodeError: one raises, or what it returns (or adds) is not a finite number.
+    """
+    at, row = data.offsets.tolist(), np.zeros(len(y))
+    for k in range(len(data.member_pointer) - 1):
+        _check(module, "constraint", q, k, y)
+        for i in data.member_index[data.member_pointer[k] : data.member_pointer[k + 1]].tolist():
+            for a in range(at[i], at[i + 1]):
+                _check(module, "constraint_gradient", q, k, a, y)
+    for i in range(len(at) - 1):
+        for a in range(at[i], at[i + 1]):
+            _check(module, "cost_gradient", q, i, a, y)
+            if hasattr(module, "add_cost_hessian"):
+                row[:] = 0.0
+                _check(module, "add_cost_hessian", q, i, a, y, 1.0, row)
+        _check(module, "cost", q, i, y)
+
+
+def _check(module: ModuleType, name: str, q: Array, number: int, *rest: Any) -> None:
+    function = getattr(module, name)
+    at = place_of(name)(number, next(each for each in rest if isinstance(each, np.ndarray)))
+    try:
+        with np.errstate(all="ignore"):
+            value = function(q, number, *rest)
+    except Exception as error:
+        raise UserCodeError(function, error, at) from error
+    if not np.all(np.isfinite(rest[-1] if value is None else value)):
+        raise not_a_number(function, lambda: function(q, number, *rest), at)
+
+
+def callable_address(
+    function: Callable[..., float],
+    own: Callable[..., Any],
+    about: Callable[[int, Array], str] = lambda first, x: "",
+    *,
+    any_value: bool = False,
+) -> tuple[float, Any]:
     """A C function's address, as a double, that calls ``function(a, b, c, scale, x, y, z)``.
 
-    x and y are read-only, z is not. ``own`` is the user's function behind it, for messages. The
-    second item must be kept as long as the address is used.
+    x and y are read-only, z is not. ``own`` is the user's function behind it, and ``about(a, x)``
+    tells for what it is called, for messages. With ``any_value`` it may return what is not a
+    number. The second item must be kept as long as the address is used.
     """
     views: dict[tuple[int, int, bool], Array] = {}
 
@@ -86,11 +156,16 @@ def callable_address(function: Callable[..., float], own: Callable[..., Any]) ->
         return found
 
     def called(a: int, b: int, c: int, scale: float, *arrays: int) -> float:
+        x: Array = np.zeros(0)
         try:
             x, y, z = (view(arrays[at], arrays[at + 1], at == 4) for at in (0, 2, 4))
-            return function(a, b, c, scale, x, y, z)
+            value = function(a, b, c, scale, x, y, z)
+            if any_value or value == value:
+                return value
+            raise not_a_number(own, lambda: function(a, b, c, scale, x, y, z), about(a, x))
         except BaseException as error:
-            _pending.append((own, error))
+            if not _pending or not isinstance(error, Exception):
+                _pending.insert(0, (own, error, about(a, x)))
             return float("nan")
 
     kept = _SIGNATURE(called)
@@ -165,12 +240,15 @@ def _call(name: str, arguments: tuple[str, ...]) -> str:
     return f"{name}({', '.join(arguments)})"
 
 
-def plain_kernels(module: ModuleType, parameters: Array) -> tuple[ModuleType, Array, list[Any]]:
+def plain_kernels(
+    module: ModuleType, parameters: Array, own: Sequence[Sequence[int]]
+) -> tuple[ModuleType, Array, list[Any]]:
     """This module, the parameters it needs, and what must be kept alive meanwhile.
 
     Args:
         module: with a game's functions as :mod:`gne_mj.game` describes them.
         parameters: the game's own q.
+        own: for each entry of a profile the constraints that contain it.
     """
     q = parameters
     cost, gradient = module.cost, module.cost_gradient
@@ -178,19 +256,23 @@ def plain_kernels(module: ModuleType, parameters: Array) -> tuple[ModuleType, Ar
 
     second = getattr(module, "add_cost_hessian", None)
     bend = getattr(module, "constraint_hessian", None)
+    stencils = Stencils(
+        lambda k, y: _number(constraint, q, k, y), lambda k, a, y: _number(slope, q, k, a, y), own
+    )
 
     def add_cost_hessian(i: int, a: int, y: Array, scale: float, out: Array) -> float:
         if second is not None:
             second(q, i, a, y, scale, out)
         else:
             for b in range(len(y)):
-                out[b] += scale * _central(lambda at: _number(gradient, q, i, a, at), y, b)
-        return 0.0
+                out[b] += scale * stencils.slope(lambda at: _number(gradient, q, i, a, at), y, b)
+        total = float(out.sum())
+        return 0.0 if np.isfinite(total) else total
 
     def constraint_hessian(k: int, a: int, b: int, y: Array) -> float:
         if bend is not None:
             return _number(bend, q, k, a, b, y)
-        return _central(lambda at: _number(slope, q, k, a, at), y, b)
+        return stencils.slope(lambda at: _number(slope, q, k, a, at), y, b)
 
     functions: tuple[tuple[Callable[..., float], Callable[..., Any]], ...] = (
         (lambda i, a, b, scale, y, *_: _number(cost, q, i, y), cost),
@@ -200,8 +282,91 @@ def plain_kernels(module: ModuleType, parameters: Array) -> tuple[ModuleType, Ar
         (lambda k, a, b, scale, y, *_: _number(slope, q, k, a, y), slope),
         (lambda k, a, b, scale, y, *_: constraint_hessian(k, a, b, y), bend or slope),
     )
-    addresses, kept = zip(*(callable_address(*pair) for pair in functions), strict=True)
+    # Outside its set a constraint need not be a number: that is how a profile is seen to be there.
+    addresses, kept = zip(
+        *(
+            callable_address(function, mine, place_of(name), any_value=name == "constraint")
+            for name, (function, mine) in zip(FUNCTIONS, functions, strict=True)
+        ),
+        strict=True,
+    )
     return sys.modules[__name__], np.array(addresses), list(kept)
+
+
+def place_of(name: str) -> Callable[[int, Array], str]:
+    """Tells for which agent or constraint, from 0, and where a game's function was called."""
+    what = "constraint" if name.startswith("constraint") else "agent"
+
+    def about(number: int, y: Array) -> str:
+        shown = ", ".join(f"{value:.6g}" for value in y[:6]) + ", ..." * (len(y) > 6)
+        return f"for {what} {number + 1} at y = [{shown}]"
+
+    return about
+
+
+class Stencils:
+    """Difference quotients that stay inside the set, where a game's functions need not be defined.
+
+    Args:
+        constraint: g_l(y), of l and y.
+        slope: dg_l/dy_b, of l, b and y.
+        own: for each entry of a profile the constraints that contain it.
+    """
+
+    def __init__(
+        self,
+        constraint: Callable[[int, Array], float],
+        slope: Callable[[int, int, Array], float],
+        own: Sequence[Sequence[int]],
+    ) -> None:
+        self._constraint, self._slope, self._own = constraint, slope, own
+        self._at, self._found = b"", dict[int, tuple[Array, list[tuple[float, Array]]]]()
+
+    def slope(self, function: Callable[[Array], float], y: Array, b: int) -> float:
+        """df/dy_b to second order in the step."""
+        at = y.tobytes()
+        if at != self._at:
+            self._at, self._found = at, {}
+        if b not in self._found:
+            self._found[b] = self._stencil(y, b)
+        base, others = self._found[b]
+        value = function(base)
+        return float(sum(weight * (function(point) - value) for weight, point in others))
+
+    def _stencil(self, y: Array, b: int) -> tuple[Array, list[tuple[float, Array]]]:
+        """A profile, and weights of differences to others: on the other side, or of two inside."""
+        scale = self._scale(y, b)
+        step = _DIFFERENCE * scale
+        inside = self._inside(y, b)
+        while True:
+            above, below = _shifted(y, b, step), _shifted(y, b, -step)
+            up, down = self._inside(above, b), self._inside(below, b)
+            if (up and down) or not inside or step < _SHORTEST * scale:
+                return below, [(1.0 / (above[b] - below[b]), above)]
+            near, sign = (above, 1.0) if up else (below, -1.0)
+            far = _shifted(y, b, 2.0 * sign * step)
+            if (up or down) and self._inside(far, b):
+                along = near[b] - y[b]
+                return y.copy(), [(2.0 / along, near), (-0.5 / along, far)]
+            step *= 0.5
+
+    def _scale(self, y: Array, b: int) -> float:
+        """Size of an entry: its own, or its distance to the nearest bound if that is more."""
+        distance = np.inf
+        for k in self._own[b]:
+            steepness = abs(self._slope(k, b, y))
+            if steepness > 0.0:
+                distance = min(distance, abs(self._constraint(k, y)) / steepness)
+        return float(max(abs(y[b]), min(distance, max(1.0, np.max(np.abs(y))))))
+
+    def _inside(self, y: Array, b: int) -> bool:
+        return all(self._constraint(k, y) < 0.0 for k in self._own[b])
+
+
+def _shifted(y: Array, b: int, step: float) -> Array:
+    shifted = y.copy()
+    shifted[b] += step
+    return shifted
 
 
 def _number(function: Callable[..., Any], *arguments: Any) -> float:
@@ -211,14 +376,6 @@ def _number(function: Callable[..., Any], *arguments: Any) -> float:
     except (TypeError, ValueError):
         shown = "None" if value is None else f"{type(value).__name__} {value!r:.40}"
         raise UserCodeError(function, f"it must return a number, not {shown}") from None
-
-
-def _central(function: Callable[[Array], float], y: Array, b: int) -> float:
-    step = _DIFFERENCE * max(1.0, abs(y[b]))
-    above, below = y.copy(), y.copy()
-    above[b] += step
-    below[b] -= step
-    return float((function(above) - function(below)) / (above[b] - below[b]))
 
 
 # The six kernels of a game of plain functions; q holds their addresses.

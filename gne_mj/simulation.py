@@ -18,6 +18,7 @@ from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
+from gne_mj.verdicts import check_numbers
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s
 _CHUNK = 0.1
@@ -315,6 +316,8 @@ class SystemRun:
         self._due = None
         parts = joined(self._recorded)
         time, samples = parts[-1].time, parts[-1].samples
+        y = samples.state[-1, :, self.system.agents.kind.OUTPUT]
+        check_numbers(self.system.game, self.loop.monitor, y, self.clock.timestep)
         if len(parts) > 1:
             time = np.concatenate([part.time for part in parts])
             samples = Samples.join([part.samples for part in parts])

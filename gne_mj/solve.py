@@ -19,7 +19,11 @@ from gne_mj.equilibrium import (
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.margins import epsilon_bounds, of_the_set
+from gne_mj.optimality import FLAT, Optimality, examine
 from gne_mj.system import System
+
+# A gain up to so many times the variational equilibrium's own rho is one by rounding.
+ROUNDING = 1e4
 
 
 @dataclass(frozen=True)
@@ -45,9 +49,10 @@ class Solution:
         name: of the system.
         game: its game.
         penalised: at each rho that was asked for.
-        variational: the variational GNE.
-        active: the constraints that bind there. Their lambda_l exceeds -g_l: of the two, whose
-            product is 1e-11, one is near zero.
+        variational: the variational GNE, or a profile at which no agent's first derivative tells
+            it to move.
+        gains: what each agent could gain there by deviating alone, shape (N,).
+        optimality: what second derivatives tell of it, and which constraints bind.
         path: over rho, empty if it was not asked for.
     """
 
@@ -55,8 +60,24 @@ class Solution:
     game: Game
     penalised: tuple[Measured, ...]
     variational: Equilibrium
-    active: tuple[int, ...]
+    gains: NDArray[np.float64]
+    optimality: Optimality
     path: tuple[Measured, ...]
+
+    @property
+    def deviating(self) -> tuple[int, ...]:
+        """The agents, from 0, for whom the profile in the variational GNE's place is no minimum.
+
+        A best response gains, or the own second derivative is negative.
+        """
+        rho = self.variational.rho
+        gaining = self.gains > (self.game.own_constraints + ROUNDING) * rho
+        return tuple(sorted({*self.optimality.not_minima, *np.flatnonzero(gaining).tolist()}))
+
+    @property
+    def holds(self) -> bool:
+        """Whether an equilibrium was found, as far as second derivatives and responses tell."""
+        return not self.deviating
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, strings and lists, for JSON."""
@@ -69,7 +90,16 @@ class Solution:
             "constraints": list(game.constraint_names),
             "variational": {
                 **_numbers(game, self.variational),
-                "active": [game.constraint_names[k] for k in self.active],
+                "active": [game.constraint_names[k] for k in self.optimality.active],
+                "weakly_active": [game.constraint_names[k] for k in self.optimality.weakly_active],
+                "is_equilibrium": self.holds,
+                "not_minima": [i + 1 for i in self.deviating],
+                "gains": self.gains.tolist(),
+                "own_curvature": [
+                    value if np.isfinite(value) else None
+                    for value in self.optimality.curvature.tolist()
+                ],
+                "monotonicity": self.optimality.monotonicity,
             },
             "penalised": [_compared(game, point) for point in self.penalised],
             "path": [_compared(game, point) for point in self.path],
@@ -93,13 +123,13 @@ def solve_system(
     game, start = system.game, system.start
     penalised = [penalised_equilibrium(game, rho, start) for rho in rhos or (system.rho,)]
     variational = variational_equilibrium(of_the_set(game), penalised[0])
-    binding = variational.multipliers > -game.constraints(variational.action)
     return Solution(
         name=system.name,
         game=game,
         penalised=tuple(_measure(game, point, variational) for point in penalised),
         variational=variational,
-        active=tuple(int(k) for k in np.flatnonzero(binding)),
+        gains=measured_epsilon(game, variational.action),
+        optimality=examine(game, variational),
         path=tuple(
             _measure(game, point, variational) for point in path(game, path_rhos, penalised[0])
         ),
@@ -177,23 +207,27 @@ def _compared(game: Game, point: Measured) -> dict[str, Any]:
             "measured": float(point.gains[largest]),
             "agent": largest + 1,
             "each": point.gains.tolist(),
-            **epsilon_bounds(game, point.equilibrium),
+            **epsilon_bounds(game, point.equilibrium.rho, point.equilibrium.multipliers),
         },
     }
 
 
+def _bound(game: Game, point: Measured) -> float:
+    """What epsilon is at most."""
+    found = point.equilibrium
+    bound: float = epsilon_bounds(game, found.rho, found.multipliers)["bound"]
+    return bound
+
+
 def summary(solution: Solution) -> list[str]:
     """The solution in words, line by line."""
-    game, variational = solution.game, solution.variational
-    binding = [
-        f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
-        for k in solution.active
-    ]
+    game, variational, found = solution.game, solution.variational, solution.optimality
     unit = f" {game.action_unit}" if game.action_unit else ""
     lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
     for point in solution.penalised:
         numbers = _compared(game, point)
         epsilon = numbers["epsilon"]
+        more = epsilon["measured"] > epsilon["largest_own_bound"] + ROUNDING * variational.rho
         lines += [
             f"  penalised equilibrium at rho = {numbers['rho']:g}",
             f"    {game.action_name:16} {_listed(point.equilibrium.action)}{unit}",
@@ -202,17 +236,25 @@ def summary(solution: Solution) -> list[str]:
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
             f" at most {epsilon['bound']:g} = p rho"
             + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
-            + f", {epsilon['largest_own_bound']:g} by each agent's own constraints",
+            + f", {epsilon['largest_own_bound']:g} by each agent's own constraints"
+            + "; the lemma does not hold: not every J_i is convex in y_i" * more,
             f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
+    active = [
+        f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
+        for k in found.active
+    ]
+    weakly = [game.constraint_names[k] for k in found.weakly_active]
     lines += [
-        "  variational GNE",
+        "  variational GNE" if solution.holds else "  stationary profile, and no equilibrium",
         f"    {game.action_name:16} {_listed(variational.action)}{unit}",
-        f"    {'active':16} {len(binding)} of {game.constraints_count} constraints"
-        + (f": {_shortened(binding)}" if binding else ""),
+        f"    {'active':16} {len(active)} of {game.constraints_count} constraints"
+        + (f": {_shortened(active)}" if active else "")
+        + (f"; weakly (lambda = 0): {_shortened(weakly)}" if weakly else ""),
         f"    {'residual':16} stationarity {variational.residual:.1e}, complementarity"
         f" {variational.complementarity:.1e}, every constraint negative;"
         f" {variational.iterations} iterations",
+        *_doubts(solution),
     ]
     if solution.path:
         lines += ["  path", f"    {'rho':>10}  {'distance':>10}  {'epsilon':>10}  {'at most':>10}"]
@@ -220,8 +262,25 @@ def summary(solution: Solution) -> list[str]:
             lines.append(
                 f"    {point.equilibrium.rho:10.3g}  {point.distance:10.3g}"
                 f"  {np.max(point.gains):10.3g}"
-                f"  {epsilon_bounds(game, point.equilibrium)['bound']:10.3g}"
+                f"  {_bound(game, point):10.3g}"
             )
+    return lines
+
+
+def _doubts(solution: Solution) -> list[str]:
+    """Lines on agents that could do better, and on other equilibria."""
+    found, deviating, lines = solution.optimality, solution.deviating, []
+    if deviating:
+        agents = _shortened([str(i + 1) for i in deviating])
+        best = int(np.argmax(solution.gains))
+        why = f"a best response gains {solution.gains[best]:.4g} (agent {best + 1})"
+        if found.not_minima:
+            least = min(found.not_minima, key=lambda i: found.curvature[i])
+            why += f"; its own second derivative is negative (agent {least + 1})"
+        lines.append(f"    {'not minima':16} agents {agents}: {why}; start elsewhere")
+    if found.monotonicity is not None and found.monotonicity < FLAT:
+        kind = "not monotone" if found.monotonicity < -FLAT else "merely monotone"
+        lines.append(f"    {'uniqueness':16} F is {kind} there: the equilibrium need not be unique")
     return lines
 
 

@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
+from gne_mj.equilibrium import middle
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 
 HALVINGS = 60
+DEPTHS = (1e-4, 1e-8)  # of an interior profile before it is moved, in lengths of the profile
+LEAST_SQUARES = 60  # steps for each
 
 
 def random_starts(
@@ -55,26 +57,61 @@ def random_starts(
 def interior_profile(game: Game, start: NDArray[np.float64]) -> NDArray[np.float64]:
     """A profile strictly inside (and inside the tightened set), from one that need not be.
 
+    The distances to the bounds, to first order, by which a profile is short of being inside by some
+    depth are made small by least squares (Levenberg and Marquardt), less deep if that fails; what
+    is found is moved to the middle along each action. Sure for convex constraints alone.
+
+    Args:
+        game: whose set.
+        start: (m,) where to begin; the middle of the game's box and zero are tried after it.
+
     Raises:
         InvalidInput: none was found.
     """
+    begins = [start, np.zeros(game.actions)]
+    if game.box is not None:
+        begins.insert(1, 0.5 * (game.box[0] + game.box[1]))
+    for y in begins:
+        for depth in DEPTHS:
+            y = _towards(game, y, depth)
+            if _inside(game, y):
+                return middle(game, y)
+    raise InvalidInput("game", game.name, "no profile strictly inside its constraints was found")
 
-    def slack(point: NDArray[np.float64]) -> NDArray[np.float64]:
-        return point[-1] - (game.constraints(point[:-1]) + game.margins)
 
-    worst = float(np.max(game.constraints(start) + game.margins))
-    found = minimize(
-        lambda point: point[-1],
-        np.append(start, worst + 1.0),
-        jac=lambda point: np.append(np.zeros(game.actions), 1.0),
-        method="SLSQP",
-        # deep is deep enough: sets may have no deepest point
-        bounds=[(None, None)] * game.actions + [(-1.0, None)],
-        constraints={"type": "ineq", "fun": slack},
-    )
-    y: NDArray[np.float64] = found.x[:-1]
-    if not np.all(game.constraints(y) + game.margins < 0.0):
-        raise InvalidInput(
-            "game", game.name, "no profile strictly inside its constraints was found"
-        )
+def _inside(game: Game, y: NDArray[np.float64]) -> bool:
+    return bool(np.all(game.constraints(y) + game.margins < 0.0))
+
+
+def _towards(game: Game, y: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+    """The first profile inside on the way to one that is ``depth`` lengths inside, or the last."""
+    depth *= float(np.max(np.abs(y))) or 1.0
+    damping = 1e-6
+    for _ in range(LEAST_SQUARES):
+        jacobian = game.constraint_jacobian(y)
+        steep = np.linalg.norm(jacobian, axis=1)
+        steep[~(steep > 0.0)] = np.inf  # nothing to be learnt from this one here
+        short = _short(game, y, steep, depth)
+        rows = jacobian[short > 0.0] / steep[short > 0.0, None]
+        pull = rows.T @ short[short > 0.0]
+        square = rows.T @ rows
+        while damping < 1e12:
+            step = np.linalg.solve(square + damping * np.eye(len(y)), pull)
+            found = _short(game, y - step, steep, depth)
+            if np.sum(found**2) < np.sum(short**2):
+                break
+            damping *= 10.0
+        else:
+            return y
+        y, damping = y - step, max(0.1 * damping, 1e-12)
+        if _inside(game, y):
+            return y
     return y
+
+
+def _short(
+    game: Game, y: NDArray[np.float64], steep: NDArray[np.float64], depth: float
+) -> NDArray[np.float64]:
+    """By what distance a profile is short of being ``depth`` inside each constraint, (p,)."""
+    g = game.constraints(y) + game.margins
+    return np.maximum(np.where(np.isnan(g), np.inf, g / steep + depth), 0.0)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+UNKNOWN = "not known: no penalised equilibrium was found"
+
 
 def summary(report: dict[str, Any]) -> dict[str, str]:
     """What a person wants to know of one system's report, in the order of interest."""
@@ -9,16 +11,25 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
     settling, actuators = report["settling_time"], report["actuators"]
     lyapunov, epsilon = report["lyapunov"], report["epsilon"]
     distances = report["equilibrium"]
+    nowhere = distances["final_distance"] is None
     unknown = distances["final_distance_to_variational"] is None
     rows = {
         "status": f"{report['status']}: {report['message']}",
         "least margin": "nothing was observed"
         if worst is None
         else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
-        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
-        "distance at the end": f"{distances['final_distance']:.3g} to the penalised equilibrium"
+        "settling time": UNKNOWN
+        if nowhere
+        else "not settled"
+        if settling is None
+        else f"{settling:.4g} s",
+        "distance at the end": UNKNOWN
+        if nowhere
+        else f"{distances['final_distance']:.3g} to the penalised equilibrium"
         + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": "not known of MJCF robots"
+        "Lyapunov function": UNKNOWN
+        if nowhere
+        else "not known of MJCF robots"
         if not lyapunov["known"]
         else ("never rose" if lyapunov["monotone"] else "rose")
         + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
@@ -58,10 +69,12 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
                     f"; {implicit[key]} {what} (first at {implicit[first]:.4g} s)"
                 )
     if epsilon["measured"] is not None:
+        beyond = epsilon["measured"] > (1.0 + 1e-6) * epsilon["bound"]
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium; at most"
             f" {epsilon['bound']:.4g} = p rho"
             + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
             + f", and {epsilon['largest_own_bound']:.4g} by each agent's own constraints"
+            + ("; the lemma does not hold: not every J_i is convex in y_i" * beyond)
         )
     return rows

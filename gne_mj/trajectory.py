@@ -220,7 +220,7 @@ def variables_of(
         time: (samples,) in s.
         samples: at these times.
     """
-    game, kind = system.game, system.agents.kind
+    game, kind, known = system.game, system.agents.kind, system.known_equilibrium
     y = samples.state[:, :, kind.OUTPUT]
     unit = {"units": game.action_unit}
     axis = axis_of(system)
@@ -244,7 +244,11 @@ def variables_of(
             game.constraints(y),
             {"long_name": "g(y), negative inside the set"},
         ),
-        "equilibrium": ((axis,), system.equilibrium.action, {**unit, "long_name": "y*"}),
+        "equilibrium": (
+            (axis,),
+            np.full(game.actions, np.nan) if known is None else known.action,
+            {**unit, "long_name": "y*"},
+        ),
     }
     for index, (name, state_unit) in enumerate(kind.STATES):
         if index != kind.OUTPUT:

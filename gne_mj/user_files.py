@@ -12,6 +12,7 @@ import hashlib
 import importlib.util
 import re
 import sys
+import warnings
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -162,6 +163,8 @@ def _load(path: str | Path, key: str) -> ModuleType:
         raise InvalidInput(key, str(path), "it must be a Python file ending in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    # Where it matters that a value is not a number, an error says so, with its place.
+    warnings.filterwarnings("ignore", category=RuntimeWarning, module=re.escape(name))
     try:
         spec.loader.exec_module(module)
     except Exception as error:

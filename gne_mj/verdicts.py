@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.game import Game
 from gne_mj.loops import monitor as watch
 
 SUCCESSES = ("converged", "completed")
@@ -71,6 +72,29 @@ def settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> N
     last = outside.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
     last = np.where(outside.any(axis=1), last, -1)
     return np.append(time, np.nan)[last + 1]
+
+
+def check_numbers(
+    game: Game, monitor: NDArray[np.float64], y: NDArray[np.float64], reach: float
+) -> None:
+    """Where a run ended since something is no longer a number, see whether the game is why.
+
+    Args:
+        game: which was played.
+        monitor: the run's.
+        y: (m,) outputs at the start of the step in which it ended.
+        reach: about how far they go in the step with an input of one; profiles on the way are
+            looked at too, since a later stage of the step may have been the first to notice.
+
+    Raises:
+        UserCodeError: a function of the game raises there, or returns what is not a number.
+    """
+    if monitor[watch.EXIT] != watch.DIVERGED or not np.all(np.isfinite(y)):
+        return
+    at = int(watch.inputs_at(game.constraints_count)) + 5 * game.actions
+    push = np.nan_to_num(monitor[at : at + game.actions], posinf=0.0, neginf=0.0)
+    for share in (0.0, 0.5, 1.0):
+        game.check_numbers(y + share * reach * push)
 
 
 def worst_constraints(

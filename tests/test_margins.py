@@ -321,7 +321,7 @@ def test_no_agent_can_gain_more_than_the_bound_whatever_the_margin():
         rng = np.random.default_rng(seed)
         game, y = tightened_game(rng)
         found = penalised_equilibrium(game, 10.0 ** rng.uniform(-4, 0), y)
-        bounds = epsilon_bounds(game, found)
+        bounds = epsilon_bounds(game, found.rho, found.multipliers)
         gains = measured_epsilon(of_the_set(game), found.action)
         own = np.array(bounds["own_bound"])
         assert np.all(gains <= own * (1 + 1e-9) + 1e-9), seed

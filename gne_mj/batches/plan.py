@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from gne_mj.batches.sweep import Sweep
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, full_key, load_scenario
-from gne_mj.scenario_tables import SystemTable
-from gne_mj.starts import interior_profile, random_starts
+from gne_mj.starts import random_starts
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import versions
 
@@ -204,18 +203,7 @@ class Plan:
         except InfeasibleStart:
             if not self.starts:
                 return None
-        game = table.game.build(table.agents.count)
-        given = table.initial.action
-        wanted = (
-            table.game.default_start(table.agents.count)
-            if given is None
-            else np.asarray(given, dtype=np.float64).ravel() + np.zeros(game.actions)
-        )
-        # Estimates that are given belong to a run's own start, which they may not suit.
-        initial = table.initial.model_copy(update={"estimate": None, "filtered": None})
-        table = table.model_copy(update={"initial": initial})
-        profile = interior_profile(game, wanted)
-        return start_at(table, profile, game.sizes).build(self.name, simulation)
+        return table.build_inside(self.name, simulation)[0]
 
     @cached_property
     def _first_system(self) -> System:
@@ -233,7 +221,7 @@ class Plan:
         assert system is not None
         if not self.starts:
             return np.tile(system.start, (len(starts), 1))
-        middle = system.equilibrium.action
+        middle = system.centre
         return random_starts(system.game, middle, self.seeds[list(starts)].tolist(), self.spread)
 
     def alone(self, run: int) -> Scenario:
@@ -251,7 +239,7 @@ class Plan:
             return scenario
         y = self.profiles(combination, [start])[0]
         assert combination.system is not None
-        table = start_at(scenario.systems[self.name], y, combination.system.game.sizes)
+        table = scenario.systems[self.name].starting_at(y, combination.system.game.sizes)
         simulation = scenario.simulation.model_copy(update={"seed": int(self.seeds[start])})
         return scenario.model_copy(update={"systems": {self.name: table}, "simulation": simulation})
 
@@ -306,14 +294,6 @@ def make_plan(
     one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
     tables = json.loads(one.model_dump_json(exclude_none=True))
     return Plan(scenario=tables, sweeps=tuple(sweeps), **options)
-
-
-def start_at(table: SystemTable, y: NDArray[np.float64], sizes: Sequence[int]) -> SystemTable:
-    """The same system with y(0) = y, shape (m,), of agents with so many entries each."""
-    blocks = np.split(y, np.cumsum(sizes)[:-1])
-    action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
-    initial = table.initial.model_copy(update={"action": action})
-    return table.model_copy(update={"initial": initial})
 
 
 def parse_record(given: str | int) -> int:

@@ -26,6 +26,9 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         span: of the runs.
         outcome: what they showed.
         record: every which row is kept; 0 for none. The last one always is.
+
+    Raises:
+        UserCodeError: a run ended since a function of the user's game returned no number.
     """
     system, clock = combination.system, combination.clock
     assert system is not None
@@ -33,7 +36,11 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
     p, m, runs = game.constraints_count, game.actions, len(monitors)
     time = times(combination, span)
     y = samples.state[:, :, :, system.agents.kind.OUTPUT]
-    distance = np.max(np.abs(y - system.equilibrium.action), axis=2)
+    known = system.known_equilibrium
+    middle = np.full(m, np.nan) if known is None else known.action  # then nothing is known of it
+    distance = np.max(np.abs(y - middle), axis=2)
+    for monitor, last in zip(monitors, y[:, -1], strict=True):
+        verdicts.check_numbers(game, monitor, last, clock.timestep)
     left = monitors[:, watch.EXIT] != watch.INSIDE
     tail = verdicts.tail_distance(time, distance, clock.duration)
     status = verdicts.status(monitors, tail, combination.scenario.simulation.tolerance)
@@ -111,7 +118,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         ),
         "lyapunov_rise": (
             ("run",),
-            monitors[:, watch.STORAGE_RISE],
+            where(np.full(runs, known is not None), monitors[:, watch.STORAGE_RISE]),
             {"long_name": "largest rise of V from one step to the next"},
         ),
         "steps": (("run",), monitors[:, watch.STEPS].copy(), {}),
@@ -119,7 +126,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         "final_action": (("run", axis), y[:, -1].copy(), unit),
         "equilibrium": (
             ("run", axis),
-            np.tile(system.equilibrium.action, (runs, 1)),
+            np.tile(middle, (runs, 1)),
             {**unit, "long_name": "y*"},
         ),
     }

@@ -1,14 +1,13 @@
 """Commands that examine a scenario: equilibria, guarantees, plants, where a set is left."""
 
 import json
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
 from gne_mj.cli.output import PREPARING, progress, results, working
-from gne_mj.cli.simulating import load
 
 
 @app.command()
@@ -31,20 +30,26 @@ def solve(
 ) -> None:
     """Compute a scenario's penalised and variational equilibria, without running it.
 
+    The exit status is 1 if a profile was found that is no equilibrium, since agents could gain.
+
     --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
     """
     from gne_mj import solve as solving
     from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.scenario import load_scenario
 
     rhos = [] if path is None else solving.parse_path(path)
-    simulation = load(scenario, set_, quiet=as_json)
-    systems = [each for each in simulation.systems if system in (None, each.name)]
-    if not systems:
-        names = [each.name for each in simulation.systems]
-        raise InvalidInput("--system", system, nearest(str(system), names))
     with working(as_json, PREPARING):
+        every, moved = load_scenario(scenario, settings(set_)).inside_systems()
+        systems = [each for each in every if system in (None, each.name)]
+        if not systems:
+            names = [each.name for each in every]
+            raise InvalidInput("--system", system, nearest(str(system), names))
         solutions = [solving.solve_system(each, rho or (), rhos) for each in systems]
-    report = json.dumps({each.name: each.to_dict() for each in solutions}, indent=2)
+    report = json.dumps(
+        {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
+        indent=2,
+    )
     with results(out, replace=False) as folder:
         if folder is not None:
             (folder / "report.json").write_text(report + "\n", encoding="utf-8")
@@ -57,7 +62,20 @@ def solve(
     if as_json:
         print(report)
     else:
-        print("\n\n".join("\n".join(solving.summary(each)) for each in solutions))
+        texts = [
+            "\n".join([*solving.summary(each), *_moved(moved.get(each.name))]) for each in solutions
+        ]
+        print("\n\n".join(texts))
+    raise typer.Exit(0 if all(each.holds for each in solutions) else 1)
+
+
+def _moved(done: dict[str, Any] | None) -> list[str]:
+    """The line that tells where an analysis started in place of the scenario's own start."""
+    if done is None:
+        return []
+    shown = ", ".join(f"{value:.5g}" for value in done["action"][:12])
+    shown += ", ..." * (len(done["action"]) > 12)
+    return [f"  started at           {shown}, found inside: {done['why']}"]
 
 
 @app.command()
@@ -97,7 +115,7 @@ def certify(
 
     loaded = load_scenario(scenario, settings(set_))
     clock = loaded.clock()
-    systems = loaded.system_objects()
+    systems, moved = loaded.inside_systems()
     reports = {system.name: examine(system, clock) for system in systems}
     if search:
         searched = [s for s in systems if reports[s.name].epsilon is not None]
@@ -121,10 +139,19 @@ def certify(
             held = {**(reports[system.name].held or {}), key: found}
             reports[system.name] = replace(reports[system.name], held=held)
     if as_json:
-        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+        found_starts = {name: {"start_found": done} for name, done in moved.items()}
+        print(
+            json.dumps(
+                {
+                    name: {**report.to_dict(), **found_starts.get(name, {})}
+                    for name, report in reports.items()
+                },
+                indent=2,
+            )
+        )
     else:
-        for report in reports.values():
-            print("\n".join(words(report)))
+        for name, report in reports.items():
+            print("\n".join([*words(report), *_moved(moved.get(name))]))
 
 
 @app.command()

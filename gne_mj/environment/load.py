@@ -148,7 +148,7 @@ def _start(system: System, start: str | Start, spread: float) -> Start | None:
         raise InvalidInput("start", start, "choose from own, random, or give a function")
     if not 0.0 < spread < 1.0:
         raise InvalidInput("spread", spread, "it must lie between 0 and 1")
-    middle = system.equilibrium.action
+    middle = system.centre
 
     def draw(rng: np.random.Generator) -> NDArray[np.float64]:
         return random_starts(system.game, middle, [int(rng.integers(2**53))], spread)[0]

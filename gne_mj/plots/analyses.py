@@ -24,7 +24,10 @@ def save_path(solution: Solution, file: Path) -> None:
         "distance to the vGNE": [point.distance for point in solution.path],
         "measured $\\epsilon$": [np.max(point.gains) for point in solution.path],
         "its bound": [
-            epsilon_bounds(solution.game, point.equilibrium)["bound"] for point in solution.path
+            epsilon_bounds(solution.game, point.equilibrium.rho, point.equilibrium.multipliers)[
+                "bound"
+            ]
+            for point in solution.path
         ],
     }
     with plt.rc_context(STYLE):

@@ -1,6 +1,6 @@
 """The tables ``[systems.NAME.game]``, one a game."""
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,13 @@ from gne_mj.user_files import load_game
 DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
 
 
-class VelocityGame(Table):
+class GameTable(Table):
+    """What all of them have in common."""
+
+    has_default_start: ClassVar[bool] = True
+
+
+class VelocityGame(GameTable):
     """[eq:sensorNetGNE]"""
 
     type: Literal["velocity-synchronization"]
@@ -53,7 +59,7 @@ class VelocityGame(Table):
         return np.full(count, self.reference_velocity - 0.5 * first)
 
 
-class VelocityConsensusGame(Table):
+class VelocityConsensusGame(GameTable):
     """Velocity vectors synchronised over any graph, some agents knowing the reference."""
 
     type: Literal["velocity-consensus"]
@@ -99,7 +105,7 @@ class VelocityConsensusGame(Table):
         return start.ravel()
 
 
-class OsnrGame(Table):
+class OsnrGame(GameTable):
     """[eq:osnrGNE]; what is left out is taken from the ten-channel link."""
 
     type: Literal["osnr"]
@@ -132,7 +138,7 @@ class OsnrGame(Table):
         return np.full(count, 0.8 * limit / count)
 
 
-class CournotGame(Table):
+class CournotGame(GameTable):
     """Firms of one product; what is left out has the published numbers for ``count`` firms."""
 
     type: Literal["cournot"]
@@ -151,9 +157,10 @@ class CournotGame(Table):
         return np.broadcast_to(middle, (count,)).copy()
 
 
-class CustomGame(Table):
+class CustomGame(GameTable):
     """A game of the user's own."""
 
+    has_default_start: ClassVar[bool] = False
     type: Literal["custom"]
     file: str = Field(description="Python file that defines game(count, ...)")
     parameters: dict[str, Any] = Field({}, description="handed to it")

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
-from gne_mj.errors import InvalidInput, nearest
+from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
 from gne_mj.game import Game
 from gne_mj.loops.base import Present
 from gne_mj.margins import with_margin
@@ -192,18 +192,7 @@ class SystemTable(Table):
         count, integrator = self.agents.count, self.plant.integrator or simulation.integrator
         period = simulation.control_period or simulation.timestep
         try:
-            game = self.game.build(count)
-            agents = self.agents.build(game.sizes)
-            if self.margin is not None:
-                if self.controller.mode != "implicit":
-                    raise InvalidInput(
-                        "margin", "given", "it is for mode 'implicit', where a margin is a promise"
-                    )
-                steps = max(1, round(period / simulation.timestep))
-                game = with_margin(
-                    game, agents, self.margin.disturbance(game), simulation.timestep, integrator,
-                    steps,
-                )  # fmt: skip
+            game, agents = self._parts(simulation)
             law = self.controller.build(game)
             if at is None:
                 state = self.initial.build(
@@ -246,6 +235,67 @@ class SystemTable(Table):
             return system
         floor = least_rho(system, period if system.mode == "sampled" else simulation.timestep)
         return replace(system, rho=floor, schedule=self.barrier.build(floor))
+
+    def build_inside(
+        self, name: str, simulation: "SimulationTable"
+    ) -> tuple[System, dict[str, Any] | None]:
+        """The system and what was done where no start is given, or one that is not inside.
+
+        It then starts at an interior profile that was looked for, with estimates that fit, and
+        what was done has ``why`` in words and the ``action`` (m,) that was found; else it is None.
+
+        Raises:
+            InvalidInput: see :class:`gne_mj.system.System`; no interior profile was found.
+        """
+        count = self.agents.count
+        game, _ = self._parts(simulation)
+        given = self.initial.action
+        try:
+            if given is None and not self.game.has_default_start:
+                why, wanted = "no start is given", np.zeros(game.actions)
+            else:
+                return self.build(name, simulation), None
+        except InfeasibleStart as error:
+            why = str(error)
+            wanted = (
+                self.game.default_start(count)
+                if given is None
+                else per_action("initial.action", given, game.sizes)
+            )
+        profile = interior_profile(game, wanted)
+        table = self.starting_at(profile, game.sizes)
+        # Estimates that were given belong to the start that was given.
+        initial = table.initial.model_copy(update={"estimate": None, "filtered": None})
+        system = table.model_copy(update={"initial": initial}).build(name, simulation)
+        return system, {"why": why, "action": profile.tolist()}
+
+    def starting_at(self, y: NDArray[np.float64], sizes: Sizes) -> "SystemTable":
+        """The same system with y(0) = y, shape (m,)."""
+        blocks = np.split(y, np.cumsum(sizes)[:-1])
+        action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
+        initial = self.initial.model_copy(update={"action": action})
+        return self.model_copy(update={"initial": initial})
+
+    def _parts(self, simulation: "SimulationTable") -> tuple[Game, Agents]:
+        """The game, with its margin, and the agents."""
+        game = self.game.build(self.agents.count)
+        agents = self.agents.build(game.sizes)
+        if self.margin is None:
+            return game, agents
+        if self.controller.mode != "implicit":
+            raise InvalidInput(
+                "margin", "given", "it is for mode 'implicit', where a margin is a promise"
+            )
+        period = simulation.control_period or simulation.timestep
+        game = with_margin(
+            game,
+            agents,
+            self.margin.disturbance(game),
+            simulation.timestep,
+            self.plant.integrator or simulation.integrator,
+            max(1, round(period / simulation.timestep)),
+        )
+        return game, agents
 
 
 class SimulationTable(Table):
@@ -325,6 +375,15 @@ class Scenario(Table):
             InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
         """
         return [table.build(name, self.simulation) for name, table in self.systems.items()]
+
+    def inside_systems(self) -> tuple[list[System], dict[str, dict[str, Any]]]:
+        """The systems, started inside where their own start is not; what was done, by name.
+
+        See :meth:`SystemTable.build_inside`.
+        """
+        built = {n: t.build_inside(n, self.simulation) for n, t in self.systems.items()}
+        moved = {name: done for name, (_, done) in built.items() if done is not None}
+        return [system for system, _ in built.values()], moved
 
     def simulation_object(self) -> Simulation:
         """The scenario, ready to run.

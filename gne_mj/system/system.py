@@ -12,7 +12,7 @@ from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import Law
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.controllers.settings import LINKS
-from gne_mj.equilibrium import Equilibrium, order, penalised_equilibrium
+from gne_mj.equilibrium import Equilibrium, middle, order, penalised_equilibrium
 from gne_mj.errors import InvalidInput, SolverError
 from gne_mj.faults import (
     Fault,
@@ -135,13 +135,37 @@ class System:
         """y(0), shape (m,)."""
         return self.state[:, self.agents.kind.OUTPUT]
 
-    @cached_property
+    @property
     def equilibrium(self) -> Equilibrium:
-        """The penalised equilibrium, from y(0); where that is too near a bound, from the middle."""
+        """The penalised equilibrium, from y(0); where that is too near a bound, from the middle.
+
+        Raises:
+            SolverError: none was found.
+        """
+        if isinstance(self._solved, SolverError):
+            raise self._solved
+        return self._solved
+
+    @property
+    def known_equilibrium(self) -> Equilibrium | None:
+        """The same; None where none was found, and a run is still possible."""
+        return None if isinstance(self._solved, SolverError) else self._solved
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """A profile strictly inside, about which V is taken: y*, or y(0) if y* is not known."""
+        known = self.known_equilibrium
+        return self.start if known is None else known.action
+
+    @cached_property
+    def _solved(self) -> Equilibrium | SolverError:
         try:
             return penalised_equilibrium(self.game, self.rho, self.start)
         except SolverError:
-            return penalised_equilibrium(self.game, self.rho, _middle(self.game, self.start))
+            try:
+                return penalised_equilibrium(self.game, self.rho, middle(self.game, self.start))
+            except SolverError as error:
+                return error
 
     def closed_loop(self, clock: Clock, plant: "MujocoPlant | None" = None) -> ClosedLoop:
         """The native loop, at its start.
@@ -224,7 +248,7 @@ class System:
             graph=self.law.graph_data,
             settings=settings,
             limit=self.agents.input_limit,
-            equilibrium=self.equilibrium.action,
+            equilibrium=self.centre,
             size=self.typical_sizes,
             propagator=(
                 no_propagator()
@@ -237,7 +261,7 @@ class System:
         )
         return Setup(
             problem,
-            self.agents.equilibrium(self.equilibrium.action),
+            self.agents.equilibrium(self.centre),
             LoopClock(
                 clock.timestep,
                 clock.steps(clock.control_period),
@@ -250,7 +274,7 @@ class System:
     @property
     def typical_sizes(self) -> NDArray[np.float64]:
         """Of outputs and slacks (1 + p,), at the start and at the equilibrium."""
-        ends = np.stack([self.start, self.equilibrium.action])
+        ends = np.stack([self.start, self.centre])
         return typical_sizes(ends, -self.game.constraints(ends) - self.game.margins)
 
     @property
@@ -308,21 +332,3 @@ class System:
                 " integrator 'euler', or name a joint",
             )
         return plant
-
-
-def _middle(game: Game, y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A profile well inside, from one strictly inside: the middle along each action in turn."""
-    y = y.copy()
-    for a in np.tile(np.arange(game.actions), 3):
-        ends = []
-        for sign in (-1.0, 1.0):
-            low, high = 0.0, 1e-9
-            ahead = y.copy()
-            while high < 1e6:
-                ahead[a] = y[a] + sign * high
-                if not np.all(game.constraints(ahead) + game.margins < 0):
-                    break
-                low, high = high, 2.0 * high
-            ends.append(sign * low)
-        y[a] += 0.5 * sum(ends)
-    return y

@@ -60,6 +60,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     theorem = Theorem(system)
     held = Held(system, clock) if system.mode == "implicit" else None
     law, game, pieces = system.law, system.game, forecast(system, clock)
+    known = system.known_equilibrium
     return Guarantees(
         system={
             "name": system.name,
@@ -94,8 +95,8 @@ def certify(system: System, clock: Clock) -> Guarantees:
         else None,
         start=_start(system, theorem.slopes.box),
         equilibrium={
-            "penalised": system.equilibrium.action.tolist(),
-            **epsilon_bounds(game, system.equilibrium),
+            "penalised": None if known is None else known.action.tolist(),
+            **epsilon_bounds(game, system.rho, None if known is None else known.multipliers),
         },
         inputs=(theorem if held is None else held).demand.report(),
         periods={
@@ -175,9 +176,10 @@ def _start(system: System, box: Box | None) -> dict[str, Any]:
 
 
 def _at_both(system: System, rule: Any) -> dict[str, float | None]:
+    known = system.known_equilibrium
     return {
         "start": rule(system, system.start),
-        "equilibrium": rule(system, system.equilibrium.action),
+        "equilibrium": None if known is None else rule(system, known.action),
     }
 
 

@@ -65,7 +65,10 @@ def least_rho(system: System, period: float, *, reserve: float = 1.25) -> float:
 
     def keeps(rho: float) -> bool:
         there = replace(system, rho=rho, schedule=None)
-        longest = linear_period(there, there.equilibrium.action)
+        known = there.known_equilibrium
+        if known is None:
+            return False
+        longest = linear_period(there, known.action)
         return longest is None or longest >= reserve * period
 
     low, high = 1e-9, highest

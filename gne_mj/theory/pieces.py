@@ -31,10 +31,14 @@ class Pieces:
 
 
 def forecast(system: System, clock: Clock) -> Pieces | None:
-    """Of a system with fixed steps in mode continuous; None of others and of MJCF robots."""
-    if system.mode != "continuous" or system.integrator not in STABLE:
+    """Of a system with fixed steps in mode continuous.
+
+    None of others, of MJCF robots, and where y* is not known.
+    """
+    known = system.known_equilibrium
+    if system.mode != "continuous" or system.integrator not in STABLE or known is None:
         return None
-    longest = linear_period(system, system.equilibrium.action)
+    longest = linear_period(system, known.action)
     if longest is None:
         return None
     level = np.log2(2.0 * clock.timestep / (STABLE[system.integrator] * longest))
@@ -61,7 +65,8 @@ def _at_start(system: System, h: float) -> int | None:
 
 def _stands(system: System, drift: Array, h: float, looked_at: Work) -> bool:
     """Whether a piece of h seconds would stand if only outputs moved: y' = drift + M^-1 u."""
-    problem = problem_at_start(system)
+    problem, mobility = problem_at_start(system), system.agents.mobility
+    assert mobility is not None  # the linearised loop is known
     stages = 4 if system.integrator == "rk4" else 1
     point, rates = system.start, []
     for stage in range(stages):
@@ -72,7 +77,7 @@ def _stands(system: System, drift: Array, h: float, looked_at: Work) -> bool:
         u = np.clip(law_at(system, point), -limit, limit)
         if not np.all(np.isfinite(u)):
             return False
-        rates.append(drift + system.agents.mobility * u)
+        rates.append(drift + mobility * u)
         point = system.start + h * (1.0 if stage == 2 or stages == 1 else 0.5) * rates[-1]
     if stages == 4:
         point = system.start + h / 6.0 * (rates[0] + 2.0 * (rates[1] + rates[2]) + rates[3])

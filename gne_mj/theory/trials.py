@@ -174,7 +174,7 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
     game = system.game
     period = clock.control_period
     slopes = game.constraint_jacobian(system.start)
-    around = game.constraint_jacobian(0.5 * (system.start + system.equilibrium.action))
+    around = game.constraint_jacobian(0.5 * (system.start + system.centre))
     courses: list[tuple[str, dict[str, Any]]] = [("steadily", {})]
     courses += [("from half the time on", {"start": 0.5 * clock.duration})]
     courses += [

@@ -46,7 +46,10 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
 
 def _limit(system: System) -> str:
     """What y* is."""
-    bound = epsilon_bounds(system.game, system.equilibrium)
+    known = system.known_equilibrium
+    bound = epsilon_bounds(system.game, system.rho, None if known is None else known.multipliers)
+    if bound["bound"] is None:
+        return "an epsilon-vGNE, of which nothing more is known since it was not found"
     margin = " + sum lambda_l t_l" if bound["of_margin"] else ""
     limit = f"an epsilon-vGNE with epsilon = p rho{margin} = {bound['bound']:g}"
     if bound["bound_affine"] is not None:
@@ -78,9 +81,9 @@ def not_certified(
         [] if pieces is None else [("start", pieces.start), ("equilibrium", pieces.equilibrium)]
     )
     found += [
-        f"that this run goes on to its end: at the {place} pieces finer than 1/{pieces.finest} of the"
-        " timestep are needed, and it ends there as step_too_small (mode 'implicit', a larger rho or"
-        " a smaller timestep can go on)"
+        f"that this run goes on to its end: at the {place} pieces finer than 1/{pieces.finest} of"
+        " the timestep are needed, and it ends there as step_too_small (mode 'implicit', a larger"
+        " rho or a smaller timestep can go on)"
         for place, count in places
         if pieces is not None and count is None
     ]

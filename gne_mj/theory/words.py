@@ -169,6 +169,8 @@ def _estimates(estimates: dict[str, Any]) -> str:
 
 def _bounds(bounds: dict[str, Any]) -> str:
     margin = f" + {bounds['of_margin']:.4g} for the margin" if bounds["of_margin"] else ""
+    if bounds["bound"] is None:
+        return "not known, since y* was not found"
     return (
         f"at most {bounds['bound']:.4g} = p rho{margin},"
         f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
@@ -192,12 +194,13 @@ def _periods(g: dict[str, Any]) -> str:
     parts = []
     for key, name in (("push", "one push"), ("linear", "linearisation")):
         if periods[key]["start"] is not None:
-            parts.append(
-                f"{name} {periods[key]['start']:.3g} s at the start,"
-                f" {periods[key]['equilibrium']:.3g} s at y*"
-            )
+            there = periods[key]["equilibrium"]
+            part = f"{name} {periods[key]['start']:.3g} s at the start"
+            parts.append(part if there is None else f"{part}, {there:.3g} s at y*")
     text = "; ".join(parts) or "no rule known for these agents"
     text = f"{needs} periods below (heuristics): {text}"
+    if g["equilibrium"]["penalised"] is None:
+        text += "; y* was not found"
     if periods["control_period"] is not None:
         text += f"; the period here is {periods['control_period']:g} s"
     largest = periods["largest_timestep_for_estimates"]

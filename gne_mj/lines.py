@@ -1,0 +1,102 @@
+"""Lines of an agent's actions through a profile: how far they stay inside, where it costs least.
+
+A best response that is found by Newton's method is a stationary point near where it began. Along
+lines, costs are compared: for an action of one entry, on all of the feasible interval.
+"""
+
+from gne_mj import scales
+from gne_mj.native import copy, kernel
+
+# A line is followed from FIRST to FARTHEST lengths of the profile, doubling, and on either side
+# costs are compared at these places and at POINTS equal distances.
+FIRST, FARTHEST, POINTS = 1e-6, 1e6, 32
+HALVINGS = 50
+SWEEPS = 10  # over all actions, on the way to the middle
+COST, PLACE, COUNT = range(3)  # entries of what was found on a line
+
+
+@kernel
+def stays(game, data, own, y):
+    """Whether y is strictly inside an agent's own constraints."""
+    for k in range(len(own)):
+        value = game.constraint(data.parameters, own[k], y) + data.tightening[own[k]]
+        if not value < 0.0:
+            return False
+    return True
+
+
+@kernel
+def place(data, i, y, direction, t, trial):
+    """Set agent i's actions in the trial: those of y, t times the direction further."""
+    for a in range(data.offsets[i], data.offsets[i + 1]):
+        trial[a] = y[a] + t * direction[a]
+
+
+@kernel
+def end(game, data, i, own, y, direction, sign, length, trial):
+    """The greatest t, as far as FARTHEST, up to which y + sign t direction stays inside."""
+    low, high, left = 0.0, FIRST * length, False
+    while high <= FARTHEST * length:
+        place(data, i, y, direction, sign * high, trial)
+        left = not stays(game, data, own, trial)
+        if left:
+            break
+        low, high = high, 2.0 * high
+    if left:
+        for _ in range(HALVINGS):
+            half = 0.5 * (low + high)
+            place(data, i, y, direction, sign * half, trial)
+            if stays(game, data, own, trial):
+                low = half
+            else:
+                high = half
+    return low
+
+
+@kernel
+def compare(game, data, i, y, direction, t, trial, found):
+    """Keep the place t on the line if the cost is less there."""
+    place(data, i, y, direction, t, trial)
+    value = game.cost(data.parameters, i, trial)
+    if value < found[COST]:
+        found[COST], found[PLACE] = value, t
+
+
+@kernel
+def lowest(game, data, i, own, y, direction, trial, found):
+    """Fill ``found`` with agent i's least cost on the line and where it is; y is inside."""
+    length = scales.largest(y)
+    length = length if length > 0.0 else 1.0
+    copy(y, trial)
+    found[COST], found[PLACE] = game.cost(data.parameters, i, y), 0.0
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        last = end(game, data, i, own, y, direction, sign, length, trial)
+        t = FIRST * length
+        while t < last:
+            compare(game, data, i, y, direction, sign * t, trial, found)
+            t *= 2.0
+        for k in range(POINTS):
+            t = last * (k + 1) / POINTS
+            compare(game, data, i, y, direction, sign * t, trial, found)
+
+
+@kernel
+def to_middle(game, data, y, direction, trial):
+    """Move y (m,) to the middle along each action in turn; where that is far away, a little."""
+    copy(y, trial)
+    for _ in range(SWEEPS):
+        for i in range(len(data.offsets) - 1):
+            own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
+            for a in range(data.offsets[i], data.offsets[i + 1]):
+                length = scales.largest(y)
+                length = length if length > 0.0 else 1.0
+                direction[a] = 1.0
+                above = end(game, data, i, own, y, direction, 1.0, length, trial)
+                below = end(game, data, i, own, y, direction, -1.0, length, trial)
+                direction[a] = 0.0
+                if max(above, below) > 0.25 * FARTHEST * length:  # no bound on this side
+                    most = max(length, min(above, below))
+                    above, below = min(above, most), min(below, most)
+                y[a] += 0.5 * (above - below)
+                place(data, i, y, direction, 0.0, trial)
