@@ -1,0 +1,184 @@
+"""Whether the tests notice a mutant: the nearest ones first, until one fails."""
+
+import ast
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from operators import Mutant
+from tree import Tree, environment
+
+# Pages, packages and other products have tests that these modules hardly concern
+LEFT_OUT = ("test_browser", "test_notebook", "test_packaging", "test_peers", "test_view_")
+PLAIN_LIMIT = 5.0  # s for a test without compiled code; those that take longer are left out
+TEST_LIMIT = 180.0  # s for any test, compiling included
+
+
+@dataclass
+class Baseline:
+    """What the tests do without any mutant: seconds of those that pass, by their names.
+
+    Attributes:
+        compiled: as users run it.
+        plain: with numba switched off, so that kernels are plain Python functions.
+    """
+
+    compiled: dict[str, float] = field(default_factory=dict)
+    plain: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Verdict:
+    """What became of a mutant: "killed", "timed out", "survived" or "undecided", and by what."""
+
+    outcome: str
+    by: str
+    seconds: float
+
+
+def baseline(tree: Tree, folder: Path) -> Baseline:
+    """Run all tests in the untouched copy, which also warms its machine code."""
+    kept = folder / "baseline.json"
+    if not kept.exists():
+        found = {}
+        for name, limit in (("plain", PLAIN_LIMIT), ("compiled", 0.0)):
+            print(f"running the tests without any mutant, {name} ...", flush=True)
+            files = [str(p.relative_to(tree.base)) for p in _test_files(tree.base)]
+            report, _ = _pytest(tree.base, folder, files, limit, 3600.0, ["-p", "no:randomly"])
+            found[name] = {test: s for test, outcome, s in report if outcome == "passed"}
+            failed = [test for test, outcome, _ in report if outcome == "failed"]
+            if name == "compiled" and failed:
+                print("left out, since they fail without any mutant:", *failed, sep="\n  ")
+        kept.write_text(json.dumps(found))
+    return Baseline(**json.loads(kept.read_text()))
+
+
+def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: float) -> Verdict:
+    """Try one mutant in a copy of its own; ``limit`` in s is for all tests together."""
+    begun = time.monotonic()
+    work = folder / "tree"
+    tree.put(mutant, work)
+    rank = _Rank(mutant, tree.base)
+    verdict = None
+    for plain in (True, False) if mutant.native else (False,):
+        tests = sorted(known.plain if plain else known.compiled, key=rank.of(known, plain))
+        left = limit - (time.monotonic() - begun)
+        report, ended = _pytest(
+            work, folder, tests, 3 * PLAIN_LIMIT if plain else 0.0, max(left, 10.0), ["-x"]
+        )
+        failed = [test for test, outcome, _ in report if outcome == "failed"]
+        how = ", as plain Python" if plain else ""
+        if failed:
+            verdict = ("killed", failed[0] + how)
+        elif ended == "limit":
+            verdict = ("undecided", f"after {len(report)} tests{how}")
+        elif ended == "hung":
+            verdict = ("timed out", _next(tests, report) + how)
+        elif ended != "passed":
+            verdict = ("killed", f"{_next(tests, report)}{how}: the process ended by {ended}")
+        if verdict:
+            break
+    shutil.rmtree(work)
+    outcome, by = verdict or ("survived", "")
+    return Verdict(outcome, by, round(time.monotonic() - begun, 1))
+
+
+class _Rank:
+    """Which test files are nearest to a mutant."""
+
+    def __init__(self, mutant: Mutant, base: Path) -> None:
+        stem = Path(mutant.file).stem
+        module = mutant.file.removesuffix(".py").replace("/", ".")
+        module = f"gne_mj.{module}" if module.startswith("controllers") else module
+        names = [n for n in mutant.function.split(".") if n and not n.startswith("__")]
+        words = re.compile(rf"\b({'|'.join(map(re.escape, names))})\b") if names else None
+        self._near: dict[str, int] = {}
+        for path in _test_files(base):
+            text = path.read_text(encoding="utf-8")
+            self._near[str(path.relative_to(base))] = (
+                3 * (stem in path.stem)
+                + 2 * bool(words and words.search(text))
+                + (module in text or _imports_from(text, *module.rpartition(".")[::2]))
+            )
+
+    def of(self, known: Baseline, plain: bool):
+        """The key by which tests are sorted: file by file, near and quick ones first."""
+        seconds = known.plain if plain else known.compiled
+        total: dict[str, float] = {}
+        for test, each in seconds.items():
+            file = test.partition("::")[0]
+            total[file] = total.get(file, 0.0) + each
+        places = {test: place for place, test in enumerate(seconds)}
+
+        def key(test: str) -> tuple[float, ...]:
+            file = test.partition("::")[0]
+            return -self._near.get(file, 0), total[file], places[test]
+
+        return key
+
+
+def _imports_from(text: str, package: str, name: str) -> bool:
+    """Whether a file has ``from package import name``."""
+    return any(
+        isinstance(node, ast.ImportFrom)
+        and node.module == package
+        and any(alias.name == name for alias in node.names)
+        for node in ast.parse(text).body
+    )
+
+
+def _test_files(base: Path) -> list[Path]:
+    return [p for p in sorted((base / "tests").glob("test_*.py")) if not p.stem.startswith(LEFT_OUT)]
+
+
+def _next(tests: list[str], report: list) -> str:
+    """The test that ran when the process ended."""
+    done = {test for test, _, _ in report}
+    return next((test for test in tests if test not in done), "the end")
+
+
+def _pytest(
+    tree: Path, folder: Path, tests: list[str], plain_limit: float, limit: float, more: list[str]
+) -> tuple[list, str]:
+    """Run tests; what each did, and how the process ended: passed, failed, hung, limit or other."""
+    report, chosen = folder / "report.jsonl", folder / "tests.json"
+    report.unlink(missing_ok=True)
+    settings = environment(tree) | {"MUTATION_REPORT": str(report.resolve())}
+    settings["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent)
+    if plain_limit:
+        settings |= {"NUMBA_DISABLE_JIT": "1", "MUTATION_LIMIT": str(plain_limit)}
+    files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
+    if any("::" in test for test in tests):
+        chosen.write_text(json.dumps(tests))
+        settings["MUTATION_TESTS"] = str(chosen.resolve())
+    command = [
+        sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider",
+        "-p", "plugin", "-o", f"faulthandler_timeout={TEST_LIMIT}",
+        "-o", "faulthandler_exit_on_timeout=true", *more, *files,
+    ]  # fmt: skip
+    log = (folder / "log.txt").open("wb")
+    process = subprocess.Popen(
+        command, cwd=tree, env=settings, stdout=log, stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    try:
+        code = process.wait(timeout=limit)
+    except subprocess.TimeoutExpired:
+        code = None
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        log.close()
+    lines = report.read_text().splitlines() if report.exists() else []
+    found = [json.loads(line) for line in lines]
+    hung = b"Timeout (" in (folder / "log.txt").read_bytes()
+    ended = "limit" if code is None else "hung" if hung and code != 0 else None
+    return found, ended or {0: "passed", 1: "failed"}.get(code, f"exit status {code}")
