@@ -348,7 +348,7 @@ def test_secants_find_the_law_on_a_map_that_bends(decentralised):
 
 
 def test_a_map_that_falls_is_told():
-    found = run_plain(coupled_system(), clock(0.05), 3, Bent(lambda u: -0.01 * u))
+    found = run_plain(coupled_system(), clock(0.05), 3, Bent(lambda u: 0.05 * np.sin(7.0 * u)))
     assert found.monitor[watch.NOT_MONOTONE] > 0
 
 
