@@ -20,6 +20,15 @@ LEFT_OUT = ("test_browser", "test_notebook", "test_packaging", "test_peers", "te
 PLAIN_LIMIT = 5.0  # s for a test without compiled code; those that take longer are left out
 TEST_LIMIT = 180.0  # s for any test, compiling included
 
+_running: set[subprocess.Popen] = set()
+
+
+def give_up() -> None:
+    """End the tests that run, and this process; what was decided is kept."""
+    for process in _running:
+        os.killpg(process.pid, signal.SIGKILL)
+    os._exit(130)
+
 
 @dataclass
 class Baseline:
@@ -168,6 +177,7 @@ def _pytest(
         command, cwd=tree, env=settings, stdout=log, stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
+    _running.add(process)
     try:
         code = process.wait(timeout=limit)
     except subprocess.TimeoutExpired:
@@ -176,6 +186,7 @@ def _pytest(
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
+        _running.discard(process)
         log.close()
     lines = report.read_text().splitlines() if report.exists() else []
     found = [json.loads(line) for line in lines]

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import random
+import signal
 import sys
 import time
 import tomllib
@@ -43,6 +44,8 @@ def main() -> int:
         return 0
     if options.again:
         campaign.forget("survived", "undecided")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: judge.give_up())
     campaign.run(options.processes, 60.0 * options.budget, options.limit)
     print("\n".join(campaign.lines()))
     return 1 if campaign.counts()["survived"] else 0

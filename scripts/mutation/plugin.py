@@ -2,17 +2,23 @@
 
 MUTATION_TESTS names a JSON list of the tests to run, in this order (all if it is not set),
 MUTATION_REPORT a file that gets [test, outcome, seconds] line by line, MUTATION_LIMIT the seconds
-that a test of plain Python may take.
+that a test of plain Python may take. A mutant that fills the memory gets no more than 8 GiB.
 """
 
 import json
 import os
+import resource
 import signal
 from pathlib import Path
 
 import pytest
 
+MEMORY = 2**33
 LIMIT = float(os.environ.get("MUTATION_LIMIT", "0"))
+
+
+def pytest_configure():
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def pytest_collection_modifyitems(items):
