@@ -43,7 +43,9 @@ def parts_of(system, timing):
     scratch = work(m, p, game.agents, system._sizes)
     solver = solver_in(scratch.solver, m, p, states, int(setup.problem.order.band[0]))
     channels = Channels(system.agents.parameters, setup.rest)
-    return Parts(setup.problem, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver)
+    return Parts(
+        setup.problem, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
+    )
 
 
 def run_plain(system, timing, periods, plant=held_map):

@@ -238,9 +238,7 @@ def test_both_entries_of_an_action_count_in_its_length():
     system = coupled_system(decentralised=True)
     residual, parts, common = equation_of(local, system, 3)
     assert residual(0, 1, system.start)[0]
-    got = local.local_length(
-        common[1], parts.problem, 0, 1, np.array([0.001, -0.02]), parts.solver
-    )
+    got = local.local_length(common[1], parts.problem, 0, 1, np.array([0.001, -0.02]), parts.solver)
     ball, product = 4.0 - system.start @ system.start, 1.0 - system.start[1] * system.start[2]
     of_ball = (2 * 0.4 * 0.06 / ball) ** 2 + 2 * 0.06**2 / ball
     of_product = (0.5 * 0.04 / product) ** 2
@@ -290,9 +288,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
     ):
         parts = parts_of(system, clock(0.05, 0.05 * steps, 0.05 * steps))
         state, agent = system.state.ravel(), system.agents.kind
-        implicit.find_slopes(
-            held_map, (), agent, parts.channels, parts.clock, state, parts.solver
-        )
+        implicit.find_slopes(held_map, (), agent, parts.channels, parts.clock, state, parts.solver)
         assert np.all(parts.solver.slope * parts.solver.stiff == pytest.approx(1.0))
         if agent is integrator:
             assert parts.solver.slope == pytest.approx(0.05 * steps)

@@ -8,7 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import FIVE, V0, clock, distributed, integrators, osnr_system, robot_state, robot_system
+from builders import (
+    FIVE,
+    V0,
+    clock,
+    distributed,
+    integrators,
+    osnr_system,
+    robot_state,
+    robot_system,
+)
 
 from gne_mj import exit_map as maps
 from gne_mj.controllers import FullInformation
@@ -89,7 +98,9 @@ def test_no_period_may_be_short_enough(rule):
     assert found.trials == ((0.01, False),)
 
 
-@pytest.mark.parametrize("error", [InvalidInput("k", 1, "less"), InfeasibleStart("k", "y", "g", 1.0)])
+@pytest.mark.parametrize(
+    "error", [InvalidInput("k", 1, "less"), InfeasibleStart("k", "y", "g", 1.0)]
+)
 def test_a_period_that_a_system_refuses_is_none_that_stays(rule, error):
     def stays(system, clock):
         if clock.control_period > 0.035:
@@ -122,7 +133,9 @@ def test_a_declared_margin_is_made_anew_for_each_period(rule):
 
 
 def size_of(system):
-    return max((abs(fault.force) for fault in system.faults if isinstance(fault, Push)), default=0.0)
+    return max(
+        (abs(fault.force) for fault in system.faults if isinstance(fault, Push)), default=0.0
+    )
 
 
 def test_the_smallest_push_is_found_over_all_patterns(rule):

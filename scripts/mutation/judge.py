@@ -77,21 +77,22 @@ def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: floa
     rank = _Rank(mutant, tree.base)
     verdict = None
     for plain in (True, False) if mutant.native else (False,):
-        tests = sorted(known.plain if plain else known.compiled, key=rank.of(known, plain))
-        left = limit - (time.monotonic() - begun)
-        report, ended = _pytest(
-            work, folder, tests, 3 * PLAIN_LIMIT if plain else 0.0, max(left, 10.0), ["-x"]
-        )
-        failed = [test for test, outcome, _ in report if outcome == "failed"]
         how = ", as plain Python" if plain else ""
-        if failed:
-            verdict = ("killed", failed[0] + how)
-        elif ended == "limit":
-            verdict = ("undecided", f"after {len(report)} tests{how}")
-        elif ended == "hung":
-            verdict = ("timed out", _next(tests, report) + how)
-        elif ended != "passed":
-            verdict = ("killed", f"{_next(tests, report)}{how}: the process ended by {ended}")
+        for tests in rank.stages(known.plain if plain else known.compiled):
+            left = max(limit - (time.monotonic() - begun), 10.0)
+            own_limit = 3 * PLAIN_LIMIT if plain else 0.0
+            report, ended = _pytest(work, folder, tests, own_limit, left, ["-x"])
+            failed = [test for test, outcome, _ in report if outcome == "failed"]
+            if failed:
+                verdict = ("killed", failed[0] + how)
+            elif ended == "limit":
+                verdict = ("undecided", f"at {_next(tests, report)}{how}")
+            elif ended == "hung":
+                verdict = ("timed out", _next(tests, report) + how)
+            elif ended != "passed":
+                verdict = ("killed", f"{_next(tests, report)}{how}: the process ended, {ended}")
+            if verdict:
+                break
         if verdict:
             break
     shutil.rmtree(work)
@@ -117,20 +118,20 @@ class _Rank:
                 + (module in text or _imports_from(text, *module.rpartition(".")[::2]))
             )
 
-    def of(self, known: Baseline, plain: bool):
-        """The key by which tests are sorted: file by file, near and quick ones first."""
-        seconds = known.plain if plain else known.compiled
+    def stages(self, seconds: dict[str, float]) -> list[list[str]]:
+        """The tests of near files, nearest and quickest first, and then all others."""
         total: dict[str, float] = {}
         for test, each in seconds.items():
             file = test.partition("::")[0]
             total[file] = total.get(file, 0.0) + each
-        places = {test: place for place, test in enumerate(seconds)}
 
         def key(test: str) -> tuple[float, ...]:
             file = test.partition("::")[0]
-            return -self._near.get(file, 0), total[file], places[test]
+            return -self._near.get(file, 0), total[file]
 
-        return key
+        order = sorted(seconds, key=key)
+        near = [test for test in order if self._near.get(test.partition("::")[0])]
+        return [tests for tests in (near, order[len(near) :]) if tests]
 
 
 def _imports_from(text: str, package: str, name: str) -> bool:
@@ -144,7 +145,9 @@ def _imports_from(text: str, package: str, name: str) -> bool:
 
 
 def _test_files(base: Path) -> list[Path]:
-    return [p for p in sorted((base / "tests").glob("test_*.py")) if not p.stem.startswith(LEFT_OUT)]
+    return [
+        p for p in sorted((base / "tests").glob("test_*.py")) if not p.stem.startswith(LEFT_OUT)
+    ]
 
 
 def _next(tests: list[str], report: list) -> str:

@@ -106,8 +106,8 @@ class Campaign:
                 self.found[number] = {"number": number, **asdict(mutant), **asdict(verdict)}
                 self._judge_by_hand(self.found[number])
                 self._keep()
-                print(f"{len(self.found)}/{len(self.mutants)} {verdict.outcome:9}"
-                      f" {verdict.seconds:6.1f} s  {mutant}  [{verdict.by}]", flush=True)  # fmt: skip
+                count = f"{len(self.found)}/{len(self.mutants)} {verdict.outcome:9}"
+                print(f"{count} {verdict.seconds:6.1f} s  {mutant}  [{verdict.by}]", flush=True)
 
         with ThreadPoolExecutor(processes) as pool:
             for done in [pool.submit(work, worker) for worker in range(processes)]:

@@ -2,6 +2,7 @@
 
 import ast
 from dataclasses import dataclass
+from itertools import pairwise
 
 COMPARISONS: dict[type[ast.cmpop], tuple[str, ...]] = {
     ast.Lt: ("<=", ">"),
@@ -157,22 +158,13 @@ class _Finder(ast.NodeVisitor):
             self._native[-1] and len(self._native) > 1
         )
         self._native.append(native)
-        arguments = node.args
-        names = [a.arg for a in [*arguments.posonlyargs, *arguments.args]]
-        given = zip(names[len(names) - len(arguments.defaults) :], arguments.defaults, strict=True)
-        for _, value in [*given, *zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)]:
+        for value in (*node.args.defaults, *node.args.kw_defaults):
             if value is not None:
-                self._default(value)
+                self.visit(value)
         for part in node.body:
             self.visit(part)
         self._native.pop()
         self._scopes.pop()
-
-    def _default(self, value: ast.expr) -> None:
-        if isinstance(value, ast.Constant) and isinstance(value.value, int | float):
-            self.visit(value)
-        elif isinstance(value, ast.UnaryOp):
-            self.visit(value)
 
     def visit_Constant(self, node: ast.Constant) -> None:
         value = node.value
@@ -204,15 +196,13 @@ class _Finder(ast.NodeVisitor):
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
         sign = ARITHMETIC.get(type(node.op))
         if sign is not None:
-            self._replace(
-                "arithmetic", *self._between(node.target, node.value), f"{sign}=", node
-            )
+            self._replace("arithmetic", *self._between(node.target, node.value), f"{sign}=", node)
         self._add("deleted", node, "pass")
         self.generic_visit(node)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> None:
         other = "or" if isinstance(node.op, ast.And) else "and"
-        for left, right in zip(node.values, node.values[1:], strict=False):
+        for left, right in pairwise(node.values):
             self._replace("logic", *self._between(left, right), other, node)
         self.generic_visit(node)
 
@@ -238,7 +228,7 @@ class _Finder(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> None:
         plain = [a for a in node.args if not isinstance(a, ast.Starred | ast.GeneratorExp)]
         if len(plain) == len(node.args):
-            for one, two in zip(plain, plain[1:], strict=False):
+            for one, two in pairwise(plain):
                 texts = self._text(one), self._text(two)
                 start, middle, then, end = (*self._span(one), *self._span(two))
                 between = self.source[middle:then].decode()
@@ -297,4 +287,3 @@ def _marks_native(node: ast.AST) -> bool:
         isinstance(part, ast.Call) and isinstance(part.func, ast.Name) and part.func.id in NATIVE
         for part in ast.walk(node)
     )
-

@@ -18,10 +18,12 @@ LIMIT = float(os.environ.get("MUTATION_LIMIT", "0"))
 
 
 def pytest_configure():
+    """Limit the memory."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def pytest_collection_modifyitems(items):
+    """Choose and order the tests."""
     if chosen := os.environ.get("MUTATION_TESTS"):
         order = {name: rank for rank, name in enumerate(json.loads(Path(chosen).read_text()))}
         items[:] = sorted(
@@ -31,6 +33,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_call(item):
+    """Let a test of plain Python take no longer than it may."""
     if LIMIT:
         signal.signal(signal.SIGALRM, _too_long)
         signal.setitimer(signal.ITIMER_REAL, LIMIT)
@@ -40,6 +43,7 @@ def pytest_runtest_call(item):
 
 
 def pytest_runtest_logreport(report):
+    """Write down what became of a test."""
     if report.when == "call" or report.outcome != "passed":
         with Path(os.environ["MUTATION_REPORT"]).open("a", encoding="utf-8") as file:
             file.write(json.dumps([report.nodeid, report.outcome, report.duration]) + "\n")

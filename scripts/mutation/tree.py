@@ -155,7 +155,7 @@ def _file_of(module: str, files: set[str]) -> str:
 
 
 def _of_size(text: bytes, size: int) -> bytes:
-    """The text made as long as that, in its last line's comment or by the docstring's first words."""
+    """The text made as long as that: by a comment, or by less of its docstring's first line."""
     if len(text) <= size:
         return text + b"#" * (size - len(text))
     spare, at = len(text) - size, text.find(b'"""') + 3
