@@ -163,7 +163,7 @@ def _pytest(
     report, chosen = folder / "report.jsonl", folder / "tests.json"
     report.unlink(missing_ok=True)
     settings = environment(tree) | {"MUTATION_REPORT": str(report.resolve())}
-    settings["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent)
+    settings["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent / "plugin")
     if plain_limit:
         settings |= {"NUMBA_DISABLE_JIT": "1", "MUTATION_LIMIT": str(plain_limit)}
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
@@ -172,7 +172,7 @@ def _pytest(
         settings["MUTATION_TESTS"] = str(chosen.resolve())
     command = [
         sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider",
-        "-p", "plugin", "-o", f"faulthandler_timeout={TEST_LIMIT}",
+        "-p", "mutation_plugin", "-o", f"faulthandler_timeout={TEST_LIMIT}",
         "-o", "faulthandler_exit_on_timeout=true", *more, *files,
     ]  # fmt: skip
     log = (folder / "log.txt").open("wb")
