@@ -1,6 +1,7 @@
 """Whether the tests notice a mutant: the nearest ones first, until one fails."""
 
 import ast
+import hashlib
 import json
 import os
 import re
@@ -53,27 +54,36 @@ class Verdict:
 
 
 def baseline(tree: Tree, folder: Path) -> Baseline:
-    """Run all tests in the untouched copy, which also warms its machine code."""
+    """Run all tests that are new in the untouched copy, which also warms its machine code."""
     kept = folder / "baseline.json"
-    if not kept.exists():
-        found = {}
-        for name, limit in (("plain", PLAIN_LIMIT), ("compiled", 0.0)):
-            print(f"running the tests without any mutant, {name} ...", flush=True)
-            files = [str(p.relative_to(tree.base)) for p in _test_files(tree.base)]
-            report, _ = _pytest(tree.base, folder, files, limit, 3600.0, ["-p", "no:randomly"])
-            found[name] = {test: s for test, outcome, s in report if outcome == "passed"}
+    texts = {str(path.relative_to(tree.base)): path.read_bytes() for path in _test_files(tree.base)}
+    files = {file: hashlib.sha256(text).hexdigest() for file, text in texts.items()}
+    known = json.loads(kept.read_text()) if kept.exists() else {"files": {}}
+    same = {file for file in files if known["files"].get(file) == files[file]}
+    for name, limit in (("plain", PLAIN_LIMIT), ("compiled", 0.0)):
+        found = {t: s for t, s in known.get(name, {}).items() if t.partition("::")[0] in same}
+        new = sorted(set(files) - same)
+        if new:
+            print(f"running {len(new)} files of tests without any mutant, {name} ...", flush=True)
+            report, _ = _pytest(tree.base, folder, new, limit, 7200.0, [])
+            found |= {test: seconds for test, outcome, seconds in report if outcome == "passed"}
             failed = [test for test, outcome, _ in report if outcome == "failed"]
             if name == "compiled" and failed:
                 print("left out, since they fail without any mutant:", *failed, sep="\n  ")
-        kept.write_text(json.dumps(found))
-    return Baseline(**json.loads(kept.read_text()))
+        known[name] = found
+    known["files"] = files
+    kept.write_text(json.dumps(known))
+    return Baseline(known["compiled"], known["plain"])
 
 
 def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: float) -> Verdict:
     """Try one mutant in a copy of its own; ``limit`` in s is for all tests together."""
     begun = time.monotonic()
     work = folder / "tree"
-    tree.put(mutant, work)
+    try:
+        tree.put(mutant, work)
+    except ValueError as error:
+        return Verdict("undecided", str(error), 0.0)
     rank = _Rank(mutant, tree.base)
     verdict = None
     for plain in (True, False) if mutant.native else (False,):

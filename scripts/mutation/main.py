@@ -86,7 +86,6 @@ class Campaign:
         """Try those again that ended so, with the tests as they are now."""
         self.found = {n: each for n, each in self.found.items() if each["outcome"] not in outcomes}
         Tree(ROOT, self.folder).discard()
-        (self.folder / "baseline.json").unlink(missing_ok=True)
 
     def run(self, processes: int, budget: float, limit: float) -> None:
         """Try those that were not yet, until ``budget`` seconds are over; ``limit`` for each."""
