@@ -1,6 +1,5 @@
 """Whether the tests notice a mutant: the nearest ones first, until one fails."""
 
-import ast
 import hashlib
 import json
 import os
@@ -84,7 +83,7 @@ def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: floa
         tree.put(mutant, work)
     except ValueError as error:
         return Verdict("undecided", str(error), 0.0)
-    rank = _Rank(mutant, tree.base)
+    rank = _Rank(mutant, tree)
     verdict = None
     for plain in (True, False) if mutant.native else (False,):
         how = ", as plain Python" if plain else ""
@@ -111,21 +110,22 @@ def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: floa
 
 
 class _Rank:
-    """Which test files are nearest to a mutant."""
+    """Which test files are nearest to a mutant: by their name, their words and their imports."""
 
-    def __init__(self, mutant: Mutant, base: Path) -> None:
+    def __init__(self, mutant: Mutant, tree: Tree) -> None:
         stem = Path(mutant.file).stem
-        module = mutant.file.removesuffix(".py").replace("/", ".")
-        module = f"gne_mj.{module}" if module.startswith("controllers") else module
         names = [n for n in mutant.function.split(".") if n and not n.startswith("__")]
         words = re.compile(rf"\b({'|'.join(map(re.escape, names))})\b") if names else None
+        direct = tree.importing(mutant.file, 1)
+        through = tree.importing(mutant.file, 2)
         self._near: dict[str, int] = {}
-        for path in _test_files(base):
-            text = path.read_text(encoding="utf-8")
-            self._near[str(path.relative_to(base))] = (
+        for path in _test_files(tree.base):
+            file = str(path.relative_to(tree.base))
+            self._near[file] = (
                 3 * (stem in path.stem)
-                + 2 * bool(words and words.search(text))
-                + (module in text or _imports_from(text, *module.rpartition(".")[::2]))
+                + 2 * bool(words and words.search(path.read_text(encoding="utf-8")))
+                + (file in direct)
+                + (file in through)
             )
 
     def stages(self, seconds: dict[str, float]) -> list[list[str]]:
@@ -142,16 +142,6 @@ class _Rank:
         order = sorted(seconds, key=key)
         near = [test for test in order if self._near.get(test.partition("::")[0])]
         return [tests for tests in (near, order[len(near) :]) if tests]
-
-
-def _imports_from(text: str, package: str, name: str) -> bool:
-    """Whether a file has ``from package import name``."""
-    return any(
-        isinstance(node, ast.ImportFrom)
-        and node.module == package
-        and any(alias.name == name for alias in node.names)
-        for node in ast.parse(text).body
-    )
 
 
 def _test_files(base: Path) -> list[Path]:

@@ -104,14 +104,13 @@ class Tree:
         (work / NOTE).unlink()
         (work / NOTE).write_text(json.dumps(note))
 
-    def importing(self, file: str) -> list[str]:
-        """The files that import this one, directly or through others, and itself."""
-        found, waiting = set[str](), [file]
-        while waiting:
-            name = waiting.pop()
-            if name not in found:
-                found.add(name)
-                waiting += [other for other, used in self.imports.items() if name in used]
+    def importing(self, file: str, steps: int | None = None) -> list[str]:
+        """The files that import this one, directly or through at most ``steps`` - 1 others."""
+        found, last = {file}, {file}
+        while last and steps != 0:
+            last = {other for other, used in self.imports.items() if used & last} - found
+            found |= last
+            steps = None if steps is None else steps - 1
         return sorted(found)
 
     @cached_property
