@@ -11,7 +11,7 @@ from gne_mj import certificate
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
-from gne_mj.faults import Saturation
+from gne_mj.faults import Push, Saturation
 from gne_mj.games import cournot_game, velocity_consensus_game, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.system import System
@@ -260,3 +260,40 @@ def test_planar_agents_are_told_by_agent_and_not_by_entry():
     at = watch.inputs_at(2)
     monitor[at : at + 4] = [1, 2, 3, 2]
     assert certificate._actuators(system, monitor)["peak_agent"] == 2
+
+
+# ------------------------------------------------------------------------ what a theorem gives
+
+
+def test_what_the_theorem_would_cover_is_told_apart_from_what_it_covers_not():
+    timing = clock(0.01)
+    sampled = certify(line(mode="sampled"), timing)
+    assert len(sampled.guaranteed) == 1
+    assert "in continuous time is covered by the theorem" in sampled.guaranteed[0]
+    assert any("mode 'sampled'" in each for each in sampled.not_certified)
+    euler = certify(line(integrator="euler"), timing)
+    assert any("Euler's method" in each for each in euler.not_certified)
+    pushed = (Push(force=1.0),)
+    struck = certify(line(mode="sampled", faults=pushed), timing)
+    assert struck.guaranteed == ["nothing"]
+    assert any("faults" in each for each in struck.not_certified)
+    whole = certify(line(), timing)
+    assert whole.status == "certified"
+    assert not any("in continuous time, none covers this" in each for each in whole.not_certified)
+
+
+def test_a_margin_is_told_where_there_is_one():
+    """What lies beyond the declared disturbances is not certified, and in their place no pushes."""
+    from gne_mj.margins import Disturbance, with_margin
+
+    plain = line(mode="implicit", integrator="euler")
+    bound = Disturbance(np.full(3, 1.0), np.zeros(3))
+    game = with_margin(plain.game, plain.agents, bound, 0.01, "euler", 1)
+    tight = replace(plain, game=game, disturbance=bound)
+    told = [certify(system, clock(0.01)).not_certified for system in (plain, tight)]
+    assert [any("anything under pushes" in each for each in lines) for lines in told] == [
+        True,
+        False,
+    ]
+    beyond = [any("beyond the disturbances" in each for each in lines) for lines in told]
+    assert beyond == [False, True]
