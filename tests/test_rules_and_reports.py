@@ -297,3 +297,18 @@ def test_a_margin_is_told_where_there_is_one():
     ]
     beyond = [any("beyond the disturbances" in each for each in lines) for lines in told]
     assert beyond == [False, True]
+
+
+def test_mode_implicit_guarantees_nothing_that_it_does_not_promise():
+    """A push that no margin covers, and barriers at estimates; the promise itself beside them."""
+    promised = line(mode="implicit", integrator="euler")
+    estimates = FullyDistributed(graphs.line(3), 0.01, 1.0)
+    for system, expected in (
+        (promised, True),
+        (replace(promised, faults=(Push(force=1.0),)), False),
+        (line(estimates, mode="implicit", integrator="euler"), False),
+    ):
+        report = certify(system, clock(0.01))
+        assert report.held["promised"] == expected
+        told = any("at every control instant" in each for each in report.guaranteed)
+        assert told == expected
