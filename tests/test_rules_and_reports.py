@@ -312,3 +312,14 @@ def test_mode_implicit_guarantees_nothing_that_it_does_not_promise():
         assert report.held["promised"] == expected
         told = any("at every control instant" in each for each in report.guaranteed)
         assert told == expected
+
+
+def test_a_limit_on_one_agent_is_told_as_one_on_all():
+    told = []
+    for limits in ([np.inf] * 3, [np.inf, 0.01, np.inf], [0.01] * 3):
+        agents = replace(line().agents, input_limit=np.array(limits))
+        report = certify(replace(line(), agents=agents), clock(0.01))
+        assert report.system["limited_inputs"] == bool(len(told))
+        told.append(report.guaranteed)
+    assert told[0] != told[1]
+    assert told[1] == told[2]
