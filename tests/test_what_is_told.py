@@ -11,6 +11,7 @@ from gne_mj import graph as graphs
 from gne_mj import verdicts
 from gne_mj.barrier import Schedule
 from gne_mj.batches import summary
+from gne_mj.batches.plan import make_plan
 from gne_mj.controllers import FullInformation, PartialInformation, PlainLaw
 from gne_mj.games import velocity_consensus_game, velocity_game
 from gne_mj.loops import monitor as watch
@@ -302,3 +303,22 @@ def test_parts_of_a_batch_are_joined_and_rearranged():
     assert joined["x"][1].tolist() == pytest.approx([np.nan, 1.0, 2.0], nan_ok=True)
     again = summary.rearranged(joined, np.array([2, 0, 1]))
     assert again["status"][1].tolist() == ["b", "infeasible_start", "a"]
+
+
+def test_the_tables_of_a_batch_have_no_empty_entries():
+    """They are kept as JSON and TOML, and TOML has no word for nothing."""
+    plan = make_plan("velocity-sync", {"plant.engine": "ode"})
+
+    def entries(value):
+        if isinstance(value, dict):
+            for each in value.values():
+                yield from entries(each)
+        elif isinstance(value, list):
+            for each in value:
+                yield from entries(each)
+        else:
+            yield value
+
+    found = list(entries(plan.scenario))
+    assert len(found) > 10
+    assert not any(value is None for value in found)
