@@ -145,10 +145,12 @@ class Campaign:
 
     def _judge_by_hand(self, result: dict) -> None:
         """A survivor that equivalent.toml explains is no fault."""
-        text = (ROOT / "scripts/mutation/equivalent.toml").read_text(encoding="utf-8")
-        for known in tomllib.loads(text).get("mutant", []):
-            keys = ("file", "function", "before", "after")
-            if result["outcome"] == "survived" and all(known[k] == result[k] for k in keys):
+        list_of = (ROOT / "scripts/mutation/equivalent.toml").read_text(encoding="utf-8")
+        source = (self.folder / "base" / result["file"]).read_text(encoding="utf-8")
+        shown = {**result, "text": source.splitlines()[result["line"] - 1].strip()}
+        for known in tomllib.loads(list_of).get("mutant", []):
+            keys = ("file", "text", "before", "after")
+            if result["outcome"] == "survived" and all(known[k] == shown[k] for k in keys):
                 result["outcome"], result["by"] = "equivalent", known["why"]
 
     def _keep(self) -> None:
