@@ -215,15 +215,18 @@ def test_patterns_push_the_ways_that_raise_a_constraint():
     assert [push.force for push in again] == [-1.0, 1.0]
 
 
-def test_a_gap_that_vanishes_at_the_start_is_pushed_all_the_same():
-    y = np.array([V0 - 1.0, V0 - 1.0])
-    system = System(
-        "line", velocity_game(2, V0, 3.0), integrators(2), FullInformation(), 0.1,
-        integrators(2).equilibrium(y),
-    )  # fmt: skip
-    names = {name.split(",")[0] for name, _ in trials._patterns(system, clock(0.01))}
-    assert len(names) >= 1
-    assert any(system.game.constraint_names[0] in name for name in names)
+def test_a_gap_that_vanishes_at_the_start_is_pushed_as_on_the_way_to_the_equilibrium():
+    """The first wants to be faster and the second slower, from rest where all gaps vanish."""
+    game = velocity_game(2, V0, 3.0, [V0 + 1.0, V0 - 1.0], [1.0, 1.0])
+    start = integrators(2).equilibrium(np.full(2, V0))
+    system = System("line", game, integrators(2), FullInformation(), 0.1, start)
+    y = system.equilibrium.action
+    assert y[0] > V0 > y[1]
+    patterns = dict(trials._patterns(system, clock(0.01)))
+    (push,) = patterns[f"'{game.constraint_names[0]}', +, steadily"]
+    assert (push.agents, push.force) == ((0,), 1.0)
+    pushes = patterns[f"'{game.constraint_names[1]}', +, steadily"]
+    assert [push.force for push in pushes] == [1.0, -1.0]
 
 
 def test_a_run_stays_or_does_not():
