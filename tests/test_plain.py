@@ -19,6 +19,7 @@ from builders import (
     run_loop,
 )
 
+import reference
 from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import FullInformation, PlainLaw
 from gne_mj.equilibrium import penalised_equilibrium, variational_equilibrium
@@ -333,3 +334,28 @@ def test_laws_that_do_not_fit_together():
         bad = law(game, memory=memory, rate=lambda game, rho, y, memory: memory)
         with pytest.raises(UserCodeError, match="must return"):
             ode_system(game, bad)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_a_plain_law_with_a_memory_moves_it_by_its_rate(size):
+    """Against RK4 in plain Python; as long as the action, it could be taken for that unseen."""
+    game = coupled(BARE)
+
+    def action(game, rho, y, memory):
+        return -game.pseudo_gradient(y) - LogBarrier(game, rho).gradient(y) - 0.3 * memory[0]
+
+    def rate(game, rho, y, memory):
+        return np.resize(y, size) - (1.0 + rho) * memory + 0.1 * np.arange(size)
+
+    plain = law(game, action=action, rate=rate, memory=lambda y: np.full(size, 0.5))
+    states, inputs, memory, _ = run_loop(ode_system(game, plain), 0.02, 10)
+
+    def closed(_time, x):
+        y, own = x[:4], x[4:]
+        return np.concatenate([action(game, 0.1, y, own), rate(game, 0.1, y, own)])
+
+    start = np.concatenate([START, np.full(size, 0.5)])
+    expected = reference.rk4_fixed(closed, start, 0.02, 10)
+    assert relative_error(states[:, :, 0], expected[:, :4]) < 1e-12
+    assert relative_error(memory, expected[:, 4:]) < 1e-12
+    assert relative_error(inputs[-1], action(game, 0.1, *np.split(expected[-1], [4]))) < 1e-12

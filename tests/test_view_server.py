@@ -262,3 +262,10 @@ async def wait_for(condition, patience=5.0):
     while not condition():
         assert time.monotonic() < end, "it never came true"
         await asyncio.sleep(0.01)
+
+
+def test_a_program_that_ends_is_not_kept_alive(static):
+    """By a page that it has not closed."""
+    threads = [thread for thread in threading.enumerate() if thread.name == "gne-mj view"]
+    assert len(threads) == 1
+    assert threads[0].daemon

@@ -9,6 +9,7 @@ import numpy as np
 
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, for_native, sensor_delay, strikes_messages
+from gne_mj.loops.feedback import Problem
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.mjcf_robot import MjcfRobots
 
@@ -68,6 +69,36 @@ def check_parts(system: "System") -> None:
     for quantity in system.game.quantities:  # wrong shapes are better found before a run
         quantity.at(system.start[None], system.game.entries(quantity))
         quantity.bounds(system.game.entries(quantity))
+
+
+def check_lists(system: "System", problem: Problem) -> None:
+    """Refuse a law whose graph or propagator native code would read beyond its end.
+
+    A law of one's own gives both itself, and native code believes what it is given.
+    """
+    key = f"systems.{system.name}.controller.graph"
+    agents, (pointer, neighbour) = system.game.agents, problem.graph
+    if system.law.graph is None:
+        return
+    if len(pointer) != agents + 1 or pointer[0] != 0 or np.any(np.diff(pointer) < 0):
+        raise InvalidInput(
+            key,
+            f"neighbour lists that begin at {pointer[:6].tolist()}",
+            f"they must begin at {agents + 1} places that rise from 0, one for each agent",
+        )
+    if len(neighbour) != pointer[-1] or np.any((neighbour < 0) | (neighbour >= agents)):
+        raise InvalidInput(
+            key,
+            f"neighbours {(neighbour[:6] + 1).tolist()}",
+            f"there must be {pointer[-1]} of them, agents 1 to {agents}",
+        )
+    maps, coefficients, _ = problem.propagator
+    if system.mode != "continuous" and not len(coefficients) and maps.shape != (agents,) * 3:
+        raise InvalidInput(
+            key,
+            f"a propagator of shape {maps.shape}",
+            f"it must have coefficients, or maps of shape ({agents}, {agents}, {agents})",
+        )
 
 
 def check_start(system: "System") -> None:

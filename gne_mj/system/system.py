@@ -236,7 +236,8 @@ class System:
         """What a loop of this system is made of, besides its plant, its start and its kernels.
 
         Raises:
-            InvalidInput: see :meth:`closed_loop`.
+            InvalidInput: see :meth:`closed_loop`; and a law's graph or propagator that does not
+                fit the game.
         """
         steps.check_step(self, clock)
         steps.check_slopes(self, clock)
@@ -259,6 +260,7 @@ class System:
             order=self.rows,
             faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
+        checks.check_lists(self, problem)
         return Setup(
             problem,
             self.agents.equilibrium(self.centre),

@@ -1,0 +1,75 @@
+"""The loop of mode implicit in plain Python, by the product's kernels as they stand.
+
+Nothing is compiled, so that what a loop of its own would take half a minute for is tried in a
+second. Kernels that a compiled loop has to have anyway are better tested through it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.feedback import inside, work
+from gne_mj.loops.newton import solver_in
+from gne_mj.plants import held_map
+from gne_mj.plants.ode import Channels
+
+
+class Parts(NamedTuple):
+    """What the kernels of a system are given."""
+
+    problem: Any
+    channels: Any
+    clock: Any
+    work: Any
+    monitor: Any
+    solver: Any
+
+
+class Instants(NamedTuple):
+    """What was there at the control instants, each (instants, ...)."""
+
+    y: np.ndarray
+    u: np.ndarray
+    memory: np.ndarray
+    seen: np.ndarray
+    monitor: np.ndarray
+
+
+def parts_of(system, timing):
+    """A system's problem, and scratch arrays of its loop."""
+    game, setup = system.game, system.setup(timing)
+    m, p, states = game.actions, game.constraints_count, system.agents.states
+    scratch = work(m, p, game.agents, system._sizes)
+    solver = solver_in(scratch.solver, m, p, states, int(setup.problem.order.band[0]))
+    channels = Channels(system.agents.parameters, setup.rest)
+    return Parts(
+        setup.problem, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
+    )
+
+
+def run_plain(system, timing, periods, plant=held_map):
+    """So many control periods in mode implicit, from the start on, ``plant`` predicting."""
+    parts, agent, faults = parts_of(system, timing), system.agents.kind, system.fault_kernels
+    problem, channels, clock, scratch, monitor, _ = parts
+    law, game, acting = system.law.kernels, system.game.kernels, system.acting
+    state, memory = system.state.ravel().copy(), system.loop_memory.copy()
+    rows = []
+    for k in range(periods):
+        step = k * clock.period
+        time = step * clock.h
+        scratch.y[:] = state.reshape(channels.rest.shape)[:, agent.OUTPUT]
+        assert inside(game, problem, time, 0, scratch.y, scratch, monitor)
+        if k:
+            law.propagate(problem, scratch.held, memory, scratch.scratch)
+        faults.begin(agent, problem, clock, step, 0, state, memory, scratch)
+        before = memory.copy()
+        assert acting.act(
+            acting, faults, plant, (), agent, law, game, problem, channels, clock, time, step,
+            0, state, memory, scratch, monitor,
+        )  # fmt: skip
+        faults.deliver(problem, clock, step, 0, scratch)
+        row = (scratch.y, scratch.u, before, scratch.seen)
+        rows.append([array.copy() for array in row])
+        plant.roll(agent, channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))
+    return Instants(*map(np.array, zip(*rows, strict=True)), monitor)
