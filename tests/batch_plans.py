@@ -37,7 +37,7 @@ CASES = {
         {**SHORT, "controller.mode": "sampled", "simulation.control_period": 0.1},
         [Sweep("simulation.timestep", (0.01, 0.005))],
     ),
-    "first steps that leave": (
+    "divided steps": (
         "desired-velocity",
         {"simulation.duration": 0.1, "plant.engine": "ode"},
         [Sweep("barrier.rho", (0.1, 0.2))],

@@ -34,6 +34,11 @@ def check_as_alone(name):
         rise = report["lyapunov"]["largest_rise"]
         assert whole["lyapunov_rise"][1][run] == pytest.approx(rise, rel=1e-6, abs=1e-12)
         assert whole["steps"][1][run] == report["steps"]
+        if report["division"] is not None:
+            smallest = whole["smallest_step"][1][run]
+            assert whole["divided_steps"][1][run] == report["division"]["divided_steps"]
+            assert (None if np.isnan(smallest) else smallest) == report["division"]["smallest_step"]
+            statuses.update(["divided"] * (report["division"]["divided_steps"] > 0))
         settled = whole["settling_time"][1][run]
         inside = report["exit"] is None
         if inside:
@@ -66,6 +71,8 @@ def check_as_alone(name):
 def test_every_run_is_as_it_would_be_alone(name):
     statuses = check_as_alone(name)
     assert ("left_feasible_set" in statuses) == ("leave" in name)
+    if name == "divided steps":
+        assert "divided" in statuses
 
 
 @pytest.mark.slow
@@ -75,17 +82,18 @@ def test_every_run_is_as_it_would_be_alone_for_all_laws_and_plants(name):
 
 
 def test_robots_of_every_row_are_those_that_composing_anew_would_make():
-    plan = plan_of("robots", chunk=1000)
+    plan = plan_of("robots", chunk=1)
     runner = Runner(plan, 1)
-    runner.run(0)
-    (structure,) = runner._structures.values()
-    batch = structure.loop._batch
     for run in range(0, plan.runs, 5):
+        runner.run(run)
+        (structure,) = runner._structures.values()
+        fleet = structure.loop._fleets.get()
+        structure.loop._fleets.put(fleet)
         scenario = plan.alone(run)
         numbers = scenario.system_objects()[0].agents.parameters
         lane = compose(numbers, decorated=False)
         model = compile_model(lane, timestep=0.01, integrator="RK4")
-        found = batch.get_model(run)
+        found = fleet.plant.model
         for field in (
             "body_mass", "body_subtreemass", "body_inertia", "dof_M0", "tendon_stiffness",
             "tendon_damping", "tendon_lengthspring", "body_pos", "jnt_stiffness", "dof_damping",
