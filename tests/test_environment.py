@@ -6,10 +6,11 @@ import sys
 import unittest
 from collections import OrderedDict
 from functools import cache
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from types import ModuleType
 
+import kernel_game
 import mujoco
 import numpy as np
 import pytest
@@ -24,8 +25,8 @@ import gne_mj
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.environment import environment_of, law_policy, load_environment
-from gne_mj.environment.task import NotFinite
-from gne_mj.errors import InvalidInput
+from gne_mj.environment.task import NotFinite, finite_costs
+from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game import Game
 from gne_mj.games import velocity_game
 from gne_mj.games import velocity_synchronization as velocity
@@ -389,11 +390,16 @@ def own_game(game):
     return System("robots", game, robots(EQUAL), FullInformation(), 0.1, state, engine="mujoco")
 
 
-def test_where_an_exit_is_no_number_the_state_before_it_is_observed():
+@pytest.mark.parametrize("outside", [nan, inf, None])
+def test_where_an_exit_is_no_number_the_state_before_it_is_observed(outside):
     of_run = clock(0.01, 1.0, 0.05)
 
     def cost(q, i, y):
-        return velocity.cost(q, i, y) if velocity.constraint(q, 0, y) < 0.0 else nan
+        if velocity.constraint(q, 0, y) < 0.0:
+            return velocity.cost(q, i, y)
+        if outside is None:
+            raise ValueError("not defined there")
+        return outside
 
     environment = environment_of(own_game(game_with(cost)), of_run)
     environment.reset()
@@ -413,12 +419,22 @@ def test_a_cost_that_is_no_number_inside_is_an_error_and_no_reward():
     fails = []  # later than at load, where it would be refused
     system = own_game(game_with(lambda q, i, y: nan if fails else velocity.cost(q, i, y)))
     fails.append(True)
-    with pytest.raises(NotFinite, match=r"costs at .* are not finite"):
+    where = r"test_environment.py, line \d+.* not a number for agent 1 at y = \["
+    with pytest.raises(UserCodeError, match=where):
         environment_of(system, clock(0.01, 1.0))
     environment = environment_of(system, clock(0.01, 1.0), exit_cost=0.0)
     environment.reset()
-    with pytest.raises(NotFinite, match=r"costs at .* are not finite"):
+    with pytest.raises(UserCodeError, match=where):
         environment.step(np.zeros(5))
+
+
+def test_what_kernels_cost_where_it_is_no_number_is_an_error():
+    game = Game(
+        name="kernels", kernels=kernel_game, parameters=np.zeros(1), sizes=(1, 1),
+        in_cost=[[0], [1]], in_constraint=[[0], [1]], constraint_names=("a", "b"),
+    )  # fmt: skip
+    with pytest.raises(NotFinite, match=r"costs at \[0.5, -0.1\] are not finite: \[.*, nan\]"):
+        finite_costs(game, np.array([0.5, -0.1]))
 
 
 def test_a_state_that_is_no_number_is_not_observed():

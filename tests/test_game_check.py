@@ -309,7 +309,15 @@ def test_what_is_no_number_at_the_start_is_the_users_mistake():
     report = examine(boxed(lambda i, y: (y[i] - 1.0) * slope(i, y) - y[i], slope, 3.0),
                      np.array([2.0, 2.5]))  # fmt: skip
     assert not report.holds
-    assert "not a finite number" in report.failures[0]
+    for words in (r"own_games.py, line ", "invalid value encountered in log", "for agent 2 at y ="):
+        assert words in report.failures[0]
+    # what overflows, and what raises, is told with its place too
+    for cost, words in (
+        (lambda i, y: np.exp(1000.0 * y[i]), "overflow encountered in exp for agent 1 at y = [1"),
+        (lambda i, y: 1.0 / (int(y[i]) - 1), "ZeroDivisionError.* for agent 1 at y = [1"),
+    ):
+        with pytest.raises(UserCodeError, match=words.replace("[", r"\[")):
+            load(boxed(cost, lambda i, y: 0.0, 3.0), [1.0, 2.0])
 
 
 def test_kernels_are_called_as_the_python_that_they_are():

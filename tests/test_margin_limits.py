@@ -18,7 +18,7 @@ from gne_mj.margins import Disturbance, influence, largest_push, tightening
 from gne_mj.system import System
 from gne_mj.theory import certify
 from gne_mj.theory.constants import Slopes, _row_norms
-from gne_mj.theory.held import strength
+from gne_mj.theory.disturbances import strength
 
 # ----------------------------------------------------------------------------- the largest push
 
@@ -121,7 +121,7 @@ def test_faults_of_one_agent_add_up():
         Push(agents=(0,), force=-2.0), Push(force=0.5), Noise(agents=(1, 2), amplitude=0.1),
         Bias(agents=(2,), offset=-0.3), Saturation(limit=1.0),
     )  # fmt: skip
-    most = strength(faults, system)
+    most = strength(replace(system, faults=faults))
     assert most.push == pytest.approx([2.5, 0.5, 0.5, 0.5, 0.5])
     assert most.noise == pytest.approx([0.0, 0.1, 0.4, 0.0, 0.0])
 

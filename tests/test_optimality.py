@@ -29,10 +29,11 @@ from gne_mj.starts import interior_profile
 from gne_mj.verdicts import check_numbers
 
 HERE = Path(__file__).parent
-# Where the logarithm game's gradient is
+# Where the logarithm game's gradient is, after its cost
 LINE = 2 + (HERE / "logarithm_game.py").read_text().split("\n").index(
     "def cost_gradient(q, i, a, y):"
 )
+COST_LINE = LINE - 4
 
 
 def scenario(tmp_path, action="2.0", kind="maximum", width=6.0, file="box_game.py"):
@@ -260,11 +261,16 @@ def test_without_an_equilibrium_a_run_says_what_is_not_known(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["solve", "certify", "run"])
-def test_a_gradient_that_is_not_a_number_is_told(tmp_path, command):
-    done = gne(command, scenario(tmp_path, "[0.5, -0.1]", file="logarithm_game.py"), "--json")
+@pytest.mark.parametrize("function", ["cost", "cost_gradient"])
+def test_what_is_not_a_number_at_the_start_is_told(tmp_path, command, function):
+    path, line = scenario(tmp_path, "[0.5, -0.1]", file="logarithm_game.py"), COST_LINE
+    if function == "cost_gradient":  # alone
+        file, line = tmp_path / "logarithm_game.py", LINE
+        file.write_text(file.read_text().replace("y[i] * np.log(y[i])", "y[i] * np.log(abs(y[i]))"))
+    done = gne(command, path, "--json")
     assert done.returncode == 1
-    assert done.stderr.startswith("gne-mj: user_code_failed: logarithm_game.py, line ")
-    assert f"line {LINE}, in cost_gradient: " in done.stderr
+    where = f"logarithm_game.py, line {line}, in {function}: "
+    assert done.stderr.startswith(f"gne-mj: user_code_failed: {where}")
     assert "invalid value encountered in log" in done.stderr
     assert "for agent 2 at y = [0.5, -0.1]" in done.stderr
     assert len(done.stderr.splitlines()) == 1

@@ -14,10 +14,10 @@ from gne_mj.controllers import FullInformation, FullyDistributed, PartialInforma
 from gne_mj.faults import Push, Saturation
 from gne_mj.games import cournot_game, velocity_consensus_game, velocity_game
 from gne_mj.loops import monitor as watch
+from gne_mj.margins import epsilon_bounds
 from gne_mj.system import System
 from gne_mj.theory import certify
 from gne_mj.theory.periods import least_rho, linear_period, push_period
-from gne_mj.theory.verdict import epsilon_bounds
 
 MASSES = [2.0, 0.5, 4.0]
 DELTA = [3.0, 2.0, 1.0]
@@ -111,14 +111,11 @@ def test_one_agent_whose_output_may_fall_is_enough():
 
 
 def test_epsilon_is_bounded_by_the_numbers_of_constraints():
-    bound = epsilon_bounds(line(rho=0.25))
+    bound = epsilon_bounds(line().game, 0.25, None)
     assert bound["p_rho"] == 3 * 0.25
     assert bound["p_rho_affine"] == 6 * 0.25
     assert bound["largest_own_p_rho"] == 2 * 0.25
-    firms = System(
-        "firms", cournot_game(4), integrators(4), FullInformation(), 0.5, np.full((4, 1), 20.0)
-    )
-    found = epsilon_bounds(firms)
+    found = epsilon_bounds(cournot_game(4), 0.5, None)
     assert (found["p_rho"], found["p_rho_affine"], found["largest_own_p_rho"]) == (4.0, None, 1.0)
 
 

@@ -81,7 +81,7 @@ def environment_of(
     Raises:
         InvalidInput: agents that do not run in MuJoCo, faults (there are none here), or an option
             that is not one of the above.
-        NotFinite: costs at the start that are not numbers.
+        UserCodeError, NotFinite: costs at the start that are not numbers.
     """
     key = f"systems.{system.name}"
     if system.engine != "mujoco":

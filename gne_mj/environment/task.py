@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.environment.information import Information
 from gne_mj.environment.physics import FleetPhysics
-from gne_mj.errors import GneError, InvalidInput
+from gne_mj.errors import GneError, InvalidInput, UserCodeError
 from gne_mj.game import Game
 from gne_mj.loops.feedback import LARGEST_INPUT
 from gne_mj.system import System
@@ -34,7 +34,8 @@ def finite_costs(game: Game, y: NDArray[np.float64]) -> NDArray[np.float64]:
     """J_i of each agent, shape (N,), at y (m,) inside.
 
     Raises:
-        NotFinite: one that is not a number.
+        UserCodeError: one of plain functions raises, or is not a number.
+        NotFinite: another that is not a finite number.
     """
     costs = game.costs(y)
     if not np.all(np.isfinite(costs)):
@@ -129,7 +130,10 @@ class FleetTask(control.Task):
     def _finite(self, physics: FleetPhysics) -> bool:
         data = physics.data
         parts = [data.qpos, data.qvel, data.act, physics.state, physics.constraint]
-        parts += [self.costs(physics), *self._derived(physics).values()]
+        try:
+            parts += [self.costs(physics), *self._derived(physics).values()]
+        except UserCodeError:  # outside they need not be defined
+            return False
         return all(np.all(np.isfinite(part)) for part in parts)
 
     def _derived(self, physics: FleetPhysics) -> dict[str, NDArray[np.float64]]:
@@ -181,7 +185,7 @@ class FleetTask(control.Task):
         """-sum of all J_i at the control period's end, or -J_i (N,); less what an exit costs.
 
         Raises:
-            NotFinite: a cost that is not a number.
+            UserCodeError, NotFinite: as :func:`finite_costs`.
         """
         reward = -finite_costs(self.system.game, physics.output)
         if physics.exit is not None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gne_mj.errors import UserCodeError
 from gne_mj.game import Game
 from gne_mj.game_check.differences import derivative, steps
+from gne_mj.plain import not_a_number
 
 Array = NDArray[np.float64]
 _HALVINGS = 60
@@ -49,9 +50,10 @@ class Functions:
 
     def add_row(self, i: int, a: int, y: Array, scale: float, out: Array) -> None:
         """What the author's add_cost_hessian does to ``out`` (m,)."""
-        self._call("add_cost_hessian", i, a, _readonly(y), scale, out)
+        self._call("add_cost_hessian", y, i, a, _readonly(y), scale, out)
         if not np.all(np.isfinite(out)):
-            raise self._no_number("add_cost_hessian", y, i)
+            again = (i, a, _readonly(y), scale, np.zeros(len(out)))
+            raise self._no_number("add_cost_hessian", y, *again)
 
     def row(self, i: int, a: int, y: Array) -> Array:
         """d2J_i/dy_a dy, (m,)."""
@@ -140,17 +142,17 @@ class Functions:
             return None
         return Stencil(stencil.middle, stencil.direction, h, ahead, behind)
 
-    def _call(self, name: str, *arguments: Any) -> Any:
+    def _call(self, name: str, y: Array, *arguments: Any) -> Any:
         function = getattr(self._module, name)
         try:
             return function(self._q, *arguments)
         except Exception as error:
-            raise UserCodeError(function, error) from error
+            raise UserCodeError(function, error, self._place(name, y, arguments[0])) from error
         except SystemExit as error:
             raise UserCodeError(function, "it ended the program") from error
 
     def _number(self, name: str, y: Array, *numbers: int) -> float:
-        value = self._call(name, *numbers, _readonly(y))
+        value = self._call(name, y, *numbers, _readonly(y))
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -159,16 +161,22 @@ class Functions:
                 getattr(self._module, name), f"it must return a number, not {shown}"
             ) from None
         if not math.isfinite(number):
-            raise self._no_number(name, y, numbers[0])
+            raise self._no_number(name, y, *numbers, _readonly(y))
         return number
 
-    def _no_number(self, name: str, y: Array, which: int) -> UserCodeError:
+    def _no_number(self, name: str, y: Array, *arguments: Any) -> UserCodeError:
+        function = getattr(self._module, name)
+
+        def again() -> None:
+            with np.errstate(over="raise"):
+                function(self._q, *arguments)
+
+        return not_a_number(function, again, self._place(name, y, arguments[0]))
+
+    def _place(self, name: str, y: Array, which: int) -> str:
         names = self.game.constraint_names
         whose = f"agent {which + 1}" if name in _OF_COSTS else f"constraint '{names[which]}'"
-        return UserCodeError(
-            getattr(self._module, name),
-            f"for {whose} it is not a finite number at y = {shown_profile(y)}",
-        )
+        return f"for {whose} at y = {shown_profile(y)}"
 
 
 @dataclass(frozen=True, eq=False)

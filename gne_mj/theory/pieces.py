@@ -41,8 +41,9 @@ def forecast(system: System, clock: Clock) -> Pieces | None:
     longest = linear_period(system, known.action)
     if longest is None:
         return None
-    level = np.log2(2.0 * clock.timestep / (STABLE[system.integrator] * longest))
-    return Pieces(_at_start(system, clock.timestep), _power(max(0, int(np.ceil(level)))))
+    share = 2.0 * clock.timestep / (STABLE[system.integrator] * longest)  # 0: no mode decays
+    level = 0 if share <= 1.0 else int(np.ceil(np.log2(share)))
+    return Pieces(_at_start(system, clock.timestep), _power(level))
 
 
 def _power(level: int) -> int | None:
