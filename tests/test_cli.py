@@ -20,6 +20,7 @@ SHORT = ("--set", "simulation.duration=0.2")
 LEAVING = (
     "--set", "initial.action=[0.01, 2.99, 3, 3, 3]", "--set", "simulation.timestep=0.2",
     "--set", "recording.period=0.2", "--set", "simulation.duration=2",
+    "--set", "controller.mode=sampled", "--set", "simulation.control_period=0.4",
 )  # fmt: skip
 HEAVY = {"numba", "mujoco", "xarray", "matplotlib", "scipy", "zarr", "dm_control"}
 

@@ -235,7 +235,7 @@ def piece_of(rate, g, y, h):
     k, point = [], y
     for stage, part in enumerate((0.5, 0.5, 1.0, None)):
         work.y[:], work.g[:] = point, g(point)
-        division.note(stage, work)
+        division.note(stage, problem, work)
         k.append(rate(point))
         if part is not None:
             point = y + part * h * k[-1]

@@ -11,6 +11,7 @@ from gne_mj.controllers import FullyDistributed, PartialInformation, PlainLaw
 from gne_mj.errors import EngineError
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
+from gne_mj.loops.layout import MONITOR
 from gne_mj.plants.native_mujoco import callbacks
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -93,8 +94,13 @@ def test_a_state_that_is_set_again_goes_on_bitwise(information, mode, integrator
     loop.advance(41, 1)
     for other in (data, copy):
         assert np.array_equal(other.qvel, loop.plant.data.qvel)
-        assert np.array_equal(other.act, loop.plant.data.act)
-        assert np.array_equal(other.userdata, loop.plant.data.userdata)
+        assert np.array_equal(others_of(other.act), others_of(loop.plant.data.act))
+        if mode == "sampled":
+            assert np.array_equal(other.userdata, loop.plant.data.userdata)
+        else:  # but what the loop keeps to divide steps, which MuJoCo alone does not
+            at = loop._start + MONITOR
+            monitors = slice(at, at + len(loop.monitor))
+            assert np.array_equal(other.userdata[monitors], loop.monitor)
 
 
 @LAWS
@@ -111,6 +117,12 @@ def test_a_reset_simulation_is_not_started(information):
     for use in (lambda: loop.advance(1, 1), loop.finish):
         with pytest.raises(EngineError, match="was reset"):
             use()
+
+
+def others_of(memory):
+    """A memory without the agents' own actions, which are written whenever the law acts."""
+    own = 6 * np.arange(5)
+    return np.delete(memory, own) if len(memory) else memory
 
 
 def memory_in(data, loop, mode):
@@ -141,7 +153,7 @@ def test_a_batch_of_rows_equals_single_runs(information, mode):
         whole = mujoco.MjData(first.plant.model)
         mujoco.mj_setState(first.plant.model, whole, batch.state[row], WHOLE)
         got = memory_in(whole, loop, mode)
-        assert np.array_equal(got, memory_in(loop.plant.data, loop, mode))
+        assert np.array_equal(others_of(got), others_of(memory_in(loop.plant.data, loop, mode)))
         assert np.ptp(got) > 0.1
 
 

@@ -72,7 +72,7 @@ def full_information_cases():
 )
 def test_full_information_equals_a_plain_rk4(name):
     system, agent, game = full_information_cases()[name]
-    h, steps = (2e-4, 200) if game.N == 10 else (0.005, 400)  # none of them is divided
+    h, steps = (5e-5, 200) if game.N == 10 else (0.005, 400)  # none of them is divided
     rate = reference.closed_loop_rate(agent, "full_information", game, RHO)
     expected = reference.rk4_fixed(rate, system.state[:, : agent.n].ravel(), h, steps)
     states, u, _, loop = run_loop(system, h, steps)

@@ -248,7 +248,9 @@ def test_the_worst_status_is_the_runs():
         "simulation.duration": 2.0,
         "simulation.timestep": 0.2,
         "recording.period": 0.2,
+        "simulation.control_period": 0.4,
         "systems.robots.plant.engine": "ode",
+        "systems.robots.controller.mode": "sampled",
         "systems.robots.initial.action": [0.01, 2.99, 3.0, 3.0, 3.0],
     }
     left = run("paper", leaving)
@@ -262,6 +264,7 @@ def test_a_run_that_left_is_stored_like_any_other(tmp_path):
     left = run(
         "velocity-sync",
         {"plant.engine": "ode", "simulation.timestep": 0.2, "recording.period": 0.2,
+         "controller.mode": "sampled", "simulation.control_period": 0.4,
          "initial.action": [0.01, 2.99, 3.0, 3.0, 3.0]},
     )  # fmt: skip
     loaded = Trajectory.load(left.save(tmp_path / "left"))

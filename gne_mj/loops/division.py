@@ -44,7 +44,8 @@ KNOWN = 3  # what is evaluated at the present state, one of the constants below
 SPLIT = 4  # 1: the present step is divided
 EASY = 5  # 1: twice the length is sure to do
 RATED = 6  # Euler, 1: the second row of Stages.g has the rates of g in the piece before
-HEADER = 7
+SIZED = 7  # 1: Stages.size is known
+HEADER = 8
 
 END = -1  # in place of a stage's number: the end of a piece
 NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what the law asks for
@@ -69,32 +70,26 @@ class Stages(NamedTuple):
 
     y: np.ndarray  # (4 m,) outputs
     g: np.ndarray  # (4 p,) constraints
+    size: np.ndarray  # (1 + p,) typical sizes of outputs, then of each slack: at the start or at y*
 
 
 @kernel
 def length(m, p):
     """Entries of ``work.division``."""
-    return HEADER + 4 * m + 4 * p
+    return HEADER + 4 * m + 4 * p + 1 + p
 
 
 @kernel
 def stages_of(division, m, p):
     """The arrays in ``work.division``."""
     at = HEADER + 4 * m
-    return Stages(division[HEADER:at], division[at : at + 4 * p])
+    end = at + 4 * p
+    return Stages(division[HEADER:at], division[at:end], division[end : end + 1 + p])
 
 
-def typical_sizes(outputs: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What errors are compared with: (1 + p,), the outputs' size and that of each slack.
-
-    Args:
-        outputs: (k, m) typical ones, as at the start and at the equilibrium.
-        slacks: (k, p) -g - t there. What is not finite does not count.
-    """
-    finite = np.isfinite(outputs)
-    output = np.max(np.abs(outputs), initial=0.0, where=finite)
-    slack = np.max(slacks, axis=0, initial=0.0, where=np.isfinite(slacks))
-    return np.concatenate([[output], slack])
+def sizes_at(y: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sizes (1 + p,) at outputs y (m,) with slacks -g - t (p,), which need not be positive."""
+    return np.concatenate([[np.max(np.abs(y))], np.maximum(slacks, 0.0)])
 
 
 @kernel
@@ -119,10 +114,18 @@ def ends(division, step, h):
 
 
 @kernel
-def note(stage, work):
+def note(stage, problem, work):
     """Keep what a stage has shown."""
     m, p = len(work.y), len(work.g)
     stages = stages_of(work.division, m, p)
+    if work.division[SIZED] == 0.0:  # the start of the run
+        work.division[SIZED] = 1.0
+        copy(problem.size, stages.size)
+        for r in range(m):
+            stages.size[0] = max(stages.size[0], abs(work.y[r]))
+        for k in range(p):
+            slack = -work.g[k] - problem.data.tightening[k]
+            stages.size[1 + k] = max(stages.size[1 + k], slack)
     copy(work.y, stages.y[stage * m : (stage + 1) * m])
     copy(work.g, stages.g[stage * p : (stage + 1) * p])
 
@@ -136,7 +139,7 @@ def ordinary(count, problem, work, stages):
         good &= abs(g[k] - start) <= -LITTLE * (start + tightening[k])
     if count == 1 or not good:
         return good
-    y, tiny = stages.y, TINY * problem.size[0]
+    y, tiny = stages.y, TINY * stages.size[0]
     first, second, third, fourth = y[:m], y[m : 2 * m], y[2 * m : 3 * m], y[3 * m :]
     for r in range(m):
         bend = abs(third[r] - second[r])
@@ -153,7 +156,7 @@ def stiffness(problem, stages, m, k):
         for r in range(data.offsets[i], data.offsets[i + 1]):
             bend = max(bend, abs(y[2 * m + r] - y[m + r]))
             turn = max(turn, abs(y[3 * m + r] - 2.0 * y[2 * m + r] + y[r]))
-    if not bend > ROUNDING * problem.size[0]:
+    if not bend > ROUNDING * stages.size[0]:
         return 0.0
     return min(turn / bend, STIFFEST)
 
@@ -175,8 +178,8 @@ def error_of(count, h, problem, work, stages, k):
     error = abs(stages.g[2 * p + k] - stages.g[p + k]) * z * z * z / 30.0
     error += slack * z * part * part * part * part / 50.0
     if finest:
-        return error / min(OF_SLACK_AT_LAST * slack, OF_SIZE_AT_LAST * problem.size[1 + k])
-    return error / min(OF_SLACK * slack, OF_SIZE * problem.size[1 + k])
+        return error / min(OF_SLACK_AT_LAST * slack, OF_SIZE_AT_LAST * stages.size[1 + k])
+    return error / min(OF_SLACK * slack, OF_SIZE * stages.size[1 + k])
 
 
 @kernel

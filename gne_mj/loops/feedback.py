@@ -54,7 +54,9 @@ class Problem(NamedTuple):
     schedule: np.ndarray = np.zeros(4)  # of the penalty; all zero: settings[RHO] for all time
     order: Order = NO_ORDER
     faults: Faults = NO_FAULTS
-    size: np.ndarray = np.zeros(1)  # (1 + p,) division.typical_sizes; read in mode continuous only
+    size: np.ndarray = np.zeros(
+        1
+    )  # (1 + p,) at y*: division.sizes_at; read in mode continuous only
 
 
 class Work(NamedTuple):

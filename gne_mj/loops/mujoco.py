@@ -154,7 +154,7 @@ def build(
             qpos = field(struct, at.qpos, sizes[NQ])
             record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
         if good and mode == CONTINUOUS:
-            division.note(stage, work)
+            division.note(stage, problem, work)
         places = integers(table, PLACES)
         acts = faults.push(problem, clock, step, work.u, work.acts)
         for r in range(m):

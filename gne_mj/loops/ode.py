@@ -271,7 +271,7 @@ def build(
                         state[size:], work, state[:0],
                     )  # fmt: skip
                 if moving and point < stages:
-                    division.note(stage, work)
+                    division.note(stage, problem, work)
                     acts = faults.push(problem, clock, step, work.u, work.acts)
                     seen = faults.choose(work.y, work.seen)
                     rates(

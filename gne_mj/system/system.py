@@ -27,7 +27,7 @@ from gne_mj.game_check import refuse
 from gne_mj.loops import explicit, faultless, joint, local
 from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
-from gne_mj.loops.division import typical_sizes
+from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
 from gne_mj.loops.layout import Clock as LoopClock
 from gne_mj.loops.layout import Setup
@@ -275,9 +275,8 @@ class System:
 
     @property
     def typical_sizes(self) -> NDArray[np.float64]:
-        """Of outputs and slacks (1 + p,), at the start and at the equilibrium."""
-        ends = np.stack([self.start, self.centre])
-        return typical_sizes(ends, -self.game.constraints(ends) - self.game.margins)
+        """Of outputs and slacks (1 + p,), at the equilibrium."""
+        return sizes_at(self.centre, -self.game.constraints(self.centre) - self.game.margins)
 
     @property
     def _sizes(self) -> Sizes:

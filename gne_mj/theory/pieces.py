@@ -73,7 +73,7 @@ def _stands(system: System, drift: Array, h: float, looked_at: Work) -> bool:
     for stage in range(stages):
         if not _evaluate(system, point, looked_at):
             return False
-        division.note(stage, looked_at)
+        division.note(stage, problem, looked_at)
         limit = limits_at(system, 0.0)
         u = np.clip(law_at(system, point), -limit, limit)
         if not np.all(np.isfinite(u)):
