@@ -259,6 +259,17 @@ def newton(game, data, free, count, rho, length, point, b, work):
 
 
 @kernel
+def longest_entry(count, step):
+    """Greatest magnitude of the first entries, not a number if one of them is none."""
+    longest = 0.0
+    for r in range(count):
+        size = abs(step[r])
+        if not size <= longest:
+            longest = size
+    return longest
+
+
+@kernel
 def solve(free, count, rho, length, point, b, work):
     """Fill the step of y, and lambda's if y stayed; False if it leads nowhere near."""
     for r in range(count):
@@ -269,12 +280,7 @@ def solve(free, count, rho, length, point, b, work):
         for entry in range(work.row[k], work.row[k + 1]):
             work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
-    longest = 0.0
-    for r in range(count):
-        size = abs(work.step[r])
-        if not size <= longest:  # nor if it is not a number
-            longest = size
-    return longest <= FAR * length
+    return longest_entry(count, work.step) <= FAR * length
 
 
 @kernel
@@ -381,7 +387,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
     least = max(scales.NARROWEST * whole, scales.largest_held(free, point.y))
     length = whole
     last = path.last_rho * size if path.to_zero else path.last_rho
-    distance = np.inf
+    distance, still = np.inf, False
     before, stalled = np.inf, 0
     slow, careful = 0, False
     for iteration in range(LARGEST_COUNT):
@@ -402,7 +408,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 before = error
                 enough = ACCEPTED * path.tolerance
-                near_enough = residual <= enough and off <= max(8.0 * path.spread, enough)
+                near_enough = residual <= enough and (still or off <= max(8.0 * path.spread, enough))
                 near_enough = near_enough or distance <= path.tolerance
                 # A residual that is small beside steep terms, as by a pole, does not tell enough.
                 done = error <= path.tolerance and distance <= CENTRED
@@ -418,10 +424,11 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             return SINGULAR
         now = merit(count, constraints, rho, length, point, work)
         distance = local_length(constraints, point, work)
+        still = distance <= CENTRED and longest_entry(count, work.step) <= ROUNDING * length
         if careful:
             keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
         else:
-            keep, factor = min(TO_BOUNDARY, rho / size), np.inf
+            keep, factor = min(TO_BOUNDARY, max(rho / size, residual)), np.inf
             share = longest(constraints, keep, point, work)
         found = False
         for _ in range(60):
