@@ -8,7 +8,8 @@ its terms. Iterates stay strictly inside.
 
 Steps are Newton's, shortened until the residuals' norm falls. Where only tiny steps do (along
 curved bounds, far from the path), the method sets the multipliers to rho / s and is careful until
-the path is reached: at a high rho if none was reached yet, else at its own. Where the matrix is singular, as in merely monotone games, its diagonal is raised a little.
+the path is reached: at a high rho if none was reached yet, else at its own. Where the matrix is
+singular, as in merely monotone games, its diagonal is raised a little.
 
 Nothing depends on the units of costs, constraints or actions: all is measured by the problem's own
 sizes (:mod:`gne_mj.scales`).
@@ -408,7 +409,9 @@ def follow(game, data, free, half_band, path, known, point, work, report):
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 before = error
                 enough = ACCEPTED * path.tolerance
-                near_enough = residual <= enough and (still or off <= max(8.0 * path.spread, enough))
+                near_enough = residual <= enough and (
+                    still or off <= max(8.0 * path.spread, enough)
+                )
                 near_enough = near_enough or distance <= path.tolerance
                 # A residual that is small beside steep terms, as by a pole, does not tell enough.
                 done = error <= path.tolerance and distance <= CENTRED
