@@ -226,8 +226,10 @@ class Solver:
             # By the lemma a response is only so far from the least cost of its own valley.
             if single and best is not None and cost > least - 2.0 * own * best.rho:
                 continue
+            # A barrier that outweighs what there is to gain might lead back out of the valley.
+            gain = least - cost if best is not None else 0.0
             try:
-                found = self._respond(start, agent)
+                found = self._respond(start, agent, max(gain, 0.0) / own if own else 0.0)
             except SolverError as error:
                 failure = failure or error
                 continue
@@ -269,8 +271,8 @@ class Solver:
                 starts.append((start, cost))
         return starts, last - first == 1
 
-    def _respond(self, y: NDArray[np.float64], agent: int) -> Equilibrium:
-        """What an agent's own path from y leads to."""
+    def _respond(self, y: NDArray[np.float64], agent: int, rho: float) -> Equilibrium:
+        """What an agent's own path from y leads to, from a rho at most (0 for any)."""
         data, point, position = self._data, self._point, self._nobody.position
         own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
         alone = Free(self._nobody.agents[agent : agent + 1], own, position)
@@ -280,8 +282,9 @@ class Solver:
             position[block] = np.arange(block.stop - block.start)
             point.y[:] = y
             ended = self._native.run(
-                data, alone, self._half_band, TO_ZERO, False, point, self._work, self._report
-            )
+                data, alone, self._half_band, TO_ZERO._replace(rho=rho), False, point, self._work,
+                self._report,
+            )  # fmt: skip
             if ended != method.CONVERGED:
                 self._fail(ended, y)
             forgive_pending()

@@ -7,8 +7,9 @@ The slacks s are unknowns of their own: they keep the digits that g(y) loses whe
 its terms. Iterates stay strictly inside.
 
 Steps are Newton's, shortened until the residuals' norm falls. Where only tiny steps do (along
-curved bounds, far from the path), the method goes back to a higher rho and is careful for a while.
-Where the matrix is singular, as in merely monotone games, its diagonal is raised a little.
+curved bounds, far from the path), the method sets the multipliers to rho / s and is careful until
+the path is reached: at a high rho if none was reached yet, else at its own. Where the matrix is
+singular, as in merely monotone games, its diagonal is raised a little.
 
 Nothing depends on the units of costs, constraints or actions: all is measured by the problem's own
 sizes (:mod:`gne_mj.scales`).
@@ -40,8 +41,8 @@ ROUNDING = 1e-14  # of the terms of g
 NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
 SHRINK = 0.1  # of rho, from one equilibrium to the next
 # So many steps in a row shorter than SHORT make the method careful: damped steps at one rho,
-# multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; if that
-# takes more than LONG steps, rho grows by GROW.
+# multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; each
+# LONG steps that this takes, rho grows by GROW.
 PATIENCE, SHORT, CENTRED, LONG, GROW = 3, 0.1, 0.3, 30, 10.0
 # What is added to the diagonal of a matrix that is singular, or whose step is longer than FAR
 # profiles, relative to the rows' own slopes: SHIFT, and so many times HIGHER.
@@ -259,6 +260,17 @@ def newton(game, data, free, count, rho, length, point, b, work):
 
 
 @kernel
+def longest_entry(count, step):
+    """Greatest magnitude of the first entries, not a number if one of them is none."""
+    longest = 0.0
+    for r in range(count):
+        size = abs(step[r])
+        if not size <= longest:
+            longest = size
+    return longest
+
+
+@kernel
 def solve(free, count, rho, length, point, b, work):
     """Fill the step of y, and lambda's if y stayed; False if it leads nowhere near."""
     for r in range(count):
@@ -269,12 +281,7 @@ def solve(free, count, rho, length, point, b, work):
         for entry in range(work.row[k], work.row[k + 1]):
             work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
-    longest = 0.0
-    for r in range(count):
-        size = abs(work.step[r])
-        if not size <= longest:  # nor if it is not a number
-            longest = size
-    return longest <= FAR * length
+    return longest_entry(count, work.step) <= FAR * length
 
 
 @kernel
@@ -328,8 +335,8 @@ def accept(data, free, point, trial):
 def begin(game, data, free, count, b, path, known, point, work):
     """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
 
-    Unknown multipliers are rho / s, with a rho that suits y. Besides, the length of the problem
-    and the costs' size.
+    Unknown multipliers are rho / s, with a rho that suits y. Besides, a rho that leads away from
+    bounds, the length of the problem and the costs' size.
     """
     constraints = len(free.constraints)
     for k in range(constraints):
@@ -337,24 +344,33 @@ def begin(game, data, free, count, b, path, known, point, work):
         if not known:
             point.multipliers[k] = 0.0
     if not inside(game, data, free, point.y, work):
-        return 0.0, 1.0, 1.0
+        return 0.0, 0.0, 1.0, 1.0
     evaluate(game, data, free, point, work)
     for k in range(constraints):
         point.slack[k] = -work.g[k]
     length = scales.length_at(count, constraints, free, point.y, work)
     size = scales.add_costs(game, data, free, length, point.y, b, work)
     if known:
-        return path.rho, length, size
+        return path.rho, path.rho, length, size
     last = path.last_rho * size if path.to_zero else path.last_rho
-    highest = path.rho if path.rho > 0.0 else scales.pull(count, work) * length
-    rho = max(last, scales.balance(count, constraints, free, max(highest, last), work))
+    highest = max(last, path.rho if path.rho > 0.0 else scales.pull(count, work) * length)
+    rho = max(last, scales.balance(count, constraints, free, highest, work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
             r = free.position[work.column[entry]]
             work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
             work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
-    return rho, length, size
+    return rho, highest, length, size
+
+
+@kernel
+def centre(game, data, free, rho, point, work):
+    """Set the multipliers to what they are on the path beside y, and evaluate."""
+    inside(game, data, free, point.y, work)
+    for k in range(len(free.constraints)):
+        point.multipliers[k] = work.share[k] * rho / point.slack[k]
+    evaluate(game, data, free, point, work)
 
 
 @kernel
@@ -366,15 +382,15 @@ def follow(game, data, free, half_band, path, known, point, work, report):
         count += data.offsets[i + 1] - data.offsets[i]
     b = min(half_band, max(count - 1, 0))
     find_entries(data, free, work)
-    rho, whole, size = begin(game, data, free, count, b, path, known, point, work)
+    rho, highest, whole, size = begin(game, data, free, count, b, path, known, point, work)
     if rho == 0.0:
         return OUTSIDE
     least = max(scales.NARROWEST * whole, scales.largest_held(free, point.y))
     length = whole
     last = path.last_rho * size if path.to_zero else path.last_rho
-    distance = np.inf
+    distance, still = np.inf, False
     before, stalled = np.inf, 0
-    highest, shrink, slow, careful = max(rho, path.rho), SHRINK, 0, False
+    slow, careful = 0, False
     for iteration in range(LARGEST_COUNT):
         residual = stationarity_error(count, work)
         off, near_enough = spread(constraints, rho, point, work), False
@@ -382,9 +398,9 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             last = path.last_rho * size
         if not careful:
             # On the way only nearness to the path matters.
-            while rho > last and residual <= 10.0 * rho / size and off <= 0.9:
-                highest = rho
-                rho = max(last, min(shrink * rho, rho * np.sqrt(rho / size)))
+            while rho > last and residual <= max(10.0 * rho / size, path.tolerance) and off <= 0.9:
+                highest = 0.0
+                rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
                 off = spread(constraints, rho, point, work)
             error = max(residual, off * (path.tolerance / path.spread))
             report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
@@ -393,7 +409,9 @@ def follow(game, data, free, half_band, path, known, point, work, report):
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 before = error
                 enough = ACCEPTED * path.tolerance
-                near_enough = residual <= enough and off <= max(8.0 * path.spread, enough)
+                near_enough = residual <= enough and (
+                    still or off <= max(8.0 * path.spread, enough)
+                )
                 near_enough = near_enough or distance <= path.tolerance
                 # A residual that is small beside steep terms, as by a pole, does not tell enough.
                 done = error <= path.tolerance and distance <= CENTRED
@@ -409,10 +427,11 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             return SINGULAR
         now = merit(count, constraints, rho, length, point, work)
         distance = local_length(constraints, point, work)
+        still = distance <= CENTRED and longest_entry(count, work.step) <= ROUNDING * length
         if careful:
             keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
         else:
-            keep, factor = min(TO_BOUNDARY, rho / size), np.inf
+            keep, factor = min(TO_BOUNDARY, max(rho / size, residual)), np.inf
             share = longest(constraints, keep, point, work)
         found = False
         for _ in range(60):
@@ -435,17 +454,14 @@ def follow(game, data, free, half_band, path, known, point, work, report):
         slow = slow + 1 if careful or share < SHORT else 0
         if careful:
             careful = distance > CENTRED
-            if slow >= LONG:
-                highest = GROW * rho
-        elif slow >= PATIENCE or not found:
-            # Back to the last rho that was reached, and on from its equilibrium in smaller steps.
-            careful, slow, shrink = True, LONG, np.sqrt(shrink)
-        if careful and slow >= LONG:
-            slow, rho = 0, highest
-            inside(game, data, free, point.y, work)
-            for k in range(constraints):
-                point.multipliers[k] = work.share[k] * rho / point.slack[k]
-            evaluate(game, data, free, point, work)
+            lost = careful and slow >= LONG
+            rho = GROW * rho if lost else rho
+        else:
+            careful = lost = slow >= PATIENCE or not found
+            rho = max(rho, highest) if lost else rho
+        if lost:
+            slow = 0
+            centre(game, data, free, rho, point, work)
     return TOO_MANY
 
 
