@@ -161,15 +161,14 @@ def look(
 def rates(agent, law, problem, channels, stage, state, known, u, y, out):
     """Fill out with the rate of the flat state under u (m,), the law having acted at y (m,).
 
-    At stage 0 ``known`` is what :func:`stored_keeping` has found for this state.
+    ``known`` (m,) is at stage 0 what :func:`stored_keeping` has found for this state; else changed.
     """
     m, states = channels.rest.shape
     for r in range(m):
         x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
-        if stage == 0:
-            agent.rate_given(channels.parameters[r], x, u[r], known[r], rate)
-        else:
-            agent.rate(channels.parameters[r], x, u[r], rate)
+        if stage > 0:
+            known[r] = agent.shared(channels.parameters[r], x)
+        agent.rate_given(channels.parameters[r], x, u[r], known[r], rate)
     law.rate(problem, y, state[m * states :], out[m * states :])
 
 
@@ -183,7 +182,7 @@ def stage_state(stage, h, state, k, trial):
 
 @kernel
 def piece_end(
-    agent, faults, problem, channels, clock, step, length, u, state, k, trial, work, spare
+    agent, faults, problem, channels, clock, step, length, u, state, k, trial, work
 ):  # fmt: skip
     """Fill trial with the flat state at the end of a piece, mode continuous.
 
@@ -192,7 +191,6 @@ def piece_end(
         u: (m,) inputs at its start.
         state: flat, at its start.
         k: (4, ...) rates at its stages.
-        spare: scratch for a step of Euler's method.
     """
     m, states = channels.rest.shape
     if clock.method == RK4:
@@ -200,9 +198,10 @@ def piece_end(
             rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
             trial[r] = state[r] + length / 6.0 * rise
         return
-    copy(state[: m * states], trial)
     acts = faults.push(problem, clock, step, u, work.acts)
-    held_step(agent, channels.parameters, states, clock.method, length, trial, acts, spare)
+    for r in range(m):
+        at, end = r * states, (r + 1) * states
+        agent.euler_step(channels.parameters[r], state[at:end], acts[r], length, trial[at:end])
     for r in range(m * states, len(state)):  # Euler's method for the memory
         trial[r] = state[r] + length * k[0, r]
 
@@ -253,7 +252,7 @@ def build(
                 if point == stages:
                     piece_end(
                         agent, faults, problem, channels, clock, step, length, u, state, k, trial,
-                        work, spare,
+                        work,
                     )  # fmt: skip
                     now, stage, at = trial, division.END, division.ends(divided, step, h)
                 elif point > 0:
