@@ -128,7 +128,7 @@ const GNE = {};
   GNE.status = (word) => {
     let kind = "unknown";
     if (/^(converged|completed)$/.test(word)) kind = "ok";
-    else if (/left|diverged/.test(word)) kind = "bad";
+    else if (/left|diverged|too_small/.test(word)) kind = "bad";
     else if (word === "running") kind = "going";
     return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
   };
