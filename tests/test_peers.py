@@ -123,11 +123,12 @@ def test_closed_loops_in_mjx(script, integrator):
 def test_robots_in_diffrax(script):
     peer = script("peer_diffrax", "diffrax")
     states = peer.common.starts(4)
-    _, theirs = peer.batch(peer.fixed(peer.Rk4())(peer.STEPS), states)()
-    _, mine = peer.our_robots(peer.STEPS, states)()
+    fine = 20 * peer.STEPS  # steps that are not divided
+    _, theirs = peer.batch(peer.fixed(peer.Rk4())(fine), states)()
+    _, mine = peer.our_robots(fine, states)()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
     _, theirs = peer.batch(peer.adaptive(peer.diffrax.Dopri8())(1e-10), states)()
-    _, mine = peer.our_robots(20 * peer.STEPS, states)()
+    _, mine = peer.our_robots(fine, states)()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-8)
 
 
