@@ -185,8 +185,8 @@ def test_a_run_from_an_ordinary_start_is_what_the_oracle_says(monkeypatch):
     monkeypatch.setattr(kinds, "STEPS", (5e-4, 1e-3))
     drawn = continuous.draw
     monkeypatch.setattr(continuous, "draw", lambda rng: drawn(rng, "lane robots"))
-    found = continuous.one(5, 10, against=True)
+    found = continuous.one(5, 10, share=1.0)
     assert found["status"] in ("completed", "converged")
     assert found["reference_error"] < 1e-8
     assert found["error"] < 1e-7
-    assert found == continuous.one(5, 10, against=True)
+    assert found == continuous.one(5, 10, share=1.0)

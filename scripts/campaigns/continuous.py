@@ -1,17 +1,14 @@
 """Random certified systems in mode continuous: how runs end, and how near they stay to continuous
 time, which a stiff solver computes from the paper's equations."""
 
-import argparse
-import json
 import sys
-import time
-from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 import stiff
-from draws import progress
+from campaign import campaign, parser
+from checks import LEFT
 from kinds import KINDS, Draw, draw
 
 from gne_mj.errors import GneError
@@ -19,14 +16,12 @@ from gne_mj.simulation import Simulation
 from gne_mj.theory import Theorem
 from gne_mj.theory.theorem import CONDITIONAL
 
-RUNS_A_JOB = 25
 LARGEST = 160  # states of a system that is compared
 WANTED = 1e-6  # greatest relative difference
 # Each with the relative tolerances of its two solutions; the second where the first is not sure
 METHODS = ((stiff.follow, 1e-11, 1e-10), (stiff.follow_by_radau, 1e-10, 1e-9))
 CRUDE = 1e-7  # relative tolerance where only the solution's end matters
 SURE = 1e-7  # greatest relative difference of the two where the solver is relied on
-LEFT = ("left_feasible_set", "estimate_left_feasible_set", "diverged")
 AS_CONTINUOUS = "left, as in continuous time"
 REFUSED, CRASHED = "refused", "crashed"
 # Of the law without its barrier, step times greatest rate: below it RK4 can be asked for WANTED
@@ -35,57 +30,28 @@ SMOOTH = 0.05
 
 def main() -> int:
     """Run, print the tables; 1 if a run left, or was farther off than wanted."""
-    parser = argparse.ArgumentParser(prog="scripts/check-continuous", description=__doc__)
-    parser.add_argument("--runs", type=int, default=10_000)
-    parser.add_argument("--against", type=int, default=400, help="of them against a stiff solver")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--index", type=int, help="repeat this run alone")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="JSON file for the counts and each notable run")
-    options = parser.parse_args()
-    started = time.perf_counter()
-    if options.index is not None:
-        found = one(options.seed, options.index, against=True)
-        print(json.dumps(found, indent=2))
-        return 0
-    share = options.against / max(options.runs, 1)
-    jobs = [
-        (options.seed, first, min(first + RUNS_A_JOB, options.runs), share)
-        for first in range(0, options.runs, RUNS_A_JOB)
-    ]
-    rows: list[dict[str, Any]] = []
-    with ProcessPoolExecutor(options.processes) as pool:
-        for part in progress(pool.map(_job, jobs), len(jobs), "runs"):
-            rows += part
-    lines, broken = report(rows)
-    print("\n".join([*lines, "", f"{time.perf_counter() - started:.0f} s"]))
-    if options.out:
-        kept = [row for row in rows if "error" in row or _is_broken(row) or row["divided"]]
-        text = json.dumps({"seed": options.seed, "runs": len(rows), "notable": kept}, indent=1)
-        options.out.write_text(text + "\n", encoding="utf-8")
-    return 1 if broken else 0
+    options = parser("scripts/check-continuous", __doc__, 10_000)
+    options.add_argument("--against", type=int, default=400, help="of them with a stiff solver")
+    given = options.parse_args()
+    share = 1.0 if given.index is not None else given.against / max(given.runs, 1)
+    return campaign(given, partial(one, share=share), crashed, report, is_notable)
 
 
-def _job(job: tuple[int, int, int, float]) -> list[dict[str, Any]]:
-    seed, first, last, share = job
+def crashed(index: int, error: Exception) -> dict[str, Any]:
+    """What is not expected counts as broken."""
+    row = {"index": index, "kind": "any", "integrator": "any", "divided": 0}
+    return row | {"status": CRASHED, "message": f"{type(error).__name__}: {error}"}
+
+
+def is_notable(row: dict[str, Any]) -> bool:
+    """Whether a run is kept in the file: compared, divided or broken."""
+    return "error" in row or _is_broken(row) or bool(row["divided"])
+
+
+def one(seed: int, index: int, *, share: float) -> dict[str, Any]:
+    """Draw a system, run it, and compare a share of them; plain numbers, strings and None."""
     # Spread evenly, so that which runs are compared follows from the counts alone
-    return [
-        _guarded(seed, index, int((index + 1) * share) > int(index * share))
-        for index in range(first, last)
-    ]
-
-
-def _guarded(seed: int, index: int, against: bool) -> dict[str, Any]:
-    """As :func:`one`; what it does not expect ends no campaign."""
-    try:
-        return one(seed, index, against=against)
-    except Exception as error:
-        row = {"index": index, "kind": "any", "integrator": "any", "divided": 0}
-        return row | {"status": CRASHED, "message": f"{type(error).__name__}: {error}"}
-
-
-def one(seed: int, index: int, *, against: bool) -> dict[str, Any]:
-    """Draw a system, run it, and compare it if asked; plain numbers, strings and None."""
+    against = int((index + 1) * share) > int(index * share)
     drawn = draw(np.random.default_rng([seed, index]))
     system, clock = drawn.system, drawn.clock
     row: dict[str, Any] = {
