@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from gne_mj import verdicts
 from gne_mj.controllers import FullyDistributed
+from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
-from gne_mj.margins import epsilon_bounds, of_the_set
+from gne_mj.margins import of_the_set
 from gne_mj.system import System
 from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
@@ -33,7 +34,7 @@ class Certificate:
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against
-            :func:`gne_mj.margins.epsilon_bounds`.
+            :func:`gne_mj.epsilon.epsilon_bounds`.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
             whether it is known (not of MJCF robots, nor without a y*), and whether the theory
@@ -370,13 +371,13 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
 
 def _epsilon(system: System) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
-    known, measured = system.known_equilibrium, None
+    known, gains = system.known_equilibrium, None
     if known is not None:
         with suppress(SolverError):
-            measured = float(np.max(measured_epsilon(of_the_set(system.game), known.action)))
+            gains = measured_epsilon(of_the_set(system.game), known.action)
     return {
-        "measured": measured,
-        **epsilon_bounds(system.game, system.rho, None if known is None else known.multipliers),
+        "measured": None if gains is None else float(np.max(gains)),
+        **epsilon_bounds(system.game, system.rho, known, gains=gains),
     }
 
 

@@ -11,7 +11,6 @@ g < 0 at every control instant.
 
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,47 +169,6 @@ def with_margin(
 def of_the_set(game: Game) -> Game:
     """The game with a barrier of g < 0 itself, whatever keeps farther away from it."""
     return game.tightened(0.0) if np.any(game.margins) else game
-
-
-def epsilon_bounds(game: Game, rho: float, multipliers: Array | None) -> dict[str, Any]:
-    """What any agent could gain at most, by deviating alone in the set g <= 0 [lemma:epsilon].
-
-    From a penalised equilibrium agent i's cost, convex in y_i, falls by at most
-    sum_l lambda_l (-g_l) over the constraints l that contain y_i, which are convex. With
-    lambda_l = rho/(-g_l - t_l) that is p_i rho + sum_l lambda_l t_l. All in the costs' unit.
-
-    Args:
-        game: with its tightening t.
-        rho: the penalty.
-        multipliers: lambda (p,) at the penalised equilibrium; None if that is not known, and then
-            None stands for all that needs them.
-
-    Returns:
-        ``p_rho`` for p constraints and ``of_margin``, sum_l lambda_l t_l of all of them; ``bound``,
-        the two together; ``p_rho_affine`` and ``bound_affine``, the same where affine constraints
-        describe the set (None if the game's own do, or none do); ``own_bound`` of each agent, the
-        greatest of these ``largest_own_bound``, and the greatest p_i rho ``largest_own_p_rho``.
-    """
-    affine, p_rho = game.affine_constraints, game.constraints_count * rho
-    unknown = np.where(game.margins > 0, np.nan, 0.0)
-    costs = unknown if multipliers is None else multipliers * game.margins
-    of_margin = float(np.sum(costs))
-    member = np.repeat(np.arange(game.agents), game.own_constraints)
-    own = np.bincount(member, rho + costs[game.data.own_index], game.agents)
-    found = {
-        "p_rho": p_rho,
-        "of_margin": of_margin,
-        "bound": p_rho + of_margin,
-        "p_rho_affine": None if affine is None else affine * rho,
-        "bound_affine": None if affine is None else affine * rho + of_margin,
-        "own_bound": own.tolist(),
-        "largest_own_bound": float(np.max(own)),
-        "largest_own_p_rho": float(np.max(game.own_constraints)) * rho,
-    }
-    return {
-        name: None if isinstance(value, float) and np.isnan(value) else value
-        for name, value in found.items()
-    }
 
 
 def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Array) -> float:

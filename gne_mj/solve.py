@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import (
     Equilibrium,
     measured_epsilon,
@@ -18,8 +19,9 @@ from gne_mj.equilibrium import (
 )
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
-from gne_mj.margins import epsilon_bounds, of_the_set
+from gne_mj.margins import of_the_set
 from gne_mj.optimality import FLAT, Optimality, examine
+from gne_mj.summary import bounds_in_words
 from gne_mj.system import System
 
 # A gain up to so many times the variational equilibrium's own rho is one by rounding.
@@ -207,16 +209,15 @@ def _compared(game: Game, point: Measured) -> dict[str, Any]:
             "measured": float(point.gains[largest]),
             "agent": largest + 1,
             "each": point.gains.tolist(),
-            **epsilon_bounds(game, point.equilibrium.rho, point.equilibrium.multipliers),
+            **bounds_of(game, point),
         },
     }
 
 
-def _bound(game: Game, point: Measured) -> float:
-    """What epsilon is at most."""
+def bounds_of(game: Game, point: Measured) -> dict[str, Any]:
+    """What epsilon is at most at a penalised equilibrium (:func:`epsilon_bounds`)."""
     found = point.equilibrium
-    bound: float = epsilon_bounds(game, found.rho, found.multipliers)["bound"]
-    return bound
+    return epsilon_bounds(game, found.rho, found, gains=point.gains)
 
 
 def summary(solution: Solution) -> list[str]:
@@ -227,17 +228,13 @@ def summary(solution: Solution) -> list[str]:
     for point in solution.penalised:
         numbers = _compared(game, point)
         epsilon = numbers["epsilon"]
-        more = epsilon["measured"] > epsilon["largest_own_bound"] + ROUNDING * variational.rho
         lines += [
             f"  penalised equilibrium at rho = {numbers['rho']:g}",
             f"    {game.action_name:16} {_listed(point.equilibrium.action)}{unit}",
             f"    {'multipliers':16} {_listed(point.equilibrium.multipliers)}",
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
-            f" at most {epsilon['bound']:g} = p rho"
-            + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
-            + f", {epsilon['largest_own_bound']:g} by each agent's own constraints"
-            + "; the lemma does not hold: not every J_i is convex in y_i" * more,
+            f" {bounds_in_words(epsilon)}",
             f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
     active = [
@@ -262,7 +259,7 @@ def summary(solution: Solution) -> list[str]:
             lines.append(
                 f"    {point.equilibrium.rho:10.3g}  {point.distance:10.3g}"
                 f"  {np.max(point.gains):10.3g}"
-                f"  {_bound(game, point):10.3g}"
+                f"  {_number(bounds_of(game, point)['bound'])}"
             )
     return lines
 
@@ -282,6 +279,10 @@ def _doubts(solution: Solution) -> list[str]:
         kind = "not monotone" if found.monotonicity < -FLAT else "merely monotone"
         lines.append(f"    {'uniqueness':16} F is {kind} there: the equilibrium need not be unique")
     return lines
+
+
+def _number(value: float | None) -> str:
+    return f"{'none' if value is None else format(value, '.3g'):>10}"
 
 
 def _listed(values: NDArray[np.float64]) -> str:

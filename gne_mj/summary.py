@@ -69,12 +69,21 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
                     f"; {implicit[key]} {what} (first at {implicit[first]:.4g} s)"
                 )
     if epsilon["measured"] is not None:
-        beyond = epsilon["measured"] > (1.0 + 1e-6) * epsilon["bound"]
         rows["epsilon"] = (
-            f"{epsilon['measured']:.3g} measured at the penalised equilibrium; at most"
-            f" {epsilon['bound']:.4g} = p rho"
-            + (f" + {epsilon['of_margin']:.4g} for the margin" if epsilon["of_margin"] else "")
-            + f", and {epsilon['largest_own_bound']:.4g} by each agent's own constraints"
-            + ("; the lemma does not hold: not every J_i is convex in y_i" * beyond)
+            f"{epsilon['measured']:.3g} measured at the penalised equilibrium;"
+            f" {bounds_in_words(epsilon)}"
         )
     return rows
+
+
+def bounds_in_words(bounds: dict[str, Any]) -> str:
+    """:func:`gne_mj.epsilon.epsilon_bounds` as part of a sentence on epsilon."""
+    if bounds["refuted"] is not None:
+        return f"no bound, since the lemma does not hold: {bounds['refuted']}"
+    if bounds["bound"] is None:
+        return "no bound is known, since y* was not found"
+    margin = f" + {bounds['of_margin']:.4g} for the margin" if bounds["of_margin"] else ""
+    return (
+        f"at most {bounds['bound']:.4g} = p rho{margin}, and"
+        f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
+    )

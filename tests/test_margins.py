@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gne_mj.controllers import FullInformation
+from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Noise, Push, SensorDelay
@@ -30,7 +31,6 @@ from gne_mj.games import (
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import (
     Disturbance,
-    epsilon_bounds,
     influence,
     largest_push,
     of_the_set,
@@ -321,7 +321,7 @@ def test_no_agent_can_gain_more_than_the_bound_whatever_the_margin():
         rng = np.random.default_rng(seed)
         game, y = tightened_game(rng)
         found = penalised_equilibrium(game, 10.0 ** rng.uniform(-4, 0), y)
-        bounds = epsilon_bounds(game, found.rho, found.multipliers)
+        bounds = epsilon_bounds(game, found.rho, found)
         gains = measured_epsilon(of_the_set(game), found.action)
         own = np.array(bounds["own_bound"])
         assert np.all(gains <= own * (1 + 1e-9) + 1e-9), seed

@@ -81,8 +81,15 @@ def test_a_maximum_is_no_equilibrium(tmp_path):
     assert told.returncode == 1
     for words in ("no equilibrium", "agents 1, 2", "gains 2.1", "own second derivative"):
         assert words in told.stdout
+    bounds = ("bound", "largest_own_bound")
+    assert all(report["penalised"][0]["epsilon"][name] is None for name in bounds)
+    # A run and certify do not state a bound that a best response exceeds
+    certified = json.loads(gne("certify", scenario(tmp_path), "--json").stdout)["s"]["equilibrium"]
+    assert all(certified[name] is None for name in bounds)
+    assert certified["own_bound"] == [None, None]
+    assert "J_1 is not convex in y_1" in certified["refuted"]
     ran = gne("run", scenario(tmp_path))
-    assert "the lemma does not hold: not every J_i is convex in y_i" in ran.stdout
+    assert "no bound, since the lemma does not hold: not every J_i is convex in y_i" in ran.stdout
     assert "variational GNE\n" not in told.stdout.replace("to the variational GNE\n", "")
 
 

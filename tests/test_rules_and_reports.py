@@ -11,10 +11,10 @@ from gne_mj import certificate
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
+from gne_mj.epsilon import epsilon_bounds
 from gne_mj.faults import Push, Saturation
 from gne_mj.games import cournot_game, velocity_consensus_game, velocity_game
 from gne_mj.loops import monitor as watch
-from gne_mj.margins import epsilon_bounds
 from gne_mj.system import System
 from gne_mj.theory import certify
 from gne_mj.theory.periods import least_rho, linear_period, push_period

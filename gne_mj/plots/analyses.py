@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from gne_mj.exit_map import Cell
-from gne_mj.margins import epsilon_bounds
 from gne_mj.plots.style import STYLE, line_style
-from gne_mj.solve import Solution
+from gne_mj.solve import Solution, bounds_of
 
 
 def save_path(solution: Solution, file: Path) -> None:
@@ -24,10 +23,7 @@ def save_path(solution: Solution, file: Path) -> None:
         "distance to the vGNE": [point.distance for point in solution.path],
         "measured $\\epsilon$": [np.max(point.gains) for point in solution.path],
         "its bound": [
-            epsilon_bounds(solution.game, point.equilibrium.rho, point.equilibrium.multipliers)[
-                "bound"
-            ]
-            for point in solution.path
+            bounds_of(solution.game, point)["bound"] or np.nan for point in solution.path
         ],
     }
     with plt.rc_context(STYLE):

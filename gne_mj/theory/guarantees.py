@@ -7,7 +7,6 @@ import numpy as np
 
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
-from gne_mj.margins import epsilon_bounds
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
@@ -96,7 +95,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": None if known is None else known.action.tolist(),
-            **epsilon_bounds(game, system.rho, None if known is None else known.multipliers),
+            **theorem.epsilon,
         },
         inputs=(theorem if held is None else held).demand.report(),
         periods={

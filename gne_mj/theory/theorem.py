@@ -2,18 +2,21 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
+from gne_mj.epsilon import epsilon_bounds
 from gne_mj.game import Box
 from gne_mj.graph import complete
 from gne_mj.loops.feedback import LARGEST_INPUT
 from gne_mj.system import System
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
-from gne_mj.theory.assumption import Assumption
+from gne_mj.theory.assumption import FAILS, Assumption
 from gne_mj.theory.constants import Slopes
+from gne_mj.theory.convexity import convex_constraints, own_convexity
 from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.demand import Demand, limited
 from gne_mj.theory.disturbances import estimate_error
@@ -81,6 +84,16 @@ class Theorem:
     def demand(self) -> Demand:
         """What the law, as it reads, asks of the actuators at the start."""
         return Demand(self.system, np.abs(law_at_start(self.system)), "the law at the start")
+
+    @cached_property
+    def epsilon(self) -> dict[str, Any]:
+        """What agents can gain at y* (:func:`gne_mj.epsilon.epsilon_bounds`)."""
+        system = self.system
+        inside = Slopes(system.game, system.game.box, system.start, feasible=True)
+        parts = (own_convexity(system, inside), convex_constraints(system))
+        refuted = next((part.why for part in parts if part.status == FAILS), None)
+        known = system.known_equilibrium
+        return epsilon_bounds(system.game, system.rho, known, refuted=refuted)
 
     @cached_property
     def gain(self) -> Gain | None:

@@ -1,7 +1,5 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
-from gne_mj.margins import epsilon_bounds
-from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
@@ -12,7 +10,7 @@ from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     """What the theorem gives."""
     system = theorem.system
-    limit = _limit(system)
+    limit = _limit(theorem)
     as_long = ", as long as no input limit is met" if limited(system) else ""
     trust = [f"[{a.label}]" for a in theorem.assumptions if a.status == ASSUMED]
     provided = f", provided {' and '.join(trust)}" if trust else ""
@@ -44,10 +42,9 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
     return ["nothing"]
 
 
-def _limit(system: System) -> str:
+def _limit(theorem: Theorem) -> str:
     """What y* is."""
-    known = system.known_equilibrium
-    bound = epsilon_bounds(system.game, system.rho, None if known is None else known.multipliers)
+    bound = theorem.epsilon
     if bound["bound"] is None:
         return "an epsilon-vGNE, of which nothing more is known since it was not found"
     margin = " + sum lambda_l t_l" if bound["of_margin"] else ""

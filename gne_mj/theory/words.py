@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from gne_mj.summary import bounds_in_words
 from gne_mj.theory.guarantees import Guarantees
 from gne_mj.theory.theorem import CONDITIONAL
 
@@ -49,7 +50,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
-    yield "epsilon of y*", _bounds(g["equilibrium"])
+    yield "epsilon of y*", bounds_in_words(g["equilibrium"])
     yield "inputs", _inputs(g["inputs"])
     yield "sampling", _periods(g)
     if g["division"] is not None:
@@ -165,16 +166,6 @@ def _estimates(estimates: dict[str, Any]) -> str:
     if distance == 0.0:
         return "they equal y(0)"
     return f"at most {distance:.6g} from y(0); under partial information they need not lie inside"
-
-
-def _bounds(bounds: dict[str, Any]) -> str:
-    margin = f" + {bounds['of_margin']:.4g} for the margin" if bounds["of_margin"] else ""
-    if bounds["bound"] is None:
-        return "not known, since y* was not found"
-    return (
-        f"at most {bounds['bound']:.4g} = p rho{margin},"
-        f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
-    )
 
 
 def _inputs(inputs: dict[str, Any]) -> str:
