@@ -19,6 +19,7 @@ def parser(name: str, about: str | None, runs: int) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(prog=name, description=about)
     made.add_argument("--runs", type=int, default=runs)
     made.add_argument("--seed", type=int, default=0)
+    made.add_argument("--first", type=int, default=0, help="index of the first run")
     made.add_argument("--index", type=int, help="repeat this one alone")
     made.add_argument("--processes", type=int, default=2)
     made.add_argument("--out", type=Path, help="JSON file for the rows of all that is notable")
@@ -48,9 +49,10 @@ def campaign(
     if options.index is not None:
         print(json.dumps(one(options.seed, options.index), indent=2))
         return 0
+    end = options.first + options.runs
     jobs = [
-        (one, crashed, options.seed, first, min(first + RUNS_A_JOB, options.runs))
-        for first in range(0, options.runs, RUNS_A_JOB)
+        (one, crashed, options.seed, first, min(first + RUNS_A_JOB, end))
+        for first in range(options.first, end, RUNS_A_JOB)
     ]
     rows: list[Row] = []
     with ProcessPoolExecutor(options.processes) as pool:
@@ -60,7 +62,8 @@ def campaign(
     print("\n".join([*lines, "", f"{time.perf_counter() - started:.0f} s"]))
     if options.out:
         kept = [row for row in rows if notable(row)]
-        text = json.dumps({"seed": options.seed, "runs": len(rows), "notable": kept}, indent=1)
+        made = {"seed": options.seed, "first": options.first, "runs": len(rows), "notable": kept}
+        text = json.dumps(made, indent=1)
         options.out.write_text(text + "\n", encoding="utf-8")
     return 1 if broken else 0
 

@@ -1,6 +1,7 @@
 """Random systems for the campaigns: games, fleets, starts, periods."""
 
 import sys
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -174,9 +175,15 @@ def towards_bound(
 
 
 def progress(done: Iterable[Any], total: int, what: str) -> Iterator[Any]:
-    """The same, with a progress bar on a terminal."""
-    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as bar:
+    """The same, with a progress bar on a terminal and else a line a minute."""
+    terminal, begun = sys.stderr.isatty(), time.monotonic()
+    told = begun
+    with Progress(console=Console(stderr=True), disable=not terminal) as bar:
         task = bar.add_task(what, total=total)
-        for each in done:
+        for count, each in enumerate(done, start=1):
             yield each
             bar.advance(task)
+            now = time.monotonic()
+            if not terminal and now - told >= 60.0:
+                told = now
+                print(f"{count} of {total} {what}, {now - begun:.0f} s", file=sys.stderr)
