@@ -354,7 +354,7 @@ def _try(rng: np.random.Generator, name: str) -> Draw | None:
     if step < STEPS[0] or Theorem(system).obstacles:
         return None
     samples = int(rng.integers(15, 40))
-    every = max(1, round(float(log_uniform(rng, 0.5, 3.0)) / (samples * step)))
+    every = max(1, round(float(log_uniform(rng, 0.3, 1.5)) / (samples * step)))
     clock = Clock(samples * every * step, step, step, every * step)
     loop, x = as_stiff(system, both.oracle)
     return Draw(system, clock, loop, x, name, margin, hard)
