@@ -16,6 +16,7 @@ import numpy as np
 
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.c_layout import arrays
+from gne_mj.plants.native_mujoco import quiet
 
 # Options that a scenario gives, and MJCF's words for others
 CLOCK = ("timestep", "integrator")
@@ -31,8 +32,12 @@ def read(path: Path) -> Any:
         InvalidInput: it cannot be read or compiled, has a number that is not finite, or a setting
             that no fleet can have.
     """
+    heard: list[str] = []
     with _refusing(path, "read"):
+        mujoco.set_mju_user_warning(heard.append)
         spec = mujoco.MjSpec.from_file(str(path))
+    if any("NaN" in message for message in heard):  # which it takes for a number not given
+        raise _refusal(path, "every number must be finite, and one of its is nan")
     for name in _options(spec):
         _check_finite(path, name, getattr(spec.option, name))
     if spec.compiler.settotalmass > 0:
@@ -84,14 +89,14 @@ def adopt_options(world: Any, spec: Any) -> None:
             setattr(world.option, name, getattr(spec.option, name))
 
 
-def check_options(first: Any, spec: Any, path: Path) -> None:
-    """Refuse a file whose options are not those of a fleet's first one.
+def check_options(world: Any, spec: Any, path: Path) -> None:
+    """Refuse a file whose options are not those of a fleet's world, which are the first one's.
 
     Raises:
         InvalidInput: names the option.
     """
     for name in _options(spec):
-        own, others = getattr(spec.option, name), getattr(first.option, name)
+        own, others = getattr(spec.option, name), getattr(world.option, name)
         if name not in CLOCK and np.any(own != others):
             word, shown = WORDS.get(name, name), ""
             if word == name:
@@ -116,17 +121,10 @@ def _refusal(path: Path | str, expected: str) -> InvalidInput:
 
 @contextmanager
 def _refusing(path: Path | str, verb: str) -> Iterator[None]:
-    """What MuJoCo raises as one sentence; of what it warns only numbers that are none are told."""
-    heard: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(heard.append)
+    """What MuJoCo raises becomes one sentence, and what it warns of is not told."""
     try:
-        with warnings.catch_warnings():
+        with quiet(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     except (ValueError, OSError, mujoco.FatalError) as error:
         raise _refusal(path, f"MuJoCo must {verb} it: {' '.join(str(error).split())}") from None
-    finally:
-        mujoco.set_mju_user_warning(before)
-    if any("NaN" in message for message in heard):
-        raise _refusal(path, "every number must be finite, and one of its is nan")

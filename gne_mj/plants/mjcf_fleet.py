@@ -24,6 +24,7 @@ from gne_mj.plants.mjcf_ahead import (
     gather,
     refresh,
 )
+from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, run_steps
 from gne_mj.plants.native_mujoco import (
@@ -41,11 +42,6 @@ __all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "refresh", "s
 SPACING = 2.0  # m between robots, so that they do not touch
 SENSOR = mujoco.mjtSensor
 VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
-# What of a geom says how it is touched
-SURFACE = (
-    "contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp",
-    "margin", "gap",
-)  # fmt: skip
 
 AGENT, AHEAD = mjcf_robot, mjcf_ahead
 
@@ -95,7 +91,7 @@ class MjcfPlant(Plant):
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
-        world = _world(agents.robots)
+        world, sizes_of_robots, memory_asked = _world(agents.robots)
         world.option.timestep = timestep
         world.option.integrator = getattr(
             mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS[integrator].upper()}"
@@ -104,10 +100,14 @@ class MjcfPlant(Plant):
         if memory:
             _add_memory(world, memory)
         self.model = mjcf_file.compiled(world, "...")
+        if memory_asked > self.model.narena:
+            world.memory = memory_asked
+            self.model = mjcf_file.compiled(world, "...")
         self.data = mujoco.MjData(self.model)
         with quiet():
             mujoco.mj_fwdPosition(self.model, self.data)
-        _share_floors(self.model, self.data)
+        self._owners = owners_of(self.model, sizes_of_robots)
+        share_floors(self.model, self.data, self._owners)
         self.places = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -226,6 +226,7 @@ class MjcfPlant(Plant):
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
+        check_apart(self.model, self.data, self._owners, self.agents.robots)
         missed = np.abs(self.state[:, 0] - state[:, 0])
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
@@ -242,44 +243,26 @@ class MjcfPlant(Plant):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
 
 
-def _world(robots: tuple[RobotFile, ...]) -> Any:
+def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:
+    """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
     floor, across = world.geom("floor"), 0.5 * SPACING * (len(robots) - 1)
     floor.pos[1], floor.size[1] = across, floor.size[1] + across
     for path in dict.fromkeys(robot.path for robot in robots):
         mjcf_file.alone(path)  # which finds what is wrong with it
-    first = None
+    sizes, memory = [], 0
     for i, robot in enumerate(robots):
         spec = mjcf_file.read(robot.path)
-        if first is None:
-            first = spec.copy()
+        if i == 0:
             mjcf_file.adopt_options(world, spec)
-        mjcf_file.check_options(first, spec, robot.path)
+        mjcf_file.check_options(world, spec, robot.path)
+        sizes.append(sizes_of(spec))
+        memory += max(spec.memory, 0)
         place = (0.0, SPACING * i, 0.0)
         mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
     # a state that is not a number must be seen, not be reset
     world.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    return world
-
-
-def _share_floors(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Let but one of planes that are the same touch anything, so that a robot stands on one floor.
-
-    Args:
-        model: of the fleet; the other planes' collision bits are cleared.
-        data: positions evaluated.
-    """
-    touches = (model.geom_contype | model.geom_conaffinity) != 0
-    plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    seen = set()
-    for geom in np.flatnonzero(plane & touches & (model.geom_bodyid == 0)).tolist():
-        normal = data.geom_xmat[geom].reshape(3, 3)[:, 2]
-        place = (*normal, normal @ data.geom_xpos[geom])
-        surface = [np.atleast_1d(getattr(model, f"geom_{name}")[geom]) for name in SURFACE]
-        key = tuple(np.round(np.concatenate([place, *surface]), 9).tolist())
-        if key in seen:
-            model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-        seen.add(key)
+    return world, sizes, memory
 
 
 def _check_sensor(model: mujoco.MjModel, robot: RobotFile, sensor: int) -> Any:

@@ -91,7 +91,7 @@ def offsets() -> Offsets:
         EngineError: a field is not where it is declared, so this MuJoCo cannot be driven.
     """
     result = Offsets(
-        *(word_of("mjData", name) for name in Offsets._fields[:-2]),
+        **{name: word_of("mjData", name) for name in Offsets._fields[:-2]},
         nuserdata=word_of("mjModel", "nuserdata"),
         timestep=word_of("mjModel", "opt", "timestep"),
     )
