@@ -232,3 +232,20 @@ def test_other_floors_stay_apart(tmp_path):
     plant = plant_of(*robots)
     planes = plant.model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     assert np.count_nonzero(planes & (plant.model.geom_contype > 0)) == 4
+
+
+def test_robots_that_overlap_at_the_start_are_refused(tmp_path):
+    """What is wider than the 2 m between robots, or a floor that is no plane."""
+    text = BOAT.format(**NOTHING)
+    wide = text.replace('size="0.2 0.1 0.05" mass="3"', 'size="0.2 1.01 0.05" mass="3"')
+    box = text.replace('type="plane" size="5 5 1"', 'type="box" size="5 5 0.01" pos="0 0 0.09"')
+    for name, words in ((wide, "'robot_1/hull' of agent 1 overlaps 'robot_2/hull' of agent 2"),
+                        (box, "of agent 1 overlaps 'robot_2/floor' of agent 2")):  # fmt: skip
+        path = tmp_path / "over.xml"
+        path.write_text(name)
+        one = plant_of(RobotFile(path, "x", "u"))
+        one.reset([[0.0, 0.0]])
+        two = plant_of(*[RobotFile(path, "x", "u")] * 2)
+        with pytest.raises(InvalidInput, match="2 m beside it") as caught:
+            two.reset(np.zeros((2, 2)))
+        assert words in str(caught.value)

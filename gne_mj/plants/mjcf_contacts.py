@@ -1,7 +1,7 @@
 """Who touches whom in a fleet of users' robots: each its own parts and what its file brings along.
 
 All files lie in one world. Planes that several of them bring are one floor; whatever else robots
-would touch each other by, they must not touch at the start.
+would touch each other by, they must not overlap at the start.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ def check_apart(
     owners: list[set[int]],
     robots: Sequence[RobotFile],
 ) -> None:
-    """Refuse robots that touch each other, or what only another one's file brings along.
+    """Refuse robots that overlap each other, or what only another one's file brings along.
 
     Args:
         data: with contacts.
@@ -79,7 +79,8 @@ def check_apart(
     Raises:
         InvalidInput: names the geoms and the agents.
     """
-    for one, other in data.contact.geom[: data.ncon].tolist():
+    overlaps = data.contact.dist < 0.0
+    for one, other in data.contact.geom[overlaps].tolist():
         if min(one, other) < 0 or owners[one] & owners[other]:
             continue
         i, j = min(owners[one]), min(owners[other])
@@ -87,6 +88,6 @@ def check_apart(
         raise InvalidInput(
             "agents.file",
             str(robots[i].path),
-            f"at the start '{names[0]}' of agent {i + 1} touches '{names[1]}' of agent {j + 1},"
+            f"at the start '{names[0]}' of agent {i + 1} overlaps '{names[1]}' of agent {j + 1},"
             " 2 m beside it: make its file narrower, or its floor a plane, which all share",
         )
