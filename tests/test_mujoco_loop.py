@@ -20,7 +20,7 @@ from builders import (
 )
 
 import reference
-from gne_mj.errors import EngineError
+from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.plants.mujoco import MujocoPlant, passive_callback
 from gne_mj.plants.native_mujoco import callbacks, offsets
@@ -253,3 +253,10 @@ def test_leaving_the_set_is_seen_at_its_step_and_the_state_before_it_is_kept():
         assert np.all(system.game.constraints(recorded.state[:, :, 1]) < 0)
         again = loop.advance(5, 1)
         assert len(again.input) == 0
+
+
+def test_masses_that_mujoco_does_not_take_are_refused_in_one_sentence():
+    agents = robot_system(robot_state(FIVE), {**EQUAL, "main_mass": [1e-16] * 5}).agents
+    with pytest.raises(InvalidInput, match=r"MuJoCo must compile it: .*mass") as caught:
+        MujocoPlant(agents, 0.01)
+    assert "\n" not in str(caught.value)
