@@ -125,6 +125,12 @@ def test_files_of_one_fleet_with_different_flags_are_refused(tmp_path):
             plant_of(first, second)
 
 
+def test_the_automatic_reset_is_off_whatever_files_say(tmp_path):
+    flags = ('<flag autoreset="disable"/>', '<flag autoreset="enable"/>')
+    plant = plant_of(*[boat(tmp_path, f"{k}.xml", flags=flag) for k, flag in enumerate(flags)])
+    assert plant.model.opt.disableflags == mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
 def test_a_scenarios_clock_stands_above_a_files(tmp_path):
     clocks = ('timestep="0.1" integrator="implicit"', 'timestep="0.2"')
     robots = [boat(tmp_path, f"{k}.xml", option=clock) for k, clock in enumerate(clocks)]

@@ -26,7 +26,7 @@ WORDS = {
 
 
 def read(path: Path) -> Any:
-    """The file's ``mujoco.MjSpec``, without keyframes.
+    """The file's ``mujoco.MjSpec``, without keyframes and with MuJoCo's automatic reset off.
 
     Raises:
         InvalidInput: it cannot be read or compiled, has a number that is not finite, or a setting
@@ -43,7 +43,9 @@ def read(path: Path) -> Any:
     if spec.compiler.settotalmass > 0:
         raise _refusal(path, "settotalmass would be that of the fleet: scale its masses instead")
     if spec.option.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-        raise _refusal(path, "who sleeps is not part of MuJoCo's state: leave the flag 'sleep' out")
+        raise _refusal(path, "MuJoCo's state does not say who sleeps: leave the flag 'sleep' out")
+    # a state that is not a number must be seen, not be reset
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     for key in list(spec.keys):
         spec.delete(key)
     return spec

@@ -260,8 +260,6 @@ def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], i
         memory += max(spec.memory, 0)
         place = (0.0, SPACING * i, 0.0)
         mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
-    # a state that is not a number must be seen, not be reset
-    world.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     return world, sizes, memory
 
 
