@@ -88,6 +88,22 @@ def test_a_late_control_acts_after_exactly_its_delay(tmp_path, pieces):
     assert np.ptp(inputs) > 0.1
 
 
+def test_plants_and_environments_find_late_controls_as_loops_do(tmp_path):
+    """v+ = v + h u(t - 4 h) / m by Euler."""
+    agents = carts(tmp_path, mast="")
+    plant, other = (MjcfPlant(agents, H, "euler") for _ in range(2))
+    plant.reset(agents.equilibrium(START))
+    physics = FleetPhysics(other, velocity_game(3, V0, 3.0), agents.equilibrium(START))
+    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (300, 3))
+    expected = START + np.cumsum(H / 3.0 * np.concatenate([np.zeros((4, 3)), inputs[:-4]]), axis=0)
+    for u, y in zip(inputs, expected, strict=True):
+        plant.step(u)
+        physics.set_control(u)
+        physics.step()
+        assert np.allclose(plant.output, y, rtol=0, atol=1e-12)
+        assert np.array_equal(physics.output, plant.output)
+
+
 @pytest.mark.parametrize("lag", ["", FILTER])
 def test_an_environment_goes_back_to_the_whole_state(tmp_path, lag):
     agents = carts(tmp_path, lag=lag)

@@ -21,7 +21,6 @@ from gne_mj.plants.native_mujoco import (
     STATE,
     USERDATA_HEADER,
     Offsets,
-    call,
     call_state,
     callbacks,
     check_warnings,
@@ -30,6 +29,7 @@ from gne_mj.plants.native_mujoco import (
     state_functions,
     step_address,
     table_of,
+    timed_step,
 )
 from gne_mj.table import Table, integers
 
@@ -87,11 +87,11 @@ def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
         nq, nv, na = sizes[NQ], sizes[NV], sizes[NA]
         qpos, qvel = field(data, at.qpos, nq), field(data, at.qvel, nv)
         act = field(data, at.act, na)
-        for step in range(steps + 1):
-            if step > 0 or steps == 0:
+        for taken in range(steps + 1):
+            if taken > 0 or steps == 0:
                 call_state(functions[0], model, data, before.ctypes.data, functions[2])
-            if step > 0:
-                call(mj_step, model, data)
+            if taken > 0:
+                timed_step(at, mj_step, model, data)
             fleet.refresh(model, data, table)
             fleet.gather(at, data, table, state)
             for r in range(len(y)):

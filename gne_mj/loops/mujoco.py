@@ -65,6 +65,7 @@ from gne_mj.plants.native_mujoco import (
     state_functions,
     step_address,
     table_of,
+    timed_step,
 )
 from gne_mj.table import Table, integers
 
@@ -196,9 +197,7 @@ def build(
         while done < count:
             save(functions, model, data, saved[0])
             if not moving:
-                # to the bit that of the step, by which late controls are found in their history
-                set_number(data, at.time, (step + done) * h)
-                call(mj_step, model, data)
+                timed_step(at, mj_step, model, data)
                 if monitor[watch.EXIT] != watch.INSIDE:
                     restore(functions, model, data, saved[0])
                     break

@@ -5,10 +5,8 @@ therefore found by stepping a second mjData from the same state; it bears no mar
 callback of a loop acts on it.
 """
 
-import numpy as np
-
 from gne_mj.native import kernel
-from gne_mj.plants.native_mujoco import call, call_state, field, number, set_number
+from gne_mj.plants.native_mujoco import call, call_state, field, timed_step
 from gne_mj.table import integers
 
 # Of a fleet's table (see gne_mj.plants.mujoco): where the robots' numbers are, and sizes
@@ -72,10 +70,8 @@ def predict(context, agent, channels, clock, state, u, out, trial, scratch):
     ctrl = field(twin, at.ctrl, sizes[NU])
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]
-    first = np.rint(number(data, at.time) / clock.h)
-    for step in range(clock.period):
-        set_number(twin, at.time, (first + step) * clock.h)  # as the loop does
-        call(sizes[MJ_STEP], model, twin)
+    for _ in range(clock.period):
+        timed_step(at, sizes[MJ_STEP], model, twin)
     if sizes[MJ_FORWARD] != 0:  # sensors are of the last step's start
         call(sizes[MJ_FORWARD], model, twin)
     gather(at, twin, table, trial)

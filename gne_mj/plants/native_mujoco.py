@@ -71,7 +71,7 @@ class Offsets(NamedTuple):
 # two have the same address
 _PROBE = """
 <mujoco>
-  <size nuserdata="7"/>
+  <size nuserdata="7919"/>
   <worldbody>
     <camera/><light/>
     <body mocap="true"><geom size="1"/></body>
@@ -98,7 +98,7 @@ def offsets() -> Offsets:
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
     _check_arrays(data)
-    if ctypes.c_int64.from_address(model._address + 8 * result.nuserdata).value != 7:
+    if ctypes.c_int64.from_address(model._address + 8 * result.nuserdata).value != 7919:
         raise unknown_layout("mjModel.nuserdata")
     for struct, name, address in (
         (data, "time", data._address + 8 * result.time),
@@ -257,6 +257,17 @@ def step_address(function: str = "mj_step") -> int:
         library = ctypes.CDLL(str(path))
         return ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0
     raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
+
+
+@kernel
+def timed_step(at, mj_step, model, data):
+    """One step of MuJoCo from a time that is its multiple to the bit, given addresses.
+
+    By these times late controls are found in their history; a sum of steps would miss them.
+    """
+    h = number(model, at.timestep)
+    set_number(data, at.time, np.rint(number(data, at.time) / h) * h)
+    call(mj_step, model, data)
 
 
 @kernel
