@@ -44,6 +44,7 @@ FORCES = [
     ('<motor name="u" joint="x"/>', "x", 1.0),
     ('<motor name="u" joint="x" gear="-4"/>', "x", 1.0),
     ('<general name="u" joint="x" gainprm="5" gear="0.5"/>', "x", 1.0),
+    ('<general name="u" joint="x" gaintype="affine" gainprm="5 0 0" gear="2"/>', "x", 1.0),
     ('<motor name="u" jointinparent="x" gear="7"/>', "x", 1.0),
     ('<motor name="u" joint="x" gear="10"/>', "own", 10.0),
     ('<motor name="u" tendon="cable" gear="3"/>', "winding", 2.0),

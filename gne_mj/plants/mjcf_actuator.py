@@ -35,11 +35,12 @@ def no_force(model: mujoco.MjModel, actuator: int) -> str:
         for kind, name in ((_GAIN, "gain"), (_BIAS, "bias"), (_DYN, "dyn"), (_TRN, "trn"))
     )
     constant, stiffness, damping = model.actuator_biasprm[actuator, :3]
+    varies = gain == _GAIN.mjGAIN_AFFINE and np.any(model.actuator_gainprm[actuator, 1:3])
     if model.actuator_plugin[actuator] >= 0:
         return "it is a plug-in's"
     if trn in _TRANSMISSIONS or trn not in (*_ALONG, _TRN.mjTRN_SITE):
         return f"it acts by {_TRANSMISSIONS.get(trn, 'a transmission of its own')}"
-    if gain != _GAIN.mjGAIN_FIXED:
+    if varies or gain not in (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE):
         return _GAINS.get(gain, "its gain is user code's")
     if bias not in (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE):
         return "its bias force is no number"
