@@ -1,7 +1,6 @@
 """The closed loop in MuJoCo against independent integrations of the ODE."""
 
 import ctypes
-from itertools import chain, repeat
 
 import mujoco
 import numpy as np
@@ -21,7 +20,7 @@ from builders import (
 )
 
 import reference
-from gne_mj.errors import EngineError
+from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.plants.mujoco import MujocoPlant, passive_callback
 from gne_mj.plants.native_mujoco import callbacks, offsets
@@ -233,20 +232,6 @@ def test_a_copy_of_the_data_goes_on_by_itself():
     assert np.array_equal(copy.qvel, loop.plant.data.qvel)
 
 
-def test_wrong_offsets_are_refused(monkeypatch):
-    from gne_mj.plants import native_mujoco
-
-    right = native_mujoco._find
-    native_mujoco.offsets.cache_clear()
-    shift = chain([0, 1], repeat(0))
-    monkeypatch.setattr(native_mujoco, "_find", lambda s, w: right(s, w) + next(shift))
-    with pytest.raises(EngineError, match="elsewhere than expected"):
-        native_mujoco.offsets()
-    monkeypatch.undo()
-    native_mujoco.offsets.cache_clear()
-    assert native_mujoco.offsets().qvel > 0
-
-
 def test_leaving_the_set_is_seen_at_its_step_and_the_state_before_it_is_kept():
     state = robot_state(FIVE, appendage=FIVE - 9.0 * np.array([1, 0, 0, 0, 0]))
     for engine in ("mujoco", "ode"):
@@ -268,3 +253,10 @@ def test_leaving_the_set_is_seen_at_its_step_and_the_state_before_it_is_kept():
         assert np.all(system.game.constraints(recorded.state[:, :, 1]) < 0)
         again = loop.advance(5, 1)
         assert len(again.input) == 0
+
+
+def test_masses_that_mujoco_does_not_take_are_refused_in_one_sentence():
+    agents = robot_system(robot_state(FIVE), {**EQUAL, "main_mass": [1e-16] * 5}).agents
+    with pytest.raises(InvalidInput, match=r"MuJoCo must compile it: .*mass") as caught:
+        MujocoPlant(agents, 0.01)
+    assert "\n" not in str(caught.value)

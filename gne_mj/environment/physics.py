@@ -11,20 +11,25 @@ from dm_control.rl import control
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.game import Game
-from gne_mj.native import compiled, copy, source_key
+from gne_mj.native import compiled, source_key
 from gne_mj.plain import raise_pending
+from gne_mj.plants import mjcf_file
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import NA, NQ, NV, SIZES, MujocoPlant
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
+    STATE,
     USERDATA_HEADER,
     Offsets,
-    call,
+    call_state,
     callbacks,
+    check_warnings,
     field,
     offsets,
+    state_functions,
     step_address,
     table_of,
+    timed_step,
 )
 from gne_mj.table import Table, integers
 
@@ -69,11 +74,12 @@ def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
     source = source_key(fleet, fleet.AGENT, game)
 
     @compiled
-    def advance(mj_step, mj_forward, model, data, data_of_game, steps, before, state, y, g):
-        """Take up to ``steps`` steps; return how many, and INSIDE, DIVERGED or a constraint.
+    def advance(mj_step, functions, model, data, data_of_game, steps, before, state, y, g):
+        """Take up to ``steps`` steps; return INSIDE, DIVERGED or the constraint that ended them.
 
-        ``before`` becomes qpos, qvel and act at the last step's start; state, y and g become those
-        at its end. With no steps the present is looked at.
+        ``before`` becomes MuJoCo's state at the last step's start (``functions`` are as
+        ``state_functions()`` has them); state, y and g become those at its end. With no steps the
+        present is looked at.
         """
         _ = source
         table = abs(table_of(at, model, data))
@@ -81,15 +87,12 @@ def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
         nq, nv, na = sizes[NQ], sizes[NV], sizes[NA]
         qpos, qvel = field(data, at.qpos, nq), field(data, at.qvel, nv)
         act = field(data, at.act, na)
-        for step in range(steps + 1):
-            if step > 0 or steps == 0:
-                copy(qpos, before[:nq])
-                copy(qvel, before[nq : nq + nv])
-                copy(act, before[nq + nv :])
-            if step > 0:
-                call(mj_step, model, data)
-            if mj_forward != 0:  # sensors are of the last step's start
-                call(mj_forward, model, data)
+        for taken in range(steps + 1):
+            if taken > 0 or steps == 0:
+                call_state(functions[0], model, data, before.ctypes.data, functions[2])
+            if taken > 0:
+                timed_step(at, mj_step, model, data)
+            fleet.refresh(model, data, table)
             fleet.gather(at, data, table, state)
             for r in range(len(y)):
                 y[r] = state[r * states + output]
@@ -103,8 +106,8 @@ def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
                     if not np.isfinite(array[r]):
                         found = DIVERGED
             if found != INSIDE:
-                return step, found
-        return steps, INSIDE
+                return found
+        return INSIDE
 
     return advance
 
@@ -133,13 +136,11 @@ class FleetPhysics(control.Physics):
         at, kernels = offsets(), plant.kernels
         self._advance = build(at, kernels, game.kernels)
         self._table = Table(plant.table_arrays)
-        self._forward = 0 if plant.measures_every_stage else step_address("mj_forward")
         m, model = game.actions, plant.model
         places = plant.places.ravel()
         self._actuators = np.array([kernels.actuator_of(places, r) for r in range(m)])
         self._inputs = np.zeros(m)
-        self._before = np.zeros(model.nq + model.nv + model.na)
-        self._before_time = 0.0
+        self._before = np.zeros(mujoco.mj_stateSize(model, STATE))
         self._state = np.zeros(m * plant.agents.states)
         self._y, self._g = np.zeros(m), np.zeros(game.constraints_count)
         self.joints = _joints(plant)
@@ -206,11 +207,8 @@ class FleetPhysics(control.Physics):
 
     def restore(self) -> None:
         """Back to the start of the last integration step; the exit that it led to stays noted."""
-        left, data, nq, nv = self.exit, self.plant.data, self.model.nq, self.model.nv
-        data.qpos[:] = self._before[:nq]
-        data.qvel[:] = self._before[nq : nq + nv]
-        data.act[:] = self._before[nq + nv :]
-        data.time = self._before_time
+        left = self.exit
+        mujoco.mj_setState(self.model, self.data, self._before, STATE)
         self.exit = None
         self._look(0)
         if left is not None:
@@ -220,15 +218,14 @@ class FleetPhysics(control.Physics):
         data = self.plant.data
         data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
         data.ctrl[self._actuators] = self._inputs
-        began = data.time
         with callbacks(passive=self.plant.passive):
-            taken, found = self._advance(
-                step_address(), self._forward, self.model._address, data._address, self.game.data,
-                steps, self._before, self._state, self._y, self._g,
+            found = self._advance(
+                step_address(), state_functions(), self.model._address, data._address,
+                self.game.data, steps, self._before, self._state, self._y, self._g,
             )  # fmt: skip
         raise_pending()
-        if taken > 0:
-            self._before_time = began + (taken - 1) * self.timestep()
+        if found == INSIDE:
+            check_warnings(data)
         if found == DIVERGED:
             self.exit = Exit(self.time(), "", np.nan, restored=False)
         elif found != INSIDE:
@@ -246,7 +243,7 @@ def _joints(plant: MujocoPlant | MjcfPlant) -> list[list[slice]]:
         return []
     parts, at = [], np.zeros(3, dtype=int)
     for robot in plant.agents.robots:
-        alone = mujoco.MjSpec.from_file(str(robot.path)).compile()
+        alone = mjcf_file.alone(robot.path)
         ends = at + np.array([alone.nq, alone.nv, alone.na])
         parts.append([slice(int(a), int(b)) for a, b in zip(at, ends, strict=True)])
         at = ends

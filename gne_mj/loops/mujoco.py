@@ -51,16 +51,21 @@ from gne_mj.plants.native_mujoco import (
     CALLBACK,
     LOOP_MARK,
     MARK,
+    STATE,
     USERDATA_HEADER,
     Offsets,
     address_of,
     call,
+    call_state,
     callbacks,
+    check_warnings,
     field,
     offsets,
     set_number,
+    state_functions,
     step_address,
     table_of,
+    timed_step,
 )
 from gne_mj.table import Table, integers
 
@@ -77,21 +82,15 @@ def split(rest, steps):
 
 
 @kernel
-def save(kept, row):
-    """Copy arrays into a row, one behind the other."""
-    at = 0
-    for part in kept:
-        copy(part, row[at : at + len(part)])
-        at += len(part)
+def save(functions, model, data, row):
+    """Keep what a step of MuJoCo starts from; functions as ``state_functions()`` has them."""
+    call_state(functions[0], model, data, row.ctypes.data, functions[2])
 
 
 @kernel
-def restore(row, kept):
+def restore(functions, model, data, row):
     """The way back."""
-    at = 0
-    for part in kept:
-        copy(row[at : at + len(part)], part)
-        at += len(part)
+    call_state(functions[1], model, data, row.ctypes.data, functions[2])
 
 
 @cache
@@ -175,13 +174,13 @@ def build(
         law.rate(problem_in(table), seen, memory, rates)
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
-    def advance(mj_step, model, data, kept, saved, count):
+    def advance(mj_step, functions, model, data, saved, count):
         """So many steps; an exit sets what MuJoCo moves back to the start of the step it is of.
 
         Args:
             mj_step, model, data: addresses.
-            kept: views of all that a step of MuJoCo starts from.
-            saved: (2, their entries), for the starts of a piece of a step and of the step.
+            functions: see :func:`save`.
+            saved: (2, entries of such a state), at the start of a piece of a step and of the step.
             count: steps.
         """
         _ = source
@@ -196,11 +195,11 @@ def build(
         step, done, h = np.int64(userdata[start + STEP_NOW]), 0, clock.h
         divided[division.KNOWN] = division.NOTHING
         while done < count:
-            save(kept, saved[0])
+            save(functions, model, data, saved[0])
             if not moving:
-                call(mj_step, model, data)
+                timed_step(at, mj_step, model, data)
                 if monitor[watch.EXIT] != watch.INSIDE:
-                    restore(saved[0], kept)
+                    restore(functions, model, data, saved[0])
                     break
                 done += 1
                 continue
@@ -212,7 +211,7 @@ def build(
             call(mj_step, model, data)
             good = monitor[watch.EXIT] == watch.INSIDE
             if not good and monitor[watch.EXIT_STAGE] == 0.0:
-                restore(saved[0], kept)
+                restore(functions, model, data, saved[0])
                 break
             if good:
                 fleet.refresh(model, data, table)
@@ -227,12 +226,12 @@ def build(
                 if division.go_on(divided, h, monitor):
                     step, done = step + 1, done + 1
             else:
-                restore(saved[0], kept)
+                restore(functions, model, data, saved[0])
                 if divided[division.POSITION] == 0.0:
                     copy(saved[0], saved[1])
                 if not division.halve(divided, monitor):
                     division.give_up(faults, step, h, which, problem, work, monitor)
-                    restore(saved[1], kept)
+                    restore(functions, model, data, saved[1])
                     break
             userdata[start + STEP_NOW] = step
             userdata[start + STAGE_NOW] = 0.0
@@ -305,8 +304,7 @@ class MujocoLoop(ClosedLoop):
         self._memory = put_start(data, self._start, self._table, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._remembers = moved  # by MuJoCo's integrator
-        self._kept = kept_of(data)
-        self._saved = np.zeros((2, sum(part.size for part in self._kept)))
+        self._saved = room_for_states(plant.model)
         self.monitor, self._u, *_ = parts_of(data.userdata, self._start, sizes)
 
     @property
@@ -320,7 +318,11 @@ class MujocoLoop(ClosedLoop):
         return self._step * self.plant.timestep
 
     def advance(self, samples: int, every: int) -> Samples:
-        """See the base class."""
+        """See the base class.
+
+        Raises:
+            EngineError: MuJoCo has left out contacts or constraints.
+        """
         if self.monitor[watch.EXIT] != watch.INSIDE:
             samples = 0
         data, first = self.plant.data, self._step
@@ -329,13 +331,15 @@ class MujocoLoop(ClosedLoop):
         remember = self._remember if self._remembers else None
         with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
             steps = self._advance(
-                step_address(), self.plant.model._address, data._address, self._kept, self._saved,
-                samples * every,
+                step_address(), state_functions(), self.plant.model._address, data._address,
+                self._saved, samples * every,
             )  # fmt: skip
         # The callback counts steps, but one that ended in an exit was not taken.
         data.userdata[self._start + STEP_NOW] = first + steps
         data.userdata[self._start + RECORDER] = 0.0
         data.time = self.time
+        if self.monitor[watch.EXIT] == watch.INSIDE:
+            check_warnings(data)
         return recorder.samples(0)
 
     def finish(self) -> Samples:
@@ -405,11 +409,9 @@ def observe(plant: "MujocoPlant | MjcfPlant", control: Any, start: int) -> None:
     data.userdata[start + STEP_NOW], data.userdata[start + STAGE_NOW] = step, 0.0
 
 
-def kept_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
-    """Views of all that a step of MuJoCo starts from, besides time, inputs and userdata."""
-    return (
-        data.qpos, data.qvel, data.act, data.qacc_warmstart, data.history, data.plugin_state
-    )  # fmt: skip
+def room_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Two rows for what a step of MuJoCo starts from."""
+    return np.zeros((2, mujoco.mj_stateSize(model, STATE)))
 
 
 def put_start(

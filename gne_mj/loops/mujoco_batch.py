@@ -15,11 +15,17 @@ from numpy.typing import NDArray
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
 from gne_mj.loops.layout import MEMORY, MODE, MONITOR, RECORDER, STEP
-from gne_mj.loops.mujoco import build, kept_of, observe, put_start
+from gne_mj.loops.mujoco import build, observe, put_start, room_for_states
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.recorder import FIRST
 from gne_mj.plants.mujoco import ROOM, SIZES
-from gne_mj.plants.native_mujoco import callbacks, offsets, step_address
+from gne_mj.plants.native_mujoco import (
+    callbacks,
+    check_warnings,
+    offsets,
+    state_functions,
+    step_address,
+)
 from gne_mj.table import Table
 
 if TYPE_CHECKING:
@@ -76,6 +82,7 @@ class MujocoBatch(BatchLoop):
                     fleet.advance(self._advance, min(STRIDE, span.steps - done))
                     if userdata[first + watch.EXIT] != watch.INSIDE:
                         break
+                    check_warnings(fleet.plant.data)
                 recorder.blocks[run, FIRST] = span.last
                 observe(fleet.plant, self._control, self._start)
                 monitors[run] = userdata[first : first + monitors.shape[1]]
@@ -97,8 +104,7 @@ class _Fleet:
 
     def __init__(self, plant: "MujocoPlant | MjcfPlant") -> None:
         self.plant = plant
-        self._kept = kept_of(plant.data)
-        self._saved = np.zeros((2, sum(part.size for part in self._kept)))
+        self._saved = room_for_states(plant.model)
         self._parameters = plant.agents.parameters
 
     def begin(self, case: Case, table: Table, start: int) -> NDArray[np.float64]:
@@ -117,4 +123,4 @@ class _Fleet:
     def advance(self, advance: Any, steps: int) -> None:
         """So many steps on."""
         model, data = self.plant.model._address, self.plant.data._address
-        advance(step_address(), model, data, self._kept, self._saved, steps)
+        advance(step_address(), state_functions(), model, data, self._saved, steps)

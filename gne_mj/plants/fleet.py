@@ -85,6 +85,9 @@ def compile_model(
         userdata: entries of mjData's ``userdata``.
         memory: entries of ``act`` for a law's memory; an actuator without any force, ``memory``,
             holds them, and its rates come from a callback.
+
+    Raises:
+        InvalidInput: numbers that MuJoCo does not take, as a mass below its least.
     """
     if memory:
         lane.actuator.add(
@@ -94,7 +97,11 @@ def compile_model(
     lane.option.timestep = timestep
     lane.option.integrator = integrator
     lane.size.nuserdata = userdata
-    return mujoco.MjModel.from_xml_string(lane.to_xml_string())
+    try:
+        return mujoco.MjModel.from_xml_string(lane.to_xml_string())
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise InvalidInput("agents", "...", f"MuJoCo must compile it: {said}") from None
 
 
 def read_model(name: str) -> str:

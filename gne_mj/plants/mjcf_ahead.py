@@ -5,17 +5,17 @@ therefore found by stepping a second mjData from the same state; it bears no mar
 callback of a loop acts on it.
 """
 
-from gne_mj.native import copy, kernel
-from gne_mj.plants.native_mujoco import call, field
+from gne_mj.native import kernel
+from gne_mj.plants.native_mujoco import call, call_state, field, timed_step
 from gne_mj.table import integers
 
 # Of a fleet's table (see gne_mj.plants.mujoco): where the robots' numbers are, and sizes
 PLACES, _, SIZES = range(3)
-NQ, NV, NU, _, NA = range(5)
-SENSORDATA, TWIN, MJ_STEP, MJ_FORWARD = range(7, 11)  # more entries of SIZES
+NQ, NV, NU = range(3)
+SENSORDATA, TWIN, MJ_STEP, MJ_FORWARD, MJ_COPY, KNOWN = range(7, 13)  # more entries of SIZES
 # Addresses of the functions that sensors of velocities need, in their order
 SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
-FIRST_OF_SENSORS, LAST_OF_SENSORS = 11, 13
+FIRST_OF_SENSORS, LAST_OF_SENSORS = 13, 15
 
 # A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
 # one, the joint's entry of qpos or -1, the actuator's of ctrl
@@ -66,16 +66,12 @@ def predict(context, agent, channels, clock, state, u, out, trial, scratch):
     at, model, data, table = context
     sizes, places = integers(table, SIZES), integers(table, PLACES)
     twin = sizes[TWIN]
-    copy(field(data, at.qpos, sizes[NQ]), field(twin, at.qpos, sizes[NQ]))
-    copy(field(data, at.qvel, sizes[NV]), field(twin, at.qvel, sizes[NV]))
-    copy(field(data, at.act, sizes[NA]), field(twin, at.act, sizes[NA]))
-    warm = field(data, at.qacc_warmstart, sizes[NV])
-    copy(warm, field(twin, at.qacc_warmstart, sizes[NV]))
+    call_state(sizes[MJ_COPY], model, data, twin, sizes[KNOWN])
     ctrl = field(twin, at.ctrl, sizes[NU])
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]
     for _ in range(clock.period):
-        call(sizes[MJ_STEP], model, twin)
+        timed_step(at, sizes[MJ_STEP], model, twin)
     if sizes[MJ_FORWARD] != 0:  # sensors are of the last step's start
         call(sizes[MJ_FORWARD], model, twin)
     gather(at, twin, table, trial)

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.native import kernel
-from gne_mj.plants import mjcf_ahead, mjcf_robot
+from gne_mj.plants import mjcf_ahead, mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import read_model
+from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_ahead import (
     ACTUATOR,
     OUTPUT_AT,
@@ -23,12 +24,15 @@ from gne_mj.plants.mjcf_ahead import (
     gather,
     refresh,
 )
+from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, run_steps
 from gne_mj.plants.native_mujoco import (
+    KNOWN_STATE,
     PLANT_MARK,
     USERDATA_HEADER,
     callbacks,
+    quiet,
     step_address,
 )
 from gne_mj.table import Table
@@ -36,6 +40,8 @@ from gne_mj.table import Table
 __all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
+SENSOR = mujoco.mjtSensor
+VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
 
 AGENT, AHEAD = mjcf_robot, mjcf_ahead
 
@@ -49,9 +55,11 @@ def stored(channels, state, userdata):
 class MjcfPlant(Plant):
     """A fleet of the user's own robots in MuJoCo.
 
-    Each file's bodies are attached to one world, side by side; all must have one gravity and the
-    same flags; contacts are between a robot's own geoms and whatever its file brings along. A fleet
-    starts from the models' reference pose at the given outputs.
+    Each file's bodies are attached to one world, side by side; all must have the same options
+    (gravity, density, flags and so on); contacts are between a robot's own geoms and whatever its
+    file brings along, a floor that several bring being one. A fleet starts from the models'
+    reference pose at the given outputs. An input is the force of its actuator, gain and gear
+    divided out.
 
     Args:
         agents: which robots.
@@ -65,8 +73,8 @@ class MjcfPlant(Plant):
         model, data: MuJoCo's own.
 
     Raises:
-        InvalidInput: a file that MuJoCo cannot read, a name that it does not have, or an actuator
-            that would clamp inputs that the agents' limit allows.
+        InvalidInput: a file that MuJoCo cannot read, a name that it does not have, an actuator
+            that is no force, or that would clamp inputs that the agents' limit allows.
     """
 
     passive = None
@@ -83,7 +91,7 @@ class MjcfPlant(Plant):
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
-        world = _world(agents.robots)
+        world, sizes_of_robots, memory_asked = _world(agents.robots)
         world.option.timestep = timestep
         world.option.integrator = getattr(
             mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS[integrator].upper()}"
@@ -91,11 +99,15 @@ class MjcfPlant(Plant):
         world.nuserdata = USERDATA_HEADER + userdata
         if memory:
             _add_memory(world, memory)
-        try:
-            self.model = world.compile()
-        except ValueError as error:
-            raise InvalidInput("agents.file", "...", f"MuJoCo must compile it: {error}") from None
+        self.model = mjcf_file.compiled(world, "...")
+        if memory_asked > self.model.narena:
+            world.memory = memory_asked
+            self.model = mjcf_file.compiled(world, "...")
         self.data = mujoco.MjData(self.model)
+        with quiet():
+            mujoco.mj_fwdPosition(self.model, self.data)
+        self._owners = owners_of(self.model, sizes_of_robots)
+        share_floors(self.model, self.data, self._owners)
         self.places = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -105,6 +117,7 @@ class MjcfPlant(Plant):
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
             model.na - memory, model.nsensordata, self._twin._address, step_address(),
             0 if self.measures_every_stage else step_address("mj_forward"),
+            step_address("mj_copyState"), KNOWN_STATE,
             *(step_address(name) for name in SENSOR_FUNCTIONS),
         )  # fmt: skip
         self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
@@ -138,21 +151,14 @@ class MjcfPlant(Plant):
         if actuator < 0:
             names = _names(model, "actuator", prefix)
             raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
-        self._check_limit(i, robot, actuator)
-        if sensor >= 0:
-            kind = mujoco.mjtSensor(model.sensor_type[sensor])
-            if kind == mujoco.mjtSensor.mjSENS_JOINTVEL:
-                joint = int(model.sensor_objid[sensor])
-            elif kind in (
-                mujoco.mjtSensor.mjSENS_TENDONVEL,
-                mujoco.mjtSensor.mjSENS_ACTUATORVEL,
-            ):
-                return -1 - int(model.sensor_adr[sensor]), -1, actuator
-            else:
-                raise InvalidInput(
-                    "agents.output", robot.output, "a sensor must be jointvel, tendonvel or"
-                    " actuatorvel",
-                )  # fmt: skip
+        kind = _check_sensor(model, robot, sensor) if sensor >= 0 else None
+        own = kind == SENSOR.mjSENS_ACTUATORVEL and model.sensor_objid[sensor] == actuator
+        self._check_limit(i, robot, make_force(model, self.data, robot, actuator, own_velocity=own))
+        ctrl = int(model.actuator_ctrladr[actuator])
+        if kind is not None:
+            if kind != SENSOR.mjSENS_JOINTVEL:
+                return -1 - int(model.sensor_adr[sensor]), -1, ctrl
+            joint = int(model.sensor_objid[sensor])
         if joint < 0:
             names = [*_names(model, "joint", prefix), *_names(model, "sensor", prefix)]
             raise InvalidInput("agents.output", robot.output, nearest(robot.output, names))
@@ -161,23 +167,19 @@ class MjcfPlant(Plant):
             mujoco.mjtJoint.mjJNT_HINGE,
         ):
             raise InvalidInput("agents.output", robot.output, "it must be a slide or a hinge joint")
-        return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint]), actuator
+        return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint]), ctrl
 
-    def _check_limit(self, i: int, robot: RobotFile, actuator: int) -> None:
+    def _check_limit(self, i: int, robot: RobotFile, least: float) -> None:
         """MuJoCo clamps silently; what the law asks for must not be changed unseen."""
-        model, limit = self.model, float(self.agents.input_limit[i])
-        ranges = []
-        if model.actuator_ctrllimited[actuator]:
-            ranges.append(model.actuator_ctrlrange[actuator])
-        if model.actuator_forcelimited[actuator]:
-            gain = model.actuator_gainprm[actuator, 0] or 1.0
-            ranges.append(np.sort(model.actuator_forcerange[actuator] / gain))
-        least = min((min(-low, high) for low, high in ranges), default=np.inf)
-        if limit > least:
+        if least <= 0:
+            raise InvalidInput(
+                "agents.input", robot.input, "its ranges must leave forces of both signs"
+            )
+        if self.agents.input_limit[i] > least:
             raise InvalidInput(
                 "agents.input_limit",
-                limit,
-                f"actuator '{robot.input}' of agent {i + 1} clamps its input: give a limit of at"
+                float(self.agents.input_limit[i]),
+                f"actuator '{robot.input}' of agent {i + 1} clamps its force: give a limit of at"
                 f" most {least:g}",
             )
 
@@ -191,8 +193,9 @@ class MjcfPlant(Plant):
     def refresh(self) -> None:
         """Bring sensors of velocities up to date, which are of the last step's start."""
         if not self.measures_every_stage:
-            for name in SENSOR_FUNCTIONS:
-                getattr(mujoco, name)(self.model, self.data)
+            with quiet():
+                for name in SENSOR_FUNCTIONS:
+                    getattr(mujoco, name)(self.model, self.data)
 
     @property
     def output_joints(self) -> NDArray[np.int64]:
@@ -221,7 +224,9 @@ class MjcfPlant(Plant):
             self.data.qvel[column] = 1.0
             slopes[:, column] = self.state[:, 0]
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
-        mujoco.mj_forward(self.model, self.data)
+        with quiet():
+            mujoco.mj_forward(self.model, self.data)
+        check_apart(self.model, self.data, self._owners, self.agents.robots)
         missed = np.abs(self.state[:, 0] - state[:, 0])
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
@@ -238,32 +243,45 @@ class MjcfPlant(Plant):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
 
 
-def _world(robots: tuple[RobotFile, ...]) -> Any:
+def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:
+    """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
     floor, across = world.geom("floor"), 0.5 * SPACING * (len(robots) - 1)
     floor.pos[1], floor.size[1] = across, floor.size[1] + across
+    for path in dict.fromkeys(robot.path for robot in robots):
+        mjcf_file.alone(path)  # which finds what is wrong with it
+    sizes, memory = [], 0
     for i, robot in enumerate(robots):
-        try:
-            spec = mujoco.MjSpec.from_file(str(robot.path))
-        except (ValueError, OSError) as error:
-            raise InvalidInput(
-                "agents.file", str(robot.path), f"MuJoCo must read it: {error}"
-            ) from None
-        for name in ("gravity", "disableflags", "enableflags"):
-            own = getattr(spec.option, name)
-            if i == 0:
-                setattr(world.option, name, own)
-            elif np.any(own != getattr(world.option, name)):
-                raise InvalidInput(
-                    "agents.file", str(robot.path), f"its {name} must be that of the first file"
-                )
-        for key in list(spec.keys):
-            spec.delete(key)
-        frame = world.worldbody.add_frame(pos=[0.0, SPACING * i, 0.0])
-        world.attach(spec, prefix=f"robot_{i + 1}/", frame=frame)
-    # a state that is not a number must be seen, not be reset
-    world.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    return world
+        spec = mjcf_file.read(robot.path)
+        if i == 0:
+            mjcf_file.adopt_options(world, spec)
+        mjcf_file.check_options(world, spec, robot.path)
+        sizes.append(sizes_of(spec))
+        memory += max(spec.memory, 0)
+        place = (0.0, SPACING * i, 0.0)
+        mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
+    return world, sizes, memory
+
+
+def _check_sensor(model: mujoco.MjModel, robot: RobotFile, sensor: int) -> Any:
+    """The sensor's type; refused if it tells no velocity, or not the present one."""
+    kind, expected = SENSOR(model.sensor_type[sensor]), ""
+    if kind not in VELOCITIES:
+        expected = "a sensor must be jointvel, tendonvel or actuatorvel"
+    elif model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SENSOR:
+        expected = "the file's flags switch sensors off: name a joint, or leave the flag out"
+    elif (
+        model.sensor_cutoff[sensor]
+        or model.sensor_delay[sensor]
+        or model.sensor_interval[sensor, 0]
+    ):
+        expected = (
+            "the sensor must tell the velocity as it is: leave out its cutoff, delay and interval,"
+            " and declare a fault 'sensor-delay' instead"
+        )
+    if expected:
+        raise InvalidInput("agents.output", robot.output, expected)
+    return kind
 
 
 def _add_memory(world: Any, memory: int) -> None:

@@ -18,7 +18,7 @@ NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
-INPUT_UNIT = "the actuator's ctrl"
+INPUT_UNIT = "N or N m"
 KNOWS_STORAGE = False
 
 
@@ -30,7 +30,8 @@ class RobotFile:
         path: its MJCF file.
         output: name of the joint (slide or hinge) or of the velocity sensor (jointvel, tendonvel
             or actuatorvel) that is the output y_i.
-        input: name of the actuator that u_i drives; its force should be proportional to ctrl.
+        input: name of the actuator whose force u_i is, at the joint or tendon that it drives; at
+            an ``actuatorvel`` sensor of its own the force before the gear.
     """
 
     path: Path

@@ -21,12 +21,12 @@ from gne_mj.plants.native_mujoco import (
     USERDATA_HEADER,
     Offsets,
     address_of,
-    call,
     callbacks,
     field,
     offsets,
     step_address,
     table_of,
+    timed_step,
 )
 from gne_mj.table import Table, floats, integers
 
@@ -121,13 +121,13 @@ def passive_callback(at: Offsets) -> Any:
 def run_steps() -> Any:
     """The native loop of plain mj_step: (address of mj_step, of the model, of the data, steps)."""
 
-    source = source_key()
+    at, source = offsets(), source_key()
 
     @compiled
     def run(mj_step, model, data, steps):
         _ = source
         for _step in range(steps):
-            call(mj_step, model, data)
+            timed_step(at, mj_step, model, data)
 
     return run
 

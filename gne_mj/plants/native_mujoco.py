@@ -1,9 +1,9 @@
-"""MuJoCo's C side, for compiled code: struct fields, mj_step, and callbacks.
+"""MuJoCo's C side, for compiled code: struct fields, functions, and callbacks.
 
 MuJoCo calls plain C functions ``(const mjModel*, mjData*)`` where it evaluates control and passive
 forces. What such a callback needs is reached through two pointers: a field's offset inside mjData
-is found at start-up by looking for its array's address in the struct's memory and is checked by
-writing and reading back; everything else lies in a table of arrays. ``userdata`` begins with a
+is that of MuJoCo's own declarations (:mod:`gne_mj.plants.c_layout`) and is checked by writing and
+reading back; everything else lies in a table of arrays. ``userdata`` begins with a
 mark that says whose simulation this is, and that table's address. A simulation without the mark is
 left alone.
 """
@@ -24,6 +24,7 @@ from numba.extending import intrinsic
 
 from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word
+from gne_mj.plants.c_layout import arrays, unknown_layout, word_of
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
 ACTIVATION = types.float64(types.voidptr, types.voidptr, types.int32)
@@ -32,6 +33,13 @@ _DYNAMICS = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, 
 _WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
+# What a step of MuJoCo starts from, but the loops' own userdata; and what a law may know of it, to
+# look ahead: not the pushes from outside
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) & ~int(mujoco.mjtState.mjSTATE_USERDATA)
+KNOWN_STATE = STATE & ~int(
+    mujoco.mjtState.mjSTATE_QFRC_APPLIED | mujoco.mjtState.mjSTATE_XFRC_APPLIED
+)
+
 # What userdata begins with. All zero, as after a reset, means "not started".
 MARK, TABLE_ADDRESS, USERDATA_HEADER = range(3)
 # Marks: numbers that nobody else would write there by chance.
@@ -39,7 +47,11 @@ PLANT_MARK, LOOP_MARK = 7.390125461e173, 5.870193424e191
 
 
 class Offsets(NamedTuple):
-    """Where fields lie in MuJoCo's structs, in 8-byte words from the struct's start."""
+    """Where fields lie in MuJoCo's structs, in 8-byte words from the struct's start.
+
+    Attributes:
+        nuserdata: of mjModel, as ``timestep`` of its options; all others are mjData's.
+    """
 
     qpos: int
     qvel: int
@@ -50,71 +62,73 @@ class Offsets(NamedTuple):
     qacc_warmstart: int
     sensordata: int
     userdata: int
-    time: int  # a number in mjData itself
-    nuserdata: int  # in mjModel
-    timestep: int  # mjModel.opt.timestep, a number in mjModel itself
+    time: int
+    nuserdata: int
+    timestep: int
+
+
+# Of its arrays of numbers about those of Offsets none is empty but a plug-in's state, so that no
+# two have the same address
+_PROBE = """
+<mujoco>
+  <size nuserdata="7919"/>
+  <worldbody>
+    <camera/><light/>
+    <body mocap="true"><geom size="1"/></body>
+    <body><joint name="j" type="slide"/><geom size="1"/><site/></body>
+  </worldbody>
+  <tendon><fixed><joint joint="j" coef="1"/></fixed></tendon>
+  <actuator><intvelocity joint="j" delay="0.01" nsample="2"/></actuator>
+  <sensor><jointvel joint="j"/></sensor>
+</mujoco>"""
 
 
 @cache
 def offsets() -> Offsets:
-    """Find and check the offsets in the MuJoCo that is loaded.
+    """The offsets in the MuJoCo that is loaded, checked in it.
 
     Raises:
-        EngineError: a field is not where its address says, so this MuJoCo cannot be driven.
+        EngineError: a field is not where it is declared, so this MuJoCo cannot be driven.
     """
-    size = 7919  # a number that no other size of the probe model has
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><size nuserdata="{size}"/><worldbody><body><joint name="j" type="slide"/>
-        <geom size="1"/></body></worldbody><actuator><intvelocity joint="j"/></actuator>
-        <sensor><jointvel joint="j"/></sensor></mujoco>"""
-    )
-    data = mujoco.MjData(model)
-    names = [name for name in Offsets._fields if name not in ("time", "nuserdata", "timestep")]
-    found = {name: _find(data._address, getattr(data, name).ctypes.data) for name in names}
-    data.time = model.opt.timestep = 0.7919
     result = Offsets(
-        **found,
-        time=_find(data._address, _bits(0.7919)),
-        nuserdata=_find(model._address, size),
-        timestep=_find(model._address, _bits(0.7919)),
+        **{name: word_of("mjData", name) for name in Offsets._fields[:-2]},
+        nuserdata=word_of("mjModel", "nuserdata"),
+        timestep=word_of("mjModel", "opt", "timestep"),
     )
-    read_back = _read_back()
-    for mark, name in enumerate(names, start=1):
-        array = getattr(data, name)
-        array[0] = mark
-        if read_back(data._address, getattr(result, name)) != mark or array[0] != -mark:
-            raise _unknown_layout(f"mjData.{name}")
-    other = mujoco.MjModel.from_xml_string('<mujoco><size nuserdata="6133"/></mujoco>')
-    if ctypes.c_int64.from_address(other._address + 8 * result.nuserdata).value != 6133:
-        raise _unknown_layout("mjModel.nuserdata")
-    ctypes.c_double.from_address(data._address + 8 * result.time).value = 0.25
-    ctypes.c_double.from_address(model._address + 8 * result.timestep).value = 0.5
-    if data.time != 0.25 or model.opt.timestep != 0.5:
-        raise _unknown_layout("mjData.time or mjModel.opt.timestep")
+    model = mujoco.MjModel.from_xml_string(_PROBE)
+    data = mujoco.MjData(model)
+    _check_arrays(data)
+    if ctypes.c_int64.from_address(model._address + 8 * result.nuserdata).value != 7919:
+        raise unknown_layout("mjModel.nuserdata")
+    for struct, name, address in (
+        (data, "time", data._address + 8 * result.time),
+        (model.opt, "timestep", model._address + 8 * result.timestep),
+    ):
+        number = ctypes.c_double.from_address(address)
+        setattr(struct, name, 0.7919)
+        seen, number.value = number.value, 0.25
+        if seen != 0.7919 or getattr(struct, name) != 0.25:
+            raise unknown_layout(name)
     return result
 
 
-def _bits(number: float) -> int:
-    """A double as the 8-byte integer of the same bits."""
-    return int(np.float64(number).view(np.int64))
-
-
-def _unknown_layout(name: str) -> EngineError:
-    return EngineError(
-        f"MuJoCo {mujoco.__version__} keeps {name} elsewhere than expected, so its simulations"
-        " cannot be driven natively"
-    )
-
-
-def _find(struct: int, word: int) -> int:
-    """Index of the first 8-byte word with this content; the struct is known to contain it."""
-    block = 64  # read little past a match: pointers are followed by hundreds of other fields
-    for start in range(0, 2**17, block):
-        words = (ctypes.c_int64 * block).from_address(struct + 8 * start)
-        for index, content in enumerate(words):
-            if content == word:
-                return start + index
-    raise _unknown_layout("a field")
+def _check_arrays(data: mujoco.MjData) -> None:
+    """Write into every array up to the last one of Offsets, and read it back natively."""
+    names = arrays("mjData")
+    names = names[: 1 + max(names.index(name) for name in Offsets._fields if name in names)]
+    read_back = _read_back()
+    for mark, name in enumerate(names, start=1):
+        array = getattr(data, name).reshape(-1)
+        if not array.size:
+            if name in Offsets._fields:
+                raise unknown_layout(f"mjData.{name}")
+            continue
+        at = word_of("mjData", name)
+        if ctypes.c_int64.from_address(data._address + 8 * at).value != array.ctypes.data:
+            raise unknown_layout(f"mjData.{name}")
+        array[0] = mark
+        if read_back(data._address, at) != mark or array[0] != -mark:
+            raise unknown_layout(f"mjData.{name}")
 
 
 @cache
@@ -152,6 +166,18 @@ def field(typingctx: Any, struct: Any, offset: Any, length: Any) -> Any:
 
 
 @intrinsic
+def number(typingctx: Any, struct: Any, offset: Any) -> Any:
+    """The double at an offset in the struct at an address."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = context.get_value_type(types.float64)
+        place = _at_word(context, builder, *arguments)
+        return builder.load(builder.inttoptr(place, kind.as_pointer()))
+
+    return types.float64(types.int64, types.int64), codegen
+
+
+@intrinsic
 def set_number(typingctx: Any, struct: Any, offset: Any, number: Any) -> Any:
     """Set the double at an offset in the struct at an address."""
 
@@ -182,15 +208,45 @@ def call(typingctx: Any, function: Any, model: Any, data: Any) -> Any:
     """Call the C function at an address with two struct addresses."""
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        from llvmlite import ir
-
-        pointer = cgutils.voidptr_t
-        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer])
-        target = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(target, [builder.inttoptr(a, pointer) for a in arguments[1:]])
+        _call(builder, arguments[0], arguments[1:])
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64), codegen
+
+
+@intrinsic
+def call_state(
+    typingctx: Any, function: Any, model: Any, source: Any, target: Any, parts: Any
+) -> Any:
+    """Call mj_getState, mj_setState or mj_copyState at an address.
+
+    Args:
+        function: its address.
+        model, source, target: addresses, in the order that the function has them.
+        parts: bits of mjtState.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        parts = builder.trunc(arguments[4], cgutils.int32_t)
+        _call(builder, arguments[0], arguments[1:4], parts)
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), codegen
+
+
+def _call(builder: Any, function: Any, pointers: Any, *more: Any) -> None:
+    from llvmlite import ir
+
+    pointer = cgutils.voidptr_t
+    kinds = [pointer] * len(pointers) + [value.type for value in more]
+    target = builder.inttoptr(function, ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+    builder.call(target, [builder.inttoptr(a, pointer) for a in pointers] + list(more))
+
+
+@cache
+def state_functions() -> tuple[int, ...]:
+    """What loops take steps back with: addresses of mj_getState and mj_setState, and STATE."""
+    return step_address("mj_getState"), step_address("mj_setState"), STATE
 
 
 @cache
@@ -201,6 +257,17 @@ def step_address(function: str = "mj_step") -> int:
         library = ctypes.CDLL(str(path))
         return ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0
     raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
+
+
+@kernel
+def timed_step(at, mj_step, model, data):
+    """One step of MuJoCo from a time that is its multiple to the bit, given addresses.
+
+    By these times late controls are found in their history; a sum of steps would miss them.
+    """
+    h = number(model, at.timestep)
+    set_number(data, at.time, np.rint(number(data, at.time) / h) * h)
+    call(mj_step, model, data)
 
 
 @kernel
@@ -227,6 +294,40 @@ def _silence() -> Any:
     return callback(types.void(types.voidptr), ignore)
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """MuJoCo's warnings go nowhere meanwhile: not to stderr, nor to a file in the working folder.
+
+    What they say of a simulation is in the monitor, and in :func:`check_warnings`.
+    """
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(_WARNING(_silence().address))
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def check_warnings(data: mujoco.MjData) -> None:
+    """Refuse to go on where MuJoCo has left out forces; what else it warns of the monitor sees.
+
+    Raises:
+        EngineError: contacts or constraints did not fit, or an inertia is singular.
+    """
+    kinds = mujoco.mjtWarning
+    lost = {
+        kinds.mjWARN_CONTACTFULL: "ran out of memory and left out contacts",
+        kinds.mjWARN_CNSTRFULL: "ran out of memory and left out constraints",
+        kinds.mjWARN_INERTIA: "met an inertia that is nearly singular and took another",
+    }
+    for kind, what in lost.items():
+        if data.warning[kind].number:
+            raise EngineError(
+                f"MuJoCo {what}, by {data.time:.6g} s, so that what follows would not be the"
+                " model's motion: see to its contacts and masses, or give more <size memory>"
+            )
+
+
 _installed = threading.Lock()
 
 
@@ -236,8 +337,7 @@ def callbacks(
 ) -> Iterator[None]:
     """Install C callbacks (numba ``cfunc`` objects) for a while; always restores what was there.
 
-    MuJoCo's warnings are silenced meanwhile: they would be written to a log file in the working
-    folder, and what they warn of is in the monitor.
+    MuJoCo is :func:`quiet` meanwhile.
 
     Raises:
         EngineError: callbacks are global to the process, and ours are installed already.
@@ -252,18 +352,16 @@ def callbacks(
             mujoco.get_mjcb_control(),
             mujoco.get_mjcb_passive(),
             mujoco.get_mjcb_act_dyn(),
-            mujoco.get_mju_user_warning(),
         )
         try:
             mujoco.set_mjcb_control(control and _FUNCTION(control.address))
             mujoco.set_mjcb_passive(passive and _FUNCTION(passive.address))
             mujoco.set_mjcb_act_dyn(activation and _DYNAMICS(activation.address))
-            mujoco.set_mju_user_warning(_WARNING(_silence().address))
-            yield
+            with quiet():
+                yield
         finally:
             mujoco.set_mjcb_control(before[0])
             mujoco.set_mjcb_passive(before[1])
             mujoco.set_mjcb_act_dyn(before[2])
-            mujoco.set_mju_user_warning(before[3])
     finally:
         _installed.release()

@@ -1,0 +1,133 @@
+"""What an actuator of a user's robot does with its control, and how it is made a force.
+
+MuJoCo's actuator gives the force gain * a + bias, with a the control or an activation that follows
+it, and gear times that to the joint. A law gives forces: where the gain is a number, there is no
+bias and the activation at most a filter, dividing by gain and gear makes the control the force.
+All else, servos above all, would turn the law's force into something of another kind.
+"""
+
+import mujoco
+import numpy as np
+
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.mjcf_robot import RobotFile
+
+_GAIN, _BIAS, _DYN, _TRN = mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn, mujoco.mjtTrn
+_FILTERS = (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)
+_ALONG = (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT, _TRN.mjTRN_TENDON)  # with a gear of one entry
+_GAINS = {
+    _GAIN.mjGAIN_AFFINE: "its gain depends on its length or velocity, as a damper's does",
+    _GAIN.mjGAIN_MUSCLE: "it is a muscle",
+    _GAIN.mjGAIN_DCMOTOR: "it is a DC motor, driven by a voltage",
+    _GAIN.mjGAIN_SO3: "it is a servo of an orientation",
+    _GAIN.mjGAIN_PID: "it is a PID servo",
+}
+_TRANSMISSIONS = {
+    _TRN.mjTRN_SLIDERCRANK: "a slider-crank, whose lever changes",
+    _TRN.mjTRN_BODY: "adhesion of a body",
+}
+
+
+def no_force(model: mujoco.MjModel, actuator: int) -> str:
+    """What an actuator is that gives no force in proportion to its control; empty if it does."""
+    gain, bias, dyn, trn = (
+        kind(getattr(model, f"actuator_{name}type")[actuator])
+        for kind, name in ((_GAIN, "gain"), (_BIAS, "bias"), (_DYN, "dyn"), (_TRN, "trn"))
+    )
+    constant, stiffness, damping = model.actuator_biasprm[actuator, :3]
+    varies = gain == _GAIN.mjGAIN_AFFINE and np.any(model.actuator_gainprm[actuator, 1:3])
+    if model.actuator_plugin[actuator] >= 0:
+        return "it is a plug-in's"
+    if trn in _TRANSMISSIONS or trn not in (*_ALONG, _TRN.mjTRN_SITE):
+        return f"it acts by {_TRANSMISSIONS.get(trn, 'a transmission of its own')}"
+    if varies or gain not in (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE):
+        return _GAINS.get(gain, "its gain is user code's")
+    if bias not in (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE):
+        return "its bias force is no number"
+    if bias == _BIAS.mjBIAS_AFFINE and (constant or stiffness or damping):
+        if stiffness:
+            integrates = dyn == _DYN.mjDYN_INTEGRATOR
+            what = "an integrated-velocity servo" if integrates else "a position servo"
+            return f"it is {what} of stiffness {-stiffness:g}"
+        return f"it is a velocity servo of gain {-damping:g}" if damping else "it has a bias force"
+    if dyn == _DYN.mjDYN_INTEGRATOR:
+        return "its control is the rate of its force"
+    return "" if dyn in _FILTERS else "its activation has dynamics of its own"
+
+
+def make_force(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    robot: RobotFile,
+    actuator: int,
+    *,
+    own_velocity: bool,
+) -> float:
+    """Make an actuator's control the force at what it drives; returns the greatest it delivers.
+
+    Args:
+        model: of the fleet; the actuator's gain and ranges are changed.
+        data: in the reference pose, positions evaluated.
+        robot: whose actuator it is, for messages.
+        actuator: its number.
+        own_velocity: whether the output is the actuator's own velocity, gear included, so that the
+            force that goes with it is the one before the gear.
+
+    Returns:
+        In N (N m), infinite if nothing clamps it.
+
+    Raises:
+        InvalidInput: it gives no force in proportion to its control, or none at all.
+    """
+    gain = float(model.actuator_gainprm[actuator, 0])
+    trn, out = _TRN(model.actuator_trntype[actuator]), model.actuator_outadr[actuator]
+    geared = trn in _ALONG and model.actuator_outnum[actuator] == 1
+    gear = float(model.actuator_gear[out, 0]) if geared and not own_velocity else 1.0
+    what = no_force(model, actuator)
+    if not what and gain * gear == 0.0:
+        what = "its gain or gear is 0"
+    if not what and _is_disabled(model, actuator):
+        what = "the file's options disable it"
+    if what:
+        raise InvalidInput(
+            "agents.input",
+            robot.input,
+            f"in {robot.path.name} {what}, where a law needs a force: make it a <motor>, or name"
+            " another actuator",
+        )
+    scale, ctrl = gain * gear, model.actuator_ctrladr[actuator]
+    if scale != 1.0:
+        model.actuator_gainprm[actuator, 0] = 1.0 / gear
+        for ranges, row in ((model.actuator_ctrlrange, ctrl), (model.actuator_actrange, actuator)):
+            ranges[row] = np.sort(scale * ranges[row])
+    return _clamp(model, data, actuator, gear)
+
+
+def _is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
+    group = int(model.actuator_group[actuator])
+    by_group = 0 <= group <= 30 and model.opt.disableactuator >> group & 1
+    by_flag = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    return bool(by_group or by_flag)
+
+
+def _clamp(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, gear: float) -> float:
+    """The greatest |u| that passes unchanged, u = gear times the actuator's force."""
+    ranges = []
+    clamps = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    ctrl, along = model.actuator_ctrladr[actuator], model.actuator_trnid[actuator, 0]
+    if clamps and model.actuator_ctrllimited[ctrl]:
+        ranges.append(model.actuator_ctrlrange[ctrl])
+    if model.actuator_actlimited[actuator]:
+        ranges.append(model.actuator_actrange[actuator])
+    if model.actuator_forcelimited[actuator]:
+        ranges.append(gear * model.actuator_forcerange[actuator])
+    tendon = _TRN(model.actuator_trntype[actuator]) == _TRN.mjTRN_TENDON
+    if tendon and model.tendon_actfrclimited[along]:
+        ranges.append(gear * model.tendon_actfrcrange[along])
+    row = model.actuator_outadr[actuator]
+    first, count = data.moment_rowadr[row], data.moment_rownnz[row]
+    for entry in range(first, first + count):
+        joint, lever = model.dof_jntid[data.moment_colind[entry]], data.actuator_moment[entry]
+        if model.jnt_actfrclimited[joint] and lever:
+            ranges.append(gear / lever * model.jnt_actfrcrange[joint])
+    return min((min(-low, high) for low, high in map(np.sort, ranges)), default=np.inf)

@@ -1,0 +1,93 @@
+"""Who touches whom in a fleet of users' robots: each its own parts and what its file brings along.
+
+All files lie in one world. Planes that several of them bring are one floor; whatever else robots
+would touch each other by, they must not overlap at the start.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.mjcf_robot import RobotFile
+
+# What of a geom says how it is touched
+SURFACE = (
+    "contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp",
+    "margin", "gap",
+)  # fmt: skip
+
+
+def sizes_of(spec: Any) -> tuple[int, int]:
+    """How many bodies a file has, and how many geoms of the world itself."""
+    return len(spec.bodies) - 1, sum(geom.parent == spec.worldbody for geom in spec.geoms)
+
+
+def owners_of(model: mujoco.MjModel, robots: Sequence[tuple[int, int]]) -> list[set[int]]:
+    """The robots, from 0, that each geom belongs to; none for the lane's own.
+
+    Args:
+        model: of the fleet, its robots one behind the other.
+        robots: their :func:`sizes_of`.
+    """
+    bodies, geoms = np.array(robots).T
+    of_body = np.concatenate([[-1], np.repeat(np.arange(len(robots)), bodies)])
+    of_geom = of_body[model.geom_bodyid]
+    (world,) = np.nonzero(model.geom_bodyid == 0)
+    of_geom[world[len(world) - geoms.sum() :]] = np.repeat(np.arange(len(robots)), geoms)
+    return [{owner} if owner >= 0 else set() for owner in of_geom.tolist()]
+
+
+def share_floors(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:
+    """Let but one of planes that are the same touch anything, so that a robot stands on one floor.
+
+    Args:
+        model: of the fleet; the other planes' collision bits are cleared, their pairs' made its.
+        data: positions evaluated.
+        owners: of each geom; the one that stays is of all.
+    """
+    touches = (model.geom_contype | model.geom_conaffinity) != 0
+    plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    seen: dict[tuple[float, ...], int] = {}
+    for geom in np.flatnonzero(plane & touches & (model.geom_bodyid == 0)).tolist():
+        normal = data.geom_xmat[geom].reshape(3, 3)[:, 2]
+        place = (*normal, normal @ data.geom_xpos[geom])
+        surface = [np.atleast_1d(getattr(model, f"geom_{name}")[geom]) for name in SURFACE]
+        key = tuple(np.round(np.concatenate([place, *surface]), 9).tolist())
+        kept = seen.setdefault(key, geom)
+        if kept != geom:
+            model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
+            for pairs in (model.pair_geom1, model.pair_geom2):
+                pairs[pairs == geom] = kept
+            owners[kept] |= owners[geom]
+
+
+def check_apart(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    owners: list[set[int]],
+    robots: Sequence[RobotFile],
+) -> None:
+    """Refuse robots that overlap each other, or what only another one's file brings along.
+
+    Args:
+        data: with contacts.
+        model, owners, robots: of the fleet.
+
+    Raises:
+        InvalidInput: names the geoms and the agents.
+    """
+    overlaps = data.contact.dist < 0.0
+    for one, other in data.contact.geom[overlaps].tolist():
+        if min(one, other) < 0 or owners[one] & owners[other]:
+            continue
+        i, j = min(owners[one]), min(owners[other])
+        names = [model.geom(geom).name or "a nameless geom" for geom in (one, other)]
+        raise InvalidInput(
+            "agents.file",
+            str(robots[i].path),
+            f"at the start '{names[0]}' of agent {i + 1} overlaps '{names[1]}' of agent {j + 1},"
+            " 2 m beside it: make its file narrower, or its floor a plane, which all share",
+        )

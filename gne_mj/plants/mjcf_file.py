@@ -1,0 +1,132 @@
+"""A robot's MJCF file: read, checked, and its world-wide settings brought into a fleet's world.
+
+MuJoCo attaches a file's elements with its angle units, defaults and so on. What it leaves behind is
+what the whole world has once: ``<option>``, the flags, sizes, visual settings. The options are
+carried over here, and all files of a fleet must agree in them.
+"""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.c_layout import arrays
+from gne_mj.plants.native_mujoco import quiet
+
+# Options that a scenario gives, and MJCF's words for others
+CLOCK = ("timestep", "integrator")
+WORDS = {
+    "disableflags": "flags", "enableflags": "flags", "disableactuator": "actuatorgroupdisable"
+}  # fmt: skip
+
+
+def read(path: Path) -> Any:
+    """The file's ``mujoco.MjSpec``, without keyframes and with MuJoCo's automatic reset off.
+
+    Raises:
+        InvalidInput: it cannot be read or compiled, has a number that is not finite, or a setting
+            that no fleet can have.
+    """
+    heard: list[str] = []
+    with _refusing(path, "read"):
+        mujoco.set_mju_user_warning(heard.append)
+        spec = mujoco.MjSpec.from_file(str(path))
+    if any("NaN" in message for message in heard):  # which it takes for a number not given
+        raise _refusal(path, "every number must be finite, and one of its is nan")
+    for name in _options(spec):
+        _check_finite(path, name, getattr(spec.option, name))
+    if spec.compiler.settotalmass > 0:
+        raise _refusal(path, "settotalmass would be that of the fleet: scale its masses instead")
+    if spec.option.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        raise _refusal(path, "MuJoCo's state does not say who sleeps: leave the flag 'sleep' out")
+    # a state that is not a number must be seen, not be reset
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    for key in list(spec.keys):
+        spec.delete(key)
+    return spec
+
+
+def alone(path: Path) -> mujoco.MjModel:
+    """The model that a file is by itself, compiled.
+
+    Raises:
+        InvalidInput: as :func:`read` says.
+    """
+    model = compiled(read(path), path)
+    for name in arrays("mjModel"):
+        _check_finite(path, name, getattr(model, name))
+    return model
+
+
+def compiled(spec: Any, path: Path | str) -> mujoco.MjModel:
+    """A model, compiled without a word but what is wrong with it.
+
+    Raises:
+        InvalidInput: it cannot be.
+    """
+    with _refusing(path, "compile"):
+        model: mujoco.MjModel = spec.compile()
+    return model
+
+
+def attach(world: Any, spec: Any, path: Path, *, prefix: str, at: tuple[float, ...]) -> None:
+    """Attach a file to a fleet's world, at a place (m), its names behind a prefix.
+
+    Raises:
+        InvalidInput: it cannot be.
+    """
+    with _refusing(path, "attach"):
+        world.attach(spec, prefix=prefix, frame=world.worldbody.add_frame(pos=at))
+
+
+def adopt_options(world: Any, spec: Any) -> None:
+    """Give a fleet's world all options of a file but those that the scenario gives."""
+    for name in _options(spec):
+        if name not in CLOCK:
+            setattr(world.option, name, getattr(spec.option, name))
+
+
+def check_options(world: Any, spec: Any, path: Path) -> None:
+    """Refuse a file whose options are not those of a fleet's world, which are the first one's.
+
+    Raises:
+        InvalidInput: names the option.
+    """
+    for name in _options(spec):
+        own, others = getattr(spec.option, name), getattr(world.option, name)
+        if name not in CLOCK and np.any(own != others):
+            word, shown = WORDS.get(name, name), ""
+            if word == name:
+                shown = f", {np.array2string(np.asarray(others))}"
+            raise _refusal(path, f"its {word} must be that of the first file{shown}")
+
+
+def _options(spec: Any) -> list[str]:
+    return [name for name in dir(spec.option) if not name.startswith("_")]
+
+
+def _check_finite(path: Path, name: str, numbers: Any) -> None:
+    numbers = np.asarray(numbers)
+    wrong = numbers[~np.isfinite(numbers)]
+    if len(wrong):
+        raise _refusal(path, f"every number must be finite, and its {name} has {wrong[0]}")
+
+
+def _refusal(path: Path | str, expected: str) -> InvalidInput:
+    return InvalidInput("agents.file", str(path), expected)
+
+
+@contextmanager
+def _refusing(path: Path | str, verb: str) -> Iterator[None]:
+    """What MuJoCo raises becomes one sentence, and what it warns of is not told."""
+    try:
+        with quiet(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (ValueError, OSError, mujoco.FatalError) as error:
+        raise _refusal(path, f"MuJoCo must {verb} it: {' '.join(str(error).split())}") from None
