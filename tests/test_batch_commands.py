@@ -61,8 +61,8 @@ def test_a_batch_writes_tables_and_a_figure(tmp_path, capsys):
     )
     assert (code, err) == (0, "")
     assert printed.splitlines()[0].split() == [
-        "barrier.rho", "controller.mode", "runs", "left", "worst", "margin", "settling", "(s)",
-        "not", "settled", "final", "error",
+        "barrier.rho", "controller.mode", "runs", "ended", "early", "worst", "margin", "settling",
+        "(s)", "not", "settled", "final", "error",
     ]  # fmt: skip
     assert len(printed.splitlines()) == 5 + 5
     assert {p.name for p in out.iterdir()} == {
@@ -93,7 +93,7 @@ def test_runs_that_left_are_data(tmp_path, capsys):
     report = json.loads(printed)
     assert code == 0
     assert report["done"] == report["runs"] == 10
-    assert report["combinations"][1]["left"] == report["statuses"]["left_feasible_set"] > 0
+    assert report["combinations"][1]["ended_early"] == report["statuses"]["left_feasible_set"] > 0
     code, _, _ = run(capsys, *options, "--out", tmp_path / "b", "--fail-on-exit")
     assert code == 1
 

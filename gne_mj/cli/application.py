@@ -1,10 +1,15 @@
 """The application, its errors and its entry point."""
 
 import json
+import os
 import sys
+from contextlib import suppress
 from typing import Annotated
 
 import typer
+
+from gne_mj.cli.output import say
+from gne_mj.cli.signals import raise_on_signals
 
 app = typer.Typer(
     add_completion=False,
@@ -35,14 +40,24 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails or the disk is full.
+    The exit status is 2, but 1 where a function of the user's own fails, the disk is full, or what
+    is printed cannot be written.
     """
+    raise_on_signals()
     try:
-        app()
+        try:
+            app()
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
     except BrokenPipeError:
+        _give_up_printing()
         sys.exit(1)
     except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        if error.filename:
+            _fail(f"{error.filename}: {error.strerror}")
+        _give_up_printing()
+        _fail(f"standard output: {error.strerror or error}", "not_stored", 1)
     except Exception as error:
         from gne_mj.errors import GneError, StorageError, UserCodeError
 
@@ -59,6 +74,18 @@ def main() -> None:
 
 def _fail(message: str, status: str | None = None, code: int = 2) -> None:
     if "--json" in sys.argv:
-        print(json.dumps({"status": status or "invalid_input", "message": message}))
-    print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
+        try:
+            document = {"status": status or "invalid_input", "message": message}
+            print(json.dumps(document), flush=True)
+        except OSError:
+            _give_up_printing()
+    say(f"gne-mj: {status + ': ' if status else ''}{message}")
     sys.exit(code)
+
+
+def _give_up_printing() -> None:
+    """Let what is still to be printed go nowhere, or Python complains of it at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with suppress(OSError, ValueError):  # stdout is no file of the system's own
+        os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
