@@ -21,8 +21,8 @@ from gne_mj.errors import GneError, InvalidInput, StorageError
 
 # Errors that tell of the place that was named, not of the disk
 _NO_PLACE = {
-    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
-    errno.EPERM, errno.EROFS,
+    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT,
+    errno.ENOTDIR, errno.EPERM, errno.EROFS,
 }  # fmt: skip
 
 # Of Linux's renameat2; what a system or file system says that has no such thing

@@ -1,14 +1,12 @@
 """The application, its errors and its entry point."""
 
 import json
-import os
 import sys
-from contextlib import suppress
 from typing import Annotated
 
 import typer
 
-from gne_mj.cli.output import say
+from gne_mj.cli.output import give_up, say
 from gne_mj.cli.signals import raise_on_signals
 
 app = typer.Typer(
@@ -51,12 +49,12 @@ def main() -> None:
             if sys.stdout is not None:
                 sys.stdout.flush()
     except BrokenPipeError:
-        _give_up_printing()
+        give_up(sys.stdout)
         sys.exit(1)
     except OSError as error:
         if error.filename:
             _fail(f"{error.filename}: {error.strerror}")
-        _give_up_printing()
+        give_up(sys.stdout)
         _fail(f"standard output: {error.strerror or error}", "not_stored", 1)
     except Exception as error:
         from gne_mj.errors import GneError, StorageError, UserCodeError
@@ -78,14 +76,6 @@ def _fail(message: str, status: str | None = None, code: int = 2) -> None:
             document = {"status": status or "invalid_input", "message": message}
             print(json.dumps(document), flush=True)
         except OSError:
-            _give_up_printing()
+            give_up(sys.stdout)
     say(f"gne-mj: {status + ': ' if status else ''}{message}")
     sys.exit(code)
-
-
-def _give_up_printing() -> None:
-    """Let what is still to be printed go nowhere, or Python complains of it at its end."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    with suppress(OSError, ValueError):  # stdout is no file of the system's own
-        os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)

@@ -10,7 +10,7 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, JSON, REPLACE, SET, SYSTEM, WHERE, formats, settings
-from gne_mj.cli.output import folder_for, on_terminal
+from gne_mj.cli.output import console, folder_for, on_terminal
 from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
@@ -184,7 +184,6 @@ def _showing(total: int, quiet: bool) -> Iterator[Any]:
         yield None
         return
     from rich import progress
-    from rich.console import Console
 
     with progress.Progress(
         progress.BarColumn(),
@@ -192,7 +191,7 @@ def _showing(total: int, quiet: bool) -> Iterator[Any]:
         progress.TextColumn("runs  {task.fields[rate]}"),
         progress.TimeRemainingColumn(),
         progress.TextColumn("{task.fields[early]} ended early"),
-        console=Console(stderr=True),
+        console=console(),
         transient=True,
     ) as bar:
         task = bar.add_task("runs", total=total, rate="", early=0)

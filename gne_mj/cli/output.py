@@ -6,9 +6,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from gne_mj.trajectory import Trajectory
 
 
@@ -130,8 +132,41 @@ def folder_for(out: Path | None, own: Path) -> Path:
 def say(line: str) -> None:
     """A line on stderr, if that is open: what is told there must not end a command."""
     if sys.stderr is not None:
-        with suppress(OSError):
+        try:
             print(line, file=sys.stderr, flush=True)
+        except OSError:
+            give_up(sys.stderr)
+
+
+def give_up(stream: TextIO) -> None:
+    """Let what a stream still holds go nowhere, or Python complains of it at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with suppress(OSError, ValueError):  # it is no file of the system's own
+        os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+class _Terminal:
+    """stderr, which may be closed while something is shown there: that must not end a run."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(sys.stderr, name)
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            return sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            sys.stderr.flush()
+
+
+def console() -> "Console":
+    """Rich's, on stderr."""
+    from rich.console import Console
+
+    return Console(file=cast(TextIO, _Terminal()))
 
 
 def on_terminal(quiet: bool) -> bool:
@@ -145,9 +180,7 @@ def working(quiet: bool, what: str) -> Iterator[Any]:
     if not on_terminal(quiet):
         yield None
         return
-    from rich.console import Console
-
-    with Console(stderr=True).status(what) as status:
+    with console().status(what) as status:
         yield status.update
 
 
@@ -157,7 +190,6 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
     if not on_terminal(quiet):
         yield None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     with Progress(
@@ -166,7 +198,7 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
         ),
         BarColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console(),
         transient=True,
     ) as bar:
         task = bar.add_task("run", total=total)

@@ -43,6 +43,8 @@ def main() -> int:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, help="JSON file for the counts and each notable run")
     options = parser.parse_args()
+    if options.out and options.out.exists():
+        parser.error(f"--out: {options.out} exists already; name another file")
     started = time.perf_counter()
     if options.index is not None:
         found = one(options.seed, options.index, against=True)
