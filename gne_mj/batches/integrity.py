@@ -83,5 +83,7 @@ def reading(folder: Path, store: Path, names: Iterable[str]) -> Iterator[None]:
             lost = next(chunks.damaged(store, names), None)
         if lost is None:
             raise broken(folder, f"{store.name} cannot be read ({error})") from None
-        remedy = f"delete that file, and {AGAIN.format(folder)}"
-        raise broken(folder, f"{store.name}/{lost} is damaged; {remedy}") from None
+        remedy = ""
+        if lost.rpartition("/")[0] in kept_of_runs(store):
+            remedy = f"; delete that file, and {AGAIN.format(folder)}"
+        raise broken(folder, f"{store.name}/{lost} is damaged{remedy}") from None
