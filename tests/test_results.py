@@ -139,6 +139,12 @@ def test_files_elsewhere_are_replaced_only_if_asked(run_folder, tmp_path):
         assert mine.read_bytes() != b"mine"
 
 
+def test_what_is_refused_makes_no_folder(tmp_path):
+    done = gne_here(*RUN, "--set", "barrier.rho=-1", "--out", tmp_path / "a" / "b")
+    assert done.returncode == 2
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_in_its_own_folder_a_runs_figures_are_drawn_again(run_folder):
     for _ in range(2):
         assert gne_here("plot", run_folder).returncode == 0

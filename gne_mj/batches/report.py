@@ -81,6 +81,7 @@ def figures_of(store: Store) -> "xarray.Dataset":
     kept = kept.drop_vars(others)
     with reading(store.folder, store.folder / RUNS, map(str, kept.variables)):
         runs = kept.load()
+    runs.attrs["planned"] = store.plan.runs
     return runs.isel(run=np.flatnonzero(runs["status"].notnull().to_numpy()))
 
 

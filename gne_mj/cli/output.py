@@ -40,10 +40,9 @@ class Results:
             self._replaced = _entries(out)
         elif os.path.lexists(out):
             raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
-        with storing("--out", out):
-            out.parent.mkdir(parents=True, exist_ok=True)
-            with hidden_folder(out.parent):
-                pass  # a place that cannot be written to is refused before anything is computed
+        there = next(parent for parent in out.parents if parent.exists())
+        with storing("--out", out), hidden_folder(there):
+            pass  # a place that cannot be written to is refused before anything is computed
 
     @contextmanager
     def written(self) -> Iterator[Path | None]:
@@ -60,6 +59,8 @@ class Results:
         if self.out is None:
             yield None
             return
+        with storing("--out", self.out):
+            self.out.parent.mkdir(parents=True, exist_ok=True)
         with storing("--out", self.out), hidden_folder(self.out.parent) as hidden:
             folder = hidden / self.out.name
             folder.mkdir()
