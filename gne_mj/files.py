@@ -96,16 +96,23 @@ def hidden_folder(parent: Path) -> Iterator[Path]:
     """A folder that nobody looks at, for what is not whole yet; it goes with the block."""
     _sweep(parent)
     while True:
-        folder = parent / f"{_prefix()}{secrets.token_hex(4)}"
-        folder.mkdir()
-        with locked(folder):
-            if not folder.exists():  # another process swept before it was locked
-                continue
-            try:
-                yield folder
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-        return
+        folder = parent / f"{_prefix()}{secrets.token_hex(8)}"
+        try:
+            folder.mkdir()
+            with locked(folder):
+                if folder.exists():  # else another process swept before it was locked
+                    yield folder
+                    return
+        finally:
+            _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+    except BaseException:  # a signal came just now
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def _prefix() -> str:

@@ -36,7 +36,7 @@ _PANELS = (
 
 
 def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
-    """Draw a batch's summary: a panel for each figure, and one for the share of runs that ended early.
+    """Draw a batch's summary: a panel for each figure, and the share of runs that ended early.
 
     Over the swept key with most numbers runs the horizontal axis; up to five combinations of the
     others get a line each, and more of them are put together. Lines are medians, bands hold 90% of

@@ -38,7 +38,7 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 PATIENCE = 60.0  # s for a command to end once it was asked to, on a machine that is busy
 WATCHED = 2.0  # s that a page is looked at before its command is killed, at most
 
-RUN = ("run", "velocity-sync", "--set", "simulation.duration=20", "--set", "recording.period=0.01")
+RUN = ("run", "velocity-sync", "--set", "simulation.duration=200")
 COMMANDS = {
     "run": (*RUN, "--out", "out"),
     "paper": ("paper", "--set", "simulation.duration=2", "--out", "paper"),
