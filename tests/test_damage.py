@@ -180,6 +180,11 @@ def test_what_no_run_can_bring_back_is_said(batch, tmp_path):
     (store.folder / "runs.zarr" / "margin" / ".zarray").write_text("{}")
     with pytest.raises(InvalidInput, match=r"margin/\.zarray is missing or damaged"):
         store.dataset()
+    shutil.copytree(batch / "runs.zarr", store.folder / "runs.zarr", dirs_exist_ok=True)
+    (store.folder / "runs.zarr" / ".zgroup").write_bytes(bytes(20))
+    for look in (store.dataset, store.missing):
+        with pytest.raises(InvalidInput, match=r"runs\.zarr"):
+            look()
 
 
 def test_a_chunk_of_runs_that_could_not_begin_is_whole(tmp_path):

@@ -62,7 +62,8 @@ def lost_chunks(folder: Path, store: Path, ran: NDArray[np.bool_]) -> dict[int, 
     Raises:
         InvalidInput: what is missing is not of runs.
     """
-    variables = kept_of_runs(store)
+    with reading(folder, store, ()):
+        variables = kept_of_runs(store)
     found: dict[int, str] = {}
     for file in chunks.missing(store, lambda name, chunk: name not in variables or ran[chunk]):
         name, _, place = file.rpartition("/")
