@@ -60,9 +60,14 @@ class Grid:
                 raise InvalidInput(f"--{key}", getattr(self, key), "it must be positive")
 
     @property
+    def cells(self) -> int:
+        """How many cells that is."""
+        return len(MODES) * len(self.periods) * len(self.margins) * len(self.pushes)
+
+    @property
     def total(self) -> int:
         """How many runs that is."""
-        return len(MODES) * self.runs * len(self.periods) * len(self.margins) * len(self.pushes)
+        return self.cells * self.runs
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,7 @@ def exit_map(
     progress: Callable[[int], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> list[Cell]:
-    """All cells of the grid, or those done when ``stopped`` said so.
+    """All cells of the grid, or those done when ``stopped``, asked before each run, said so.
 
     Args:
         system: whose game, agents, law and engine are tried; its start and mode do not matter.
@@ -119,6 +124,8 @@ def exit_map(
         counts = dict.fromkeys(("instant", "between", "nothing", "refused"), 0)
         least = np.inf
         for ray, signs in starts:
+            if stopped():
+                return cells
             outcome, worst = _run(
                 _at(system, mode, ray, margin, push * signs), timestep, period, grid, plants
             )
@@ -135,8 +142,6 @@ def exit_map(
                 counts["nothing"], counts["refused"], least if np.isfinite(least) else None,
             )
         )  # fmt: skip
-        if stopped():
-            break
     return cells
 
 

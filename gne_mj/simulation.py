@@ -344,24 +344,42 @@ class SystemRun:
             self._recorded[-1] = Part(last.system, last.time[:-1], last.samples.first(-1))
 
 
-@contextmanager
-def interruption() -> Iterator[threading.Event]:
-    """An event that Ctrl-C sets, so that a run ends between chunks and keeps what it has.
+_asked: threading.Event | None = None  # the event of the interruption that is going on
 
-    A second Ctrl-C acts as usual. Outside the main thread signals are left alone.
+
+@contextmanager
+def interruption(*signals: int) -> Iterator[threading.Event]:
+    """An event that a signal sets, so that a run ends between chunks and keeps what it has.
+
+    A second signal acts as usual. Within another interruption it is that one's event. Outside the
+    main thread signals are left alone. Ask the event, but do not wait for it: a signal that comes
+    while its lock is held would wait for ever.
+
+    Args:
+        signals: which; Ctrl-C (SIGINT) if there are none.
     """
-    event = threading.Event()
+    global _asked
     if threading.current_thread() is not threading.main_thread():
-        yield event
+        yield threading.Event()
         return
-    before = signal.getsignal(signal.SIGINT)
+    if _asked is not None:
+        yield _asked
+        return
+    event = _asked = threading.Event()
+    before = {number: signal.getsignal(number) for number in signals or (signal.SIGINT,)}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
     def stop(number: int, frame: object) -> None:
+        restore()  # first, so that nothing interrupts the setting but what ends all
         event.set()
-        signal.signal(signal.SIGINT, before)
 
-    signal.signal(signal.SIGINT, stop)
     try:
+        for number in before:
+            signal.signal(number, stop)
         yield event
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()
+        _asked = None

@@ -5,8 +5,10 @@ xarray alone can read it: ``xarray.open_datatree(folder, engine="zarr")``.
 """
 
 import json
+import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -15,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import chunks
 from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
+from gne_mj.files import written
 from gne_mj.game import Game
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
@@ -172,23 +176,48 @@ class Trajectory:
     def save(self, folder: str | Path) -> Path:
         """Write the tree as a Zarr folder that must not exist yet; returns its path.
 
+        The folder appears when all is written.
+
         Raises:
-            InvalidInput: the folder exists.
+            InvalidInput: the folder exists, or is in no place that can be written to.
+            StorageError: the disk is full, or fails; nothing is left.
         """
         path = Path(folder)
-        if path.exists():
+        if os.path.lexists(path):
             raise InvalidInput("folder", str(path), "it exists already; name one that does not")
-        # The second Zarr format: the third has no settled way to store names yet.
-        self.tree.to_zarr(path, mode="w-", zarr_format=2)
+        encoding = {node.path: chunks.encodings(node.to_dataset()) for node in self.tree.subtree}
+        with written("folder", path, replace=False) as new, chunks.every_chunk():
+            # The second Zarr format: the third has no settled way to store names yet.
+            self.tree.to_zarr(new, mode="w-", zarr_format=2, encoding=encoding)
         return path
 
     @classmethod
     def load(cls, folder: str | Path) -> "Trajectory":
-        """Read a saved trajectory into memory."""
+        """Read a saved trajectory into memory.
+
+        Raises:
+            InvalidInput: it is none, or something of it is missing or damaged.
+        """
         import xarray
 
-        with xarray.open_datatree(Path(folder), engine="zarr") as tree:
-            return cls(tree.load())
+        path = Path(folder)
+        try:
+            lost = chunks.disagreement(path) or next(chunks.missing(path), None)
+            if lost is None:
+                with xarray.open_datatree(path, engine="zarr", consolidated=True) as tree:
+                    return cls(tree.load())
+        except chunks.UNREADABLE:
+            lost = next(_damaged(path), None)
+            if lost is None:
+                raise InvalidInput(
+                    "folder", str(path), "it must be one that a run or `save` wrote"
+                ) from None
+        raise InvalidInput("folder", str(path), f"it must be whole: {lost} is missing or damaged")
+
+
+def _damaged(path: Path) -> Iterator[str]:
+    with suppress(*chunks.UNREADABLE):  # of a folder that is no store at all nothing can be told
+        yield from chunks.damaged(path)
 
 
 def _worst(statuses: Iterable[str]) -> str:

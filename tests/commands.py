@@ -1,9 +1,11 @@
 """The product's commands, each as a process of its own or called in this one."""
 
 import os
+import pty
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+import threading
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
 
@@ -25,6 +27,39 @@ def gne(*arguments):
         [COMMAND, *map(str, arguments)],
         env=environment(), capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
+
+
+@contextmanager
+def running(*arguments, until):
+    """The installed command on a terminal of its own, once that shows a text; it is killed at last.
+
+    Hands out the process, whose standard output is a pipe.
+    """
+    master, terminal = pty.openpty()
+    process = subprocess.Popen(
+        [COMMAND, *map(str, arguments)], stdout=subprocess.PIPE, stderr=terminal, text=True,
+        env={**environment(), "TERM": "xterm", "COLUMNS": "200"}, start_new_session=True,
+    )  # fmt: skip
+    os.close(terminal)
+    shown, ready = bytearray(), threading.Event()
+
+    def read():  # on and on, or the terminal is full and the command waits
+        with suppress(OSError):
+            while piece := os.read(master, 4096):
+                shown.extend(piece)
+                if until.encode() in shown:
+                    ready.set()
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    try:
+        assert ready.wait(120), shown.decode()
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        os.close(master)
 
 
 def gne_here(*arguments):

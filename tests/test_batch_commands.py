@@ -9,9 +9,9 @@ import xarray
 from batch_plans import ODE, small
 
 import gne_mj
-from gne_mj.batches import (
-    cluster,
-)
+from gne_mj.batches import cluster, execute
+from gne_mj.batches.chunk import Runner
+from gne_mj.batches.progress import count_early
 from gne_mj.batches.report import combinations
 from gne_mj.cli import main
 
@@ -61,8 +61,8 @@ def test_a_batch_writes_tables_and_a_figure(tmp_path, capsys):
     )
     assert (code, err) == (0, "")
     assert printed.splitlines()[0].split() == [
-        "barrier.rho", "controller.mode", "runs", "left", "worst", "margin", "settling", "(s)",
-        "not", "settled", "final", "error",
+        "barrier.rho", "controller.mode", "runs", "ended", "early", "worst", "margin", "settling",
+        "(s)", "not", "settled", "final", "error",
     ]  # fmt: skip
     assert len(printed.splitlines()) == 5 + 5
     assert {p.name for p in out.iterdir()} == {
@@ -93,9 +93,32 @@ def test_runs_that_left_are_data(tmp_path, capsys):
     report = json.loads(printed)
     assert code == 0
     assert report["done"] == report["runs"] == 10
-    assert report["combinations"][1]["left"] == report["statuses"]["left_feasible_set"] > 0
+    assert report["combinations"][1]["ended_early"] == report["statuses"]["left_feasible_set"] > 0
     code, _, _ = run(capsys, *options, "--out", tmp_path / "b", "--fail-on-exit")
     assert code == 1
+
+
+def test_a_part_of_a_batch_is_called_partial(tmp_path, capsys):
+    store = small(tmp_path)  # 12 runs in 3 chunks
+    store.write(1, Runner(store.plan, 1).run(1))
+    code, printed, _ = run(capsys, "batch-report", store.folder)
+    assert code == 0
+    assert printed.splitlines()[-1] == (
+        f"partial: 5 of 12 runs are stored; go on with `gne-mj batch --resume --out {store.folder}`"
+    )
+    code, printed, _ = run(capsys, "batch-report", store.folder, "--json")
+    report = json.loads(printed)
+    assert (report["runs"], report["done"], report["complete"]) == (12, 5, False)
+    execute(store, threads=1)
+    code, printed, _ = run(capsys, "batch-report", store.folder)
+    assert "partial" not in printed
+
+
+def test_every_run_that_did_not_reach_its_end_ended_early():
+    statuses = np.array(
+        ["", "converged", "completed", "left_feasible_set", "step_too_small", "infeasible_start"]
+    )
+    assert count_early(statuses) == 3
 
 
 def test_a_run_of_a_batch_is_run_alone(tmp_path, capsys):

@@ -11,6 +11,7 @@ import reference
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts" / "campaigns"))
 
 import continuous
+import kills
 import kinds
 import quadratic
 import stiff
@@ -190,3 +191,32 @@ def test_a_run_from_an_ordinary_start_is_what_the_oracle_says(monkeypatch):
     assert found["reference_error"] < 1e-8
     assert found["error"] < 1e-7
     assert found == continuous.one(5, 10, share=1.0)
+
+
+def test_the_kill_script_notices_what_is_half_written(tmp_path, monkeypatch):
+    """Each fault that it is to find is made on purpose, after a command that was not killed."""
+    reference = tmp_path / "reference"
+    for name in ("run", "paper"):
+        (reference / name).mkdir(parents=True)
+        (reference / name / "file").write_text("whole")
+    (reference / "mine.txt").write_text("mine")
+    monkeypatch.setattr(kills, "_paper", lambda *_: iter(()))
+    monkeypatch.setitem(kills.COMMANDS, "view --html", ())
+    program = "import sys; sys.exit(0)"
+    for fault, words in (
+        ("pass", "no result"),
+        ("open('out', 'w').write('half')", "not what it is without a kill"),
+        ("open('mine.txt', 'w').write('theirs')", "mine.txt is not as it was"),
+        ("open('run/more', 'w').write('more')", "run is not as it was"),
+        ("import os; os.mkdir('.gne-mj-x-1')", "hidden folders stayed"),
+        ("open('table.csv.part', 'w')", "that is no result"),
+        ("import subprocess; subprocess.Popen(['sleep', '60'], stdout=-3, stderr=-3)", "stayed"),
+    ):
+        (reference / "out of view --html").write_text("whole")
+        monkeypatch.setattr(kills, "GNE", (sys.executable, "-c", f"{fault}; {program}"))
+        known = kills.Reference(reference, dict.fromkeys(kills.COMMANDS, 100.0))
+        index = 5 + 9 * 2  # view --html, SIGTERM
+        name, _, ended, found = kills.kill(tmp_path / "kill", known, 0, index)
+        assert name == "view --html"
+        assert ended == "before"
+        assert any(words in each for each in found), (fault, found)

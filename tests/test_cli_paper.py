@@ -5,12 +5,11 @@ In a file of its own, which comes late: by then others have compiled what the sy
 
 import json
 import signal
-import subprocess
 import time
 from pathlib import Path
 
 import pytest
-from commands import COMMAND, environment, gne, gne_here
+from commands import gne, gne_here, running
 
 import gne_mj
 
@@ -83,34 +82,33 @@ def test_plot_draws_every_format(drawn, tmp_path):
     assert all(b"<svg" in path.read_bytes() for path in out.glob("*.svg"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scenario", ["velocity-sync", "osnr", "paper"])
-def test_ctrl_c_keeps_what_was_done(scenario, tmp_path, drawn):
-    """drawn: compiled by now."""
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("scenario", "number"),
+    [
+        ("velocity-sync", signal.SIGTERM),
+        pytest.param("velocity-sync", signal.SIGHUP, marks=SLOW),
+        pytest.param("velocity-sync", signal.SIGINT, marks=SLOW),
+        pytest.param("osnr", signal.SIGTERM, marks=SLOW),
+        pytest.param("paper", signal.SIGINT, marks=SLOW),
+    ],
+)
+@pytest.mark.usefixtures("drawn")  # compiled by now
+def test_a_signal_keeps_what_was_done(scenario, number, tmp_path):
     out = tmp_path / "run"
-    process = subprocess.Popen(
-        [COMMAND, "run", scenario, "--set", "simulation.duration=100000", "--json",
-         "--set", "simulation.timestep=0.01", "--out", out],
-        env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        deadline = time.monotonic() + 60
-        while not list(tmp_path.iterdir()):  # the folder is made just before the run
-            assert process.poll() is None, process.stderr.read()
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+    changes = ("--set", "simulation.duration=100000", "--set", "simulation.timestep=0.01")
+    with running("run", scenario, *changes, "--out", out, until="of 100000 s") as process:
         time.sleep(1.0)
-        process.send_signal(signal.SIGINT)
-        stdout, stderr = process.communicate(timeout=60)
-    finally:
-        process.kill()
-        process.wait()
-    assert process.returncode == 1, stderr
-    assert stderr == ""
-    report = json.loads(stdout)
-    assert report["status"] == "interrupted"
+        assert list(tmp_path.iterdir()) == []
+        process.send_signal(number)
+        stdout, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "stopped by the user" in stdout
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
-    assert json.loads((out / "report.json").read_text()) == report
+    report = json.loads((out / "report.json").read_text())
+    assert report["status"] == "interrupted"
     loaded = gne_mj.Trajectory.load(out / "trajectory.zarr")
     assert loaded.status == "interrupted"
     for system, certificate in report["systems"].items():

@@ -87,16 +87,16 @@ def listens(url):
         return probe.connect_ex(("127.0.0.1", urlparse(url).port)) == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL, signal.SIGINT])
 def test_a_live_page_ends_with_its_command(start, number):
     process, url = start(LIVE)
     assert b"settings" in urlopen(url, timeout=5).read()
     children = psutil.Process(process.pid).children(recursive=True)
     assert children == []  # it needs no other process in the first place
     process.send_signal(number)
-    # Ctrl-C is no kill: what was simulated is judged and told before the end
-    assert_gone(process, url, within=10.0 if number == signal.SIGINT else 2.0)
-    assert process.returncode == (1 if number == signal.SIGINT else -number)
+    # but for SIGKILL, what was simulated is judged and told before the end
+    assert_gone(process, url, within=2.0 if number == signal.SIGKILL else 10.0)
+    assert process.returncode == (-number if number == signal.SIGKILL else 1)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.plan import Plan
-from gne_mj.batches.progress import count_left
+from gne_mj.batches.progress import count_early
 from gne_mj.batches.store import Store
 from gne_mj.errors import InvalidInput
 
@@ -54,7 +54,7 @@ def connected(address: str | None) -> Iterator["Client | None"]:
 def on_cluster(
     store: Store, client: "Client", stopped: Callable[[], bool]
 ) -> Iterator[tuple[int, int]]:
-    """Run what is missing; the runs of each chunk, and how many left, as workers finish them."""
+    """Run what is missing; of each chunk its runs, and how many of them ended early."""
     from distributed import wait
 
     folder, manifest = str(store.folder.resolve()), json.dumps(store.plan.manifest())
@@ -79,7 +79,7 @@ def on_cluster(
 
 
 def run_chunk(folder: str, manifest: str, chunk: int) -> tuple[int, int]:
-    """On a worker: run and store one chunk; its runs, and how many of them left.
+    """On a worker: run and store one chunk; its runs, and how many of them ended early.
 
     Raises:
         InvalidInput: the worker does not see the folder, or has other versions or files.
@@ -93,7 +93,7 @@ def run_chunk(folder: str, manifest: str, chunk: int) -> tuple[int, int]:
     assert variables is not None
     store.write(chunk, variables)
     statuses = variables["status"][1]
-    return len(statuses), count_left(statuses)
+    return len(statuses), count_early(statuses)
 
 
 @lru_cache(maxsize=1)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.cluster import on_cluster
-from gne_mj.batches.progress import Progress, count_left
+from gne_mj.batches.progress import Progress, count_early
 from gne_mj.batches.store import Store
 from gne_mj.errors import InvalidInput
 
@@ -46,8 +46,8 @@ def execute(
         raise InvalidInput("--threads", threads, "it must not be negative")
     now = Progress.of(store)
 
-    def tell(done: int, left: int) -> Progress:
-        after = Progress(now.done + done, now.total, now.left + left)
+    def tell(done: int, early: int) -> Progress:
+        after = Progress(now.done + done, now.total, now.ended_early + early)
         if progress is not None:
             progress(after)
         return after
@@ -55,8 +55,8 @@ def execute(
     now = tell(0, 0)
     with store.locked():
         if cluster is not None:
-            for done, left in on_cluster(store, cluster, stopped):
-                now = tell(done, left)
+            for done, early in on_cluster(store, cluster, stopped):
+                now = tell(done, early)
             return Progress.of(store)
         runner = Runner(store.plan, threads or cores())
         for chunk in store.missing():
@@ -64,5 +64,5 @@ def execute(
             if variables is None:
                 break
             store.write(chunk, variables)
-            now = tell(len(variables["status"][1]), count_left(variables["status"][1]))
+            now = tell(len(variables["status"][1]), count_early(variables["status"][1]))
     return now

@@ -16,20 +16,25 @@ class Progress:
     Attributes:
         done: runs that are stored.
         total: of the batch.
-        left: of those done, how many did not stay inside their set to the end.
+        ended_early: of those done, how many did not run to their end inside their set.
     """
 
     done: int
     total: int
-    left: int
+    ended_early: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether all runs are stored."""
+        return self.done == self.total
 
     @classmethod
     def of(cls, store: Store) -> "Progress":
         """Of what is stored."""
         statuses = store.statuses()
-        return cls(int(np.sum(statuses != "")), store.plan.runs, count_left(statuses))
+        return cls(int(np.sum(statuses != "")), store.plan.runs, count_early(statuses))
 
 
-def count_left(statuses: NDArray[np.str_]) -> int:
-    """How many of these runs did not stay inside to the end; those not run yet do not count."""
+def count_early(statuses: NDArray[np.str_]) -> int:
+    """How many of these runs ended early, or could not begin; those not run yet do not count."""
     return int(np.sum(~np.isin(statuses, ["", *SUCCESSES])))

@@ -1,7 +1,6 @@
 """Tables and the figure of a batch's folder."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gne_mj import plots
-from gne_mj.batches.store import Store
+from gne_mj.batches.integrity import reading
+from gne_mj.batches.store import RUNS, Store
 from gne_mj.errors import InvalidInput
+from gne_mj.files import refuse_existing, written
 from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
@@ -34,53 +35,53 @@ class Report:
 
 
 def write_report(
-    store: Store, folder: Path | None = None, formats: tuple[str, ...] = ("png",)
+    store: Store, target: Path, formats: tuple[str, ...] = ("png",), *, replace: bool
 ) -> Report:
     """Write ``combinations.csv``, ``runs.csv`` and the figure ``summary``.
 
     Args:
         store: of the batch, complete or not.
-        folder: where to; the batch's own if left out.
+        target: folder to write to.
         formats: of the figure.
+        replace: files of these names are replaced, each once the new one is whole.
 
     Raises:
-        InvalidInput: no run is stored yet.
+        InvalidInput: no run is stored yet, something stored is missing or damaged, or files exist
+            and may not be replaced.
+        StorageError: the disk is full, or fails.
     """
-    target = store.folder if folder is None else folder
+    names = ["combinations.csv", "runs.csv", *(f"summary.{kind}" for kind in formats)]
+    if not replace:
+        refuse_existing("--out", [target / name for name in names])
     runs = figures_of(store)
     if runs.sizes["run"] == 0:
         raise InvalidInput("DIR", str(store.folder), "it must hold at least one run")
-    target.mkdir(parents=True, exist_ok=True)
     table, paths = combinations(runs), []
     for name, rows in (("combinations.csv", table), ("runs.csv", runs.to_dataframe())):
-        with _whole(target / name) as path:
+        with written("--out", target / name, replace=True) as path:
             rows.to_csv(path, index=name == "runs.csv")
         paths.append(target / name)
     for kind in formats:
-        with _whole(target / f"summary.{kind}") as path:
+        with written("--out", target / f"summary.{kind}", replace=True) as path:
             plots.save_batch(runs, path, kind)
         paths.append(target / f"summary.{kind}")
     return Report(runs, table, tuple(paths))
 
 
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` that takes its place once it is written."""
-    beside = path.with_name(f".{path.name}.partial")
-    try:
-        yield beside
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
-
-
 def figures_of(store: Store) -> "xarray.Dataset":
-    """What is one number (or word) a run, of the runs that are stored, in memory."""
+    """What is one number (or word) a run, of the runs that are stored, in memory.
+
+    Raises:
+        InvalidInput: something of it is missing or damaged.
+    """
     whole = store.dataset()
-    one = [name for name, variable in whole.data_vars.items() if variable.dims == ("run",)]
+    one = [str(name) for name, variable in whole.data_vars.items() if variable.dims == ("run",)]
     kept = whole[one]
     others = [name for name, coordinate in kept.coords.items() if coordinate.dims != ("run",)]
-    runs = kept.drop_vars(others).load()
+    kept = kept.drop_vars(others)
+    with reading(store.folder, store.folder / RUNS, map(str, kept.variables)):
+        runs = kept.load()
+    runs.attrs["planned"] = store.plan.runs
     return runs.isel(run=np.flatnonzero(runs["status"].notnull().to_numpy()))
 
 
@@ -102,7 +103,7 @@ def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
         stayed = own["status"].isin(SUCCESSES)
         row |= {
             "runs": len(own),
-            "left": int((~stayed).sum()),
+            "ended_early": int((~stayed).sum()),
             "converged": int((own["status"] == "converged").sum()),
         }
         # A run that never settled took longer than any that did, and one that left has no end.
@@ -137,7 +138,7 @@ def summary(table: "pandas.DataFrame", keys: list[str], rows: int = 24) -> Itera
     names = {
         **{key: key for key in keys},
         "runs": "runs",
-        "left": "left",
+        "ended_early": "ended early",
         "least_margin_min": "worst margin",
         "settling_time_median": "settling (s)",
         "not_settled": "not settled",

@@ -3,13 +3,13 @@
 ``DIR/manifest.json`` has all that decides the results; ``DIR/runs.zarr`` has one array a variable,
 each cut along ``run`` as the plan's chunks are. A chunk's runs are there once its statuses are:
 they are written last, in one file that appears whole or not at all. Until then the chunk's runs
-read as missing, and to resume computes them again.
+read as missing, and to resume computes them again. A file that is lost later is noticed, and a
+damaged one has no matching checksum (gne_mj/chunks.py).
 """
 
 import fcntl
 import json
-import shutil
-import tempfile
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,9 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import chunks
+from gne_mj.batches.integrity import AGAIN, broken, kept_of_runs, lost_chunks, read_statuses
 from gne_mj.batches.plan import FORMAT, Combination, Plan
 from gne_mj.batches.summary import Variables, columns_of, join, kept, span_of, times
 from gne_mj.errors import InvalidInput, StorageError
+from gne_mj.files import storing, written
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import Outcome
 from gne_mj.loops.recorder import Recorder
@@ -51,31 +54,20 @@ class Store:
             InvalidInput: the folder exists, or combinations have no common layout.
             StorageError: it cannot be written, as on a full disk.
         """
-        if folder.exists():
+        if os.path.lexists(folder):
             raise InvalidInput(
                 "--out",
                 str(folder),
                 "it exists already; name a folder that does not, or add --resume to go on with it",
             )
-        try:
+        with storing("--out", folder):
             folder.parent.mkdir(parents=True, exist_ok=True)
-            scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        except OSError as error:
-            raise InvalidInput(
-                "--out", str(folder), f"it cannot be written: {error.strerror}"
-            ) from None
-        try:
+        with written("--out", folder, replace=False) as new:
+            new.mkdir()
             text = json.dumps(plan.manifest(), indent=2)
-            (scratch / MANIFEST).write_text(text + "\n", encoding="utf-8")
-            _create_arrays(scratch / RUNS, plan)
-            scratch.chmod(0o755)
-            scratch.rename(folder)
-        except OSError as error:
-            shutil.rmtree(scratch, ignore_errors=True)
-            raise StorageError(f"{folder}: {error.strerror or error}; nothing is stored") from None
-        except BaseException:
-            shutil.rmtree(scratch, ignore_errors=True)
-            raise
+            (new / MANIFEST).write_text(text + "\n", encoding="utf-8")
+            with chunks.every_chunk():
+                _create_arrays(new / RUNS, plan)
         return cls(folder, plan)
 
     @classmethod
@@ -156,15 +148,18 @@ class Store:
         ]
 
     def statuses(self) -> NDArray[np.str_]:
-        """(runs,) how each run ended; empty if it has not been run."""
-        import zarr
+        """(runs,) how each run ended; empty if it has not been run, or a part of it is lost.
 
-        array: Any = zarr.open_array(self.folder / RUNS, path="status", mode="r")
-        found: NDArray[np.str_] = array[:]
+        Raises:
+            InvalidInput: the store is damaged.
+        """
+        found = read_statuses(self.folder, self.folder / RUNS)
+        for chunk in lost_chunks(self.folder, self.folder / RUNS, found[:: self.plan.chunk] != ""):
+            found[chunk * self.plan.chunk : (chunk + 1) * self.plan.chunk] = ""
         return found
 
     def missing(self) -> list[int]:
-        """Chunks that are not there yet."""
+        """Chunks that are not there yet, or of which a part is lost."""
         first = self.statuses()[:: self.plan.chunk]
         return np.flatnonzero(first == "").tolist()
 
@@ -176,17 +171,20 @@ class Store:
         """
         import xarray
 
-        first = chunk * self.plan.chunk
-        region = {"run": slice(first, first + len(variables["status"][1]))}
-        others = {
-            name: (dimensions, values)
-            for name, (dimensions, values, _) in variables.items()
+        first, runs = chunk * self.plan.chunk, len(variables["status"][1])
+        region = {"run": slice(first, first + runs)}
+        others: dict[str, Any] = {
+            # what these runs do not have, not being begun or of another mode, is written as well
+            name: variables[name][:2]
+            if name in variables
+            else (dimensions, np.full((runs, *shape[1:]), np.nan))
+            for name, (dimensions, shape) in kept_of_runs(self.folder / RUNS).items()
             if name != "status"
         }
         status = {"status": variables["status"][:2]}
         try:
-            for part in (others, status):
-                if part:
+            with chunks.every_chunk():
+                for part in (others, status):
                     xarray.Dataset(part).to_zarr(
                         self.folder / RUNS, region=region, zarr_format=2, consolidated=True
                     )
@@ -197,10 +195,18 @@ class Store:
             ) from None
 
     def dataset(self) -> "xarray.Dataset":
-        """All runs, read when they are used."""
+        """All runs, read when they are used.
+
+        Raises:
+            InvalidInput: the store is damaged, or a part of it is lost.
+        """
         import xarray
 
-        found: xarray.Dataset = xarray.open_dataset(self.folder / RUNS, engine="zarr", chunks=None)
+        path = self.folder / RUNS
+        ran = read_statuses(self.folder, path)[:: self.plan.chunk] != ""
+        for name in lost_chunks(self.folder, path, ran).values():
+            raise broken(self.folder, f"{RUNS}/{name} is missing; {AGAIN.format(self.folder)}")
+        found: xarray.Dataset = xarray.open_dataset(path, engine="zarr", chunks=None)
         return found
 
 
@@ -246,12 +252,13 @@ def _create_arrays(path: Path, plan: Plan) -> None:
         attributes: Mapping[str, Any],
         fill: Any = None,
     ) -> Any:
-        chunks = tuple(plan.chunk if d == "run" else sizes[d] for d in dimensions)
+        pieces = tuple(plan.chunk if d == "run" else sizes[d] for d in dimensions)
         return group.create_array(
             name,
             shape=tuple(sizes[d] for d in dimensions),
-            chunks=tuple(max(length, 1) for length in chunks),
+            chunks=tuple(max(length, 1) for length in pieces),
             dtype=values.dtype,
+            compressors=chunks.compressor(),
             fill_value=fill,
             attributes={"_ARRAY_DIMENSIONS": list(dimensions), **attributes},
         )

@@ -7,7 +7,8 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
-from gne_mj.cli.output import PREPARING, progress, results, working
+from gne_mj.cli.output import PREPARING, Results, progress, say, working
+from gne_mj.cli.signals import stopping
 
 
 @app.command()
@@ -39,6 +40,7 @@ def solve(
     from gne_mj.scenario import load_scenario
 
     rhos = [] if path is None else solving.parse_path(path)
+    results = Results(out)
     with working(as_json, PREPARING):
         every, moved = load_scenario(scenario, settings(set_)).inside_systems()
         systems = [each for each in every if system in (None, each.name)]
@@ -50,7 +52,7 @@ def solve(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
     )
-    with results(out, replace=False) as folder:
+    with stopping(), results.written() as folder:
         if folder is not None:
             (folder / "report.json").write_text(report + "\n", encoding="utf-8")
             if path is not None:
@@ -243,15 +245,14 @@ def map_(
 ) -> None:
     """Map where modes `sampled` and `implicit` leave the set: period x start margin x push.
 
-    --out keeps the figure map.png and the table map.csv. Ctrl-C ends it early and keeps what was
-    done.
+    --out keeps the figure map.png and the table map.csv. Ctrl-C ends it early and keeps the cells
+    that were done.
     """
     from dataclasses import asdict
 
     from gne_mj import exit_map as mapping
     from gne_mj.errors import InvalidInput, nearest
     from gne_mj.scenario import load_scenario
-    from gne_mj.simulation import interruption
     from gne_mj.solve import parse_path
 
     loaded = load_scenario(scenario, settings(set_))
@@ -273,22 +274,26 @@ def map_(
         duration=duration,
         seed=seed,
     )
+    results = Results(out)
     built = loaded.systems[name].build(name, loaded.simulation)
-    with (
-        interruption() as stop,
-        results(out, replace=False) as folder,
-        progress(float(grid.total), as_json, "runs") as show,
-    ):
-        cells = mapping.exit_map(built, loaded.simulation.timestep, grid, show, stopped=stop.is_set)
-        if folder is not None:
-            from gne_mj import plots
+    with stopping() as stop:
+        with progress(float(grid.total), as_json, "runs") as show:
+            cells = mapping.exit_map(
+                built, loaded.simulation.timestep, grid, show, stopped=stop.is_set
+            )
+        if cells:
+            with results.written() as folder:
+                if folder is not None:
+                    from gne_mj import plots
 
-            mapping.write(cells, folder / "map.csv")
-            plots.save_map(cells, folder / "map.png")
+                    mapping.write(cells, folder / "map.csv")
+                    plots.save_map(cells, folder / "map.png")
     if as_json:
         print(json.dumps([asdict(cell) for cell in cells], indent=2))
     else:
         print("\n".join(mapping.summary(cells)))
-        if out is not None:
-            print(f"\nfigure      {out / 'map.png'}\ntable       {out / 'map.csv'}")
+        if cells and results.out is not None:
+            print(f"\nfigure      {results.out / 'map.png'}\ntable       {results.out / 'map.csv'}")
+    if stop.is_set():
+        say(f"gne-mj: stopped: {len(cells)} of {grid.cells} cells were done")
     raise typer.Exit(1 if stop.is_set() else 0)

@@ -6,6 +6,9 @@ from typing import Annotated
 
 import typer
 
+from gne_mj.cli.output import give_up, say
+from gne_mj.cli.signals import raise_on_signals
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -35,14 +38,24 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails or the disk is full.
+    The exit status is 2, but 1 where a function of the user's own fails, the disk is full, or what
+    is printed cannot be written.
     """
+    raise_on_signals()
     try:
-        app()
+        try:
+            app()
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
     except BrokenPipeError:
+        give_up(sys.stdout)
         sys.exit(1)
     except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        if error.filename:
+            _fail(f"{error.filename}: {error.strerror}")
+        give_up(sys.stdout)
+        _fail(f"standard output: {error.strerror or error}", "not_stored", 1)
     except Exception as error:
         from gne_mj.errors import GneError, StorageError, UserCodeError
 
@@ -59,6 +72,10 @@ def main() -> None:
 
 def _fail(message: str, status: str | None = None, code: int = 2) -> None:
     if "--json" in sys.argv:
-        print(json.dumps({"status": status or "invalid_input", "message": message}))
-    print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
+        try:
+            document = {"status": status or "invalid_input", "message": message}
+            print(json.dumps(document), flush=True)
+        except OSError:
+            give_up(sys.stdout)
+    say(f"gne-mj: {status + ': ' if status else ''}{message}")
     sys.exit(code)

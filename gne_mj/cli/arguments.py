@@ -31,6 +31,9 @@ WHERE = Annotated[
 FORMAT = Annotated[
     list[str] | None, typer.Option("--format", help="png, pdf or svg; may be repeated.")
 ]
+REPLACE = Annotated[
+    bool, typer.Option("--replace", help="Files that exist may be replaced by those of a new one.")
+]
 INDEX = Annotated[int | None, typer.Option("--index", help="Number of the batch's run, from 0.")]
 PORT = Annotated[
     int | None,

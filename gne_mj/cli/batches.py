@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import FORMAT, JSON, SET, SYSTEM, WHERE, formats, settings
-from gne_mj.cli.output import on_terminal
+from gne_mj.cli.arguments import FORMAT, JSON, REPLACE, SET, SYSTEM, WHERE, formats, settings
+from gne_mj.cli.output import console, folder_for, on_terminal
+from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
     from gne_mj.batches import Progress, Store
@@ -73,7 +74,7 @@ def batch(
         ),
     ] = None,
     fail_on_exit: Annotated[
-        bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run left its set.")
+        bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run ended early.")
     ] = False,
     as_json: JSON = False,
 ) -> None:
@@ -85,14 +86,13 @@ def batch(
     from gne_mj.batches import Store, connected, execute, make_plan, parse_record, parse_sweep
     from gne_mj.batches.report import write_report
     from gne_mj.errors import InvalidInput
-    from gne_mj.simulation import interruption
 
     changed = bool(sweep or set_ or system or runs or seed or chunk)
     if scenario is None and (changed or record != "summaries" or spread != 0.9):
         raise InvalidInput(
             "SCENARIO", None, "a scenario must be named, unless --resume --out DIR is all there is"
         )
-    with connected(cluster) as client, interruption() as stop:
+    with connected(cluster) as client, stopping() as stop:
         if scenario is None:
             if not resume:
                 raise InvalidInput("SCENARIO", None, "a scenario must be named, or --resume")
@@ -115,17 +115,13 @@ def batch(
             now = execute(
                 store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
             )
-        done = now.done == now.total
         if now.done:
-            _print(store, now, write_report(store), as_json)
+            _print(store, now, write_report(store, store.folder, replace=True), as_json)
         elif as_json:
-            print(json.dumps({"runs": now.total, "done": 0, "statuses": {}, "combinations": []}))
-    if not done and not as_json:
-        print(
-            f"\nstopped: {now.done} of {now.total} runs are stored; go on with"
-            f" `gne-mj batch --resume --out {out}`"
-        )
-    raise typer.Exit(1 if not done or (fail_on_exit and now.left) else 0)
+            print(json.dumps({**_counts(now), "statuses": {}, "combinations": []}))
+    if not now.complete and not as_json:
+        print(f"\nstopped: {_partial(store, now)}")
+    raise typer.Exit(1 if not now.complete or (fail_on_exit and now.ended_early) else 0)
 
 
 @app.command(name="batch-report")
@@ -134,14 +130,33 @@ def batch_report(
     out: WHERE = None,
     format_: FORMAT = None,
     as_json: JSON = False,
+    replace: REPLACE = False,
 ) -> None:
-    """Write a batch's tables (CSV) and its figure, whether it is complete or not."""
+    """Write a batch's tables (CSV) and its figure, whether it is complete or not.
+
+    In the batch's own folder they take the place of older ones.
+    """
     from gne_mj.batches import Progress, Store
     from gne_mj.batches.report import write_report
 
     kinds = formats(format_)
     store = Store.open(folder)
-    _print(store, Progress.of(store), write_report(store, out, kinds), as_json)
+    now, target = Progress.of(store), folder_for(out, folder)
+    report = write_report(store, target, kinds, replace=replace or target == folder)
+    _print(store, now, report, as_json)
+    if not now.complete and not as_json:
+        print(f"\npartial: {_partial(store, now)}")
+
+
+def _counts(now: "Progress") -> dict[str, Any]:
+    return {"runs": now.total, "done": now.done, "complete": now.complete}
+
+
+def _partial(store: "Store", now: "Progress") -> str:
+    return (
+        f"{now.done:,} of {now.total:,} runs are stored; go on with"
+        f" `gne-mj batch --resume --out {store.folder}`"
+    )
 
 
 def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> None:
@@ -150,8 +165,7 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
     if as_json:
         statuses = report.runs["status"].to_series().value_counts()
         words: dict[str, Any] = {
-            "runs": now.total,
-            "done": now.done,
+            **_counts(now),
             "statuses": {str(name): int(count) for name, count in statuses.items()},
             "combinations": json.loads(report.table.to_json(orient="records")),
         }
@@ -165,27 +179,26 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
 
 @contextmanager
 def _showing(total: int, quiet: bool) -> Iterator[Any]:
-    """A progress bar on a terminal's stderr: runs done, rate, time left, exits so far."""
+    """A progress bar on a terminal's stderr: runs done, rate, time left, early ends so far."""
     if not on_terminal(quiet):
         yield None
         return
     from rich import progress
-    from rich.console import Console
 
     with progress.Progress(
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TextColumn("runs  {task.fields[rate]}"),
         progress.TimeRemainingColumn(),
-        progress.TextColumn("{task.fields[left]} left the set"),
-        console=Console(stderr=True),
+        progress.TextColumn("{task.fields[early]} ended early"),
+        console=console(),
         transient=True,
     ) as bar:
-        task = bar.add_task("runs", total=total, rate="", left=0)
+        task = bar.add_task("runs", total=total, rate="", early=0)
 
         def show(now: "Progress") -> None:
             speed = bar.tasks[0].speed
             rate = f"{speed:.3g}/s" if speed else ""
-            bar.update(task, completed=now.done, left=now.left, rate=rate)
+            bar.update(task, completed=now.done, early=now.ended_early, rate=rate)
 
         yield show

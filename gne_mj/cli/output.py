@@ -1,50 +1,79 @@
 """Where commands write: result folders, progress, words."""
 
 import json
-import shutil
+import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from gne_mj.trajectory import Trajectory
 
 
 PREPARING = "preparing (a first run compiles for a few seconds)"
 
 
-@contextmanager
-def results(out: Path | None, replace: bool) -> Iterator[Path | None]:
-    """A folder that becomes ``out`` when all is written, and vanishes if something fails.
+class Results:
+    """Where a command keeps what it finds: nowhere, or in a folder that appears when it is whole.
 
-    `paper` may replace results of its own, and only those.
+    Args:
+        out: the folder that was asked for, if any; refused at once if it exists.
+        replace: results of `paper` there may be replaced, and only those.
+
+    Attributes:
+        out: where the results are, once they are written.
     """
-    import tempfile
 
-    from gne_mj.errors import InvalidInput
+    def __init__(self, out: Path | None, *, replace: bool = False) -> None:
+        from gne_mj.errors import InvalidInput
+        from gne_mj.files import hidden_folder, storing
 
-    if out is None:
-        yield None
-        return
-    if out.exists() and not (replace and _is_of_paper(out)):
-        raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    except OSError as error:
-        raise InvalidInput("--out", str(out), f"it cannot be written: {error.strerror}") from None
-    try:
-        yield folder
-        folder.chmod(0o755)
-        if out.exists():
-            _replace(folder, out)
-        else:
-            folder.rename(out)
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
+        self.out = out
+        self._replaced: dict[str, object] | None = None
+        if out is None:
+            return
+        if replace and _is_of_paper(out):
+            self._replaced = _entries(out)
+        elif os.path.lexists(out):
+            raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
+        there = next(parent for parent in out.parents if parent.exists())
+        with storing("--out", out), hidden_folder(there):
+            pass  # a place that cannot be written to is refused before anything is computed
+
+    @contextmanager
+    def written(self) -> Iterator[Path | None]:
+        """The folder to write to, None without one; it gets its name when the block ends.
+
+        If somebody else has made something of that name meanwhile, the results get another one, and
+        stderr says which.
+
+        Raises:
+            StorageError: the disk is full, or fails; what was there before is as it was.
+        """
+        from gne_mj.files import appear, hidden_folder, storing
+
+        if self.out is None:
+            yield None
+            return
+        with storing("--out", self.out):
+            self.out.parent.mkdir(parents=True, exist_ok=True)
+        with storing("--out", self.out), hidden_folder(self.out.parent) as hidden:
+            folder = hidden / self.out.name
+            folder.mkdir()
+            yield folder
+            if self._replaced is not None and _replace(folder, self.out, self._replaced):
+                return
+            place = appear(folder, self.out)
+        if place != self.out:
+            say(
+                f"gne-mj: warning: {self.out} was made by somebody else meanwhile; these results"
+                f" are in {place}"
+            )
+        self.out = place
 
 
 def _is_of_paper(out: Path) -> bool:
@@ -54,22 +83,96 @@ def _is_of_paper(out: Path) -> bool:
     return all((out / name).exists() for name in names)
 
 
-def _replace(folder: Path, out: Path) -> None:
-    """Move all in ``folder`` into ``out``; what has the same names there goes last of all."""
-    import tempfile
+def _entries(folder: Path) -> dict[str, object]:
+    """What tells whether something in a folder was changed or came: by name, which and when."""
+    found: dict[str, object] = {}
+    for path in folder.iterdir():
+        about = path.lstat()
+        found[path.name] = (about.st_ino, about.st_mtime_ns, about.st_size)
+    return found
 
-    aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
-    for entry in sorted(folder.iterdir()):
-        if (out / entry.name).exists():
-            (out / entry.name).rename(aside / entry.name)
-        entry.rename(out / entry.name)
-    folder.rmdir()
-    shutil.rmtree(aside)
+
+def _replace(folder: Path, out: Path, before: dict[str, object]) -> bool:
+    """Let all in ``folder`` change places with what has its name in ``out``; the rest there stays.
+
+    At every moment each of them is there, whole: the old one or the new one.
+
+    Returns:
+        Whether it was done: not if ``out`` is no longer as it was before.
+    """
+    from gne_mj.files import exchange, locked, rename_new
+
+    if not out.is_dir():
+        return False
+    with locked(out):
+        if _entries(out) != before:
+            return False
+        for entry in sorted(folder.iterdir()):
+            if (out / entry.name).exists():
+                exchange(entry, out / entry.name)
+            else:
+                rename_new(entry, out / entry.name)
+    return True
+
+
+def folder_for(out: Path | None, own: Path) -> Path:
+    """Where figures and tables go: to --out, which is made, or beside what they are of.
+
+    Raises:
+        InvalidInput: it is no folder, or cannot be made.
+    """
+    from gne_mj.files import storing
+
+    if out is None or (out.exists() and out.samefile(own)):
+        return own
+    with storing("--out", out):
+        out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def say(line: str) -> None:
+    """A line on stderr, if that is open: what is told there must not end a command."""
+    if sys.stderr is not None:
+        try:
+            print(line, file=sys.stderr, flush=True)
+        except OSError:
+            give_up(sys.stderr)
+
+
+def give_up(stream: TextIO) -> None:
+    """Let what a stream still holds go nowhere, or Python complains of it at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with suppress(OSError, ValueError):  # it is no file of the system's own
+        os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+class _Terminal:
+    """stderr, which may be closed while something is shown there: that must not end a run."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(sys.stderr, name)
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            return sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            sys.stderr.flush()
+
+
+def console() -> "Console":
+    """Rich's, on stderr."""
+    from rich.console import Console
+
+    return Console(file=cast(TextIO, _Terminal()))
 
 
 def on_terminal(quiet: bool) -> bool:
     """Whether somebody watches, and wants to."""
-    return not quiet and sys.stderr.isatty()
+    return not quiet and sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
@@ -78,9 +181,7 @@ def working(quiet: bool, what: str) -> Iterator[Any]:
     if not on_terminal(quiet):
         yield None
         return
-    from rich.console import Console
-
-    with Console(stderr=True).status(what) as status:
+    with console().status(what) as status:
         yield status.update
 
 
@@ -90,7 +191,6 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
     if not on_terminal(quiet):
         yield None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     with Progress(
@@ -99,7 +199,7 @@ def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
         ),
         BarColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console(),
         transient=True,
     ) as bar:
         task = bar.add_task("run", total=total)
@@ -130,9 +230,8 @@ def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
 def _warn(name: str, report: dict[str, Any]) -> None:
     saturated = report["actuators"]["saturated"]
     if saturated is not None:
-        print(
+        say(
             f"gne-mj: warning: systems.{name}: the law asked agent {saturated['agent']} for"
             f" {saturated['demand']:.4g} at {saturated['time']:.4g} s, beyond its input limit"
-            f" {saturated['limit']:g}; from then on nothing is guaranteed",
-            file=sys.stderr,
+            f" {saturated['limit']:g}; from then on nothing is guaranteed"
         )

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import FORMAT, INDEX, JSON, OUT, PORT, SET, WHERE, formats
-from gne_mj.cli.output import tell
+from gne_mj.cli.arguments import FORMAT, INDEX, JSON, OUT, PORT, REPLACE, SET, WHERE, formats
+from gne_mj.cli.output import Results, folder_for, tell
 from gne_mj.cli.simulating import simulate, source_of, stored
 from gne_mj.cli.views import watch
 
@@ -49,13 +49,14 @@ def run(
     source = source_of(scenario, from_, index)
     if view:
         title = Path(scenario).stem if scenario else f"run {index} of {from_}"
-        trajectory = watch(source, set_, out, as_json, title=title, speed=speed, port=port)
+        trajectory = watch(source, set_, Results(out), as_json, title=title, speed=speed, port=port)
     else:
         for key, value in (("--speed", speed), ("--port", port)):
             if value is not None:
                 raise InvalidInput(key, value, "it goes with --view")
-        trajectory = simulate(source, set_, out, quiet=as_json)
-        tell(trajectory, as_json, out)
+        results = Results(out)
+        trajectory = simulate(source, set_, results, quiet=as_json)
+        tell(trajectory, as_json, results.out)
     raise typer.Exit(0 if trajectory.holds else 1)
 
 
@@ -71,7 +72,9 @@ def paper(
 
     Results of an earlier `paper` in the same folder are replaced; other files there stay.
     """
-    trajectory = simulate("paper", set_, out, quiet=as_json, replace=True, illustrate=_illustrate)
+    results = Results(out, replace=True)
+    trajectory = simulate("paper", set_, results, quiet=as_json, illustrate=_illustrate)
+    out = results.out or out
     tell(trajectory, as_json, out)
     if not as_json:
         for figure in sorted(out.glob("*.png")):
@@ -95,15 +98,18 @@ def plot(
     ],
     out: WHERE = None,
     format_: FORMAT = None,
+    replace: REPLACE = False,
 ) -> None:
-    """Draw the figures of a stored run."""
+    """Draw the figures of a stored run.
+
+    In the run's own folder they take the place of older ones.
+    """
     from gne_mj import plots
 
     kinds = formats(format_)
     trajectory = stored(run_folder)
-    target = out or run_folder
-    target.mkdir(parents=True, exist_ok=True)
-    for path in plots.save(trajectory, target, kinds):
+    target = folder_for(out, run_folder)
+    for path in plots.save(trajectory, target, kinds, replace=replace or target == run_folder):
         print(path)
 
 

@@ -1,13 +1,13 @@
 """What commands that run something, or read a run, have in common."""
 
 import json
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gne_mj.cli.arguments import settings
-from gne_mj.cli.output import PREPARING, progress, results, working
+from gne_mj.cli.output import PREPARING, Results, progress, say, working
+from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
     from gne_mj.simulation import Simulation
@@ -33,10 +33,9 @@ def source_of(
 
     store = Store.open(folder)
     for difference in store.check_files():
-        print(
+        say(
             f"gne-mj: warning: {difference} since the batch was run, so that the last bits may"
-            " differ",
-            file=sys.stderr,
+            " differ"
         )
     tables: dict[str, Any] = json.loads(store.plan.alone(index).model_dump_json(exclude_none=True))
     return tables
@@ -45,35 +44,28 @@ def source_of(
 def simulate(
     scenario: "str | Mapping[str, Any]",
     changes: list[str] | None,
-    out: Path | None,
+    results: Results,
     *,
     quiet: bool,
-    replace: bool = False,
     illustrate: "Callable[[Trajectory, Path], None] | None" = None,
 ) -> "Trajectory":
     """Run a scenario to its end, with progress, and keep it in a folder.
 
     Args:
         scenario, changes: what to run, with what --set changes.
-        out: where to keep it, if anywhere.
+        results: where to keep it, if anywhere.
         quiet: show no progress.
-        replace: results of `paper` there may be replaced.
         illustrate: writes pictures beside the trajectory.
     """
-    from gne_mj.simulation import interruption
-
     simulation = load(scenario, changes, quiet=quiet)
-    # The interruption covers the writing too: a first Ctrl-C never loses what was computed.
-    with (
-        interruption(),
-        results(out, replace) as folder,
-        progress(simulation.clock.duration, quiet) as show,
-    ):
-        trajectory = simulation.run(show)
-        if folder is not None:
-            keep(trajectory, folder)
-            if illustrate is not None:
-                illustrate(trajectory, folder)
+    with stopping():  # the writing too: a first Ctrl-C never loses what was computed
+        with progress(simulation.clock.duration, quiet) as show:
+            trajectory = simulation.run(show)
+        with results.written() as folder:
+            if folder is not None:
+                keep(trajectory, folder)
+                if illustrate is not None:
+                    illustrate(trajectory, folder)
     return trajectory
 
 
@@ -100,10 +92,8 @@ def stored(folder: Path) -> "Trajectory":
         raise InvalidInput("RUN", str(folder), f"it must be a folder with a trajectory.zarr{batch}")
     try:
         return Trajectory.load(store)
-    except (OSError, KeyError, ValueError, RuntimeError):
-        raise InvalidInput(
-            "RUN", str(folder), "its trajectory.zarr must be one that a run wrote"
-        ) from None
+    except InvalidInput as error:
+        raise InvalidInput("RUN", str(store), error.expected) from None
 
 
 def load(

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -12,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import INDEX, PORT, settings
-from gne_mj.cli.output import PREPARING, results, tell, working
+from gne_mj.cli.arguments import INDEX, PORT, REPLACE, settings
+from gne_mj.cli.output import PREPARING, Results, on_terminal, say, tell, working
+from gne_mj.cli.signals import stopping
 from gne_mj.cli.simulating import is_batch, keep, simulate, source_of, stored
 
 if TYPE_CHECKING:
@@ -34,31 +36,34 @@ def view(
         typer.Option("--html", metavar="FILE", help="Write one file that opens from disk instead."),
     ] = None,
     port: PORT = None,
+    replace: REPLACE = False,
 ) -> None:
     """Show a stored run in a browser, with a time slider; a batch's run is run again for it."""
     from gne_mj.errors import InvalidInput
+    from gne_mj.files import refuse_existing, written
 
     if html is not None and port is not None:
         raise InvalidInput("--port", port, "it is of no use with --html")
     if html is not None and (html.is_dir() or not html.parent.is_dir()):
         raise InvalidInput("--html", str(html), "it must be a file, in a folder that exists")
+    if html is not None and not replace:
+        refuse_existing("--html", [html])
     title = run_folder.resolve().name
     if index is None:
         trajectory = stored(run_folder)
     elif is_batch(run_folder):
-        trajectory = simulate(source_of(None, run_folder, index), None, None, quiet=False)
+        source = source_of(None, run_folder, index)
+        trajectory = simulate(source, None, Results(None), quiet=False)
         title = f"{title}, run {index}"
     else:
         raise InvalidInput("--index", index, "it goes with a folder that `batch` wrote")
     if html is not None:
-        from gne_mj.view import write_html
+        from gne_mj.view import html_page
 
-        try:
-            print(write_html(trajectory, html, title))
-        except OSError as error:
-            raise InvalidInput(
-                "--html", str(html), f"it cannot be written: {error.strerror}"
-            ) from None
+        page = html_page(trajectory, title)
+        with written("--html", html, replace=replace) as new:
+            new.write_text(page, encoding="utf-8")
+        print(html)
         return
     _show(trajectory, title, port)
 
@@ -66,7 +71,7 @@ def view(
 def watch(
     source: "str | Mapping[str, Any]",
     changes: list[str] | None,
-    out: Path | None,
+    results: Results,
     as_json: bool,
     *,
     title: str,
@@ -79,29 +84,28 @@ def watch(
 
     Args:
         source, changes: what to run, with what --set changes.
-        out: where to keep it.
+        results: where to keep it.
         as_json: print the report and nothing else.
         title: of the page.
         speed: as --speed gives it.
         port: as --port gives it.
     """
     from gne_mj.scenario import load_scenario
-    from gne_mj.simulation import interruption
 
     factor = _speed(speed)
-    with interruption() as stop, ExitStack() as page:
-        with results(out, False) as folder:
-            with working(as_json, PREPARING):
-                from gne_mj.view import Session
+    with stopping() as stop, ExitStack() as page:
+        with working(as_json, PREPARING):
+            from gne_mj.view import Session
 
-                scenario = load_scenario(source, settings(changes))
-                session = Session(scenario, title, speed=factor, port=port or 0)
-            page.callback(session.server.close)
-            page.enter_context(_announced(session.server.url))
-            trajectory = session.run(stop)
+            scenario = load_scenario(source, settings(changes))
+            session = Session(scenario, title, speed=factor, port=port or 0)
+        page.callback(session.server.close)
+        page.enter_context(_announced(session.server.url))
+        trajectory = session.run(stop)
+        with results.written() as folder:
             if folder is not None:
                 keep(trajectory, folder)
-        tell(trajectory, as_json, out)
+        tell(trajectory, as_json, results.out)
         sys.stdout.flush()  # whoever reads it need not wait for the page's end
         if not stop.is_set():
             session.show(trajectory)
@@ -110,16 +114,14 @@ def watch(
 
 
 def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
-    from gne_mj.simulation import interruption
-
-    with interruption() as stop:
+    with stopping() as stop:
         with working(False, "preparing the replay"):
             from gne_mj.view import serve
 
             server = serve(trajectory, title, port=port or 0)
         with _announced(server.url):
-            while not stop.wait(1.0):
-                pass
+            while not stop.is_set():
+                time.sleep(0.2)
         server.close()
 
 
@@ -148,9 +150,9 @@ def _announced(url: str) -> Iterator[None]:
     The browser is given a file of the user's own that leads there: what is on a command line all
     users of the machine can read, and the address holds the page's secret.
     """
-    print(f"view        {url}   (Ctrl-C ends)", file=sys.stderr, flush=True)
+    say(f"view        {url}   (Ctrl-C ends)")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if not (sys.stderr.isatty() and (screen or sys.platform == "darwin")):
+    if not (on_terminal(False) and (screen or sys.platform == "darwin")):
         yield
         return
     with tempfile.NamedTemporaryFile("w", prefix="gne-mj-", suffix=".html") as file:

@@ -36,7 +36,7 @@ _PANELS = (
 
 
 def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
-    """Draw a batch's summary: a panel for each figure, and one for the share of runs that left.
+    """Draw a batch's summary: a panel for each figure, and the share of runs that ended early.
 
     Over the swept key with most numbers runs the horizontal axis; up to five combinations of the
     others get a line each, and more of them are put together. Lines are medians, bands hold 90% of
@@ -45,7 +45,7 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
     numbers the combinations stand side by side; without any there are histograms.
 
     Args:
-        runs: figures of the runs, one each.
+        runs: figures of the runs, one each; attribute "planned" has how many there will be.
         file: to write.
         kind: of file: png, pdf or svg.
     """
@@ -56,8 +56,8 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
 
     key = _horizontal(runs)
     lines = _groups(runs, key)
-    left = ~np.isin(runs["status"].to_numpy(), SUCCESSES)
-    panels = len(_PANELS) + bool(left.any())
+    early = ~np.isin(runs["status"].to_numpy(), SUCCESSES)
+    panels = len(_PANELS) + bool(early.any())
     with plt.rc_context(STYLE):
         figure, grid = plt.subplots(
             1, panels, figsize=(2.9 * panels, 2.9), layout="constrained", squeeze=False,
@@ -74,8 +74,8 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
                 _histogram(axes, runs[panel.name].to_numpy(), label)
                 continue
             axes.set_ylabel(label)
-        if left.any():
-            _share(grid[0, -1], runs, key, left, lines)
+        if early.any():
+            _share(grid[0, -1], runs, key, early, lines)
         if key is not None:
             for axes in grid[0]:
                 axes.set_xlabel(key)
@@ -87,6 +87,9 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
                 )
             elif _others(runs, key):
                 figure.supxlabel(f"all values of {', '.join(_others(runs, key))}", fontsize=7.5)
+        planned = runs.attrs.get("planned", runs.sizes["run"])
+        if planned > runs.sizes["run"]:
+            figure.suptitle(f"partial: {runs.sizes['run']:,} of {planned:,} runs", fontsize=8.5)
         figure.savefig(file, dpi=200, format=kind)
     plt.close(figure)
 
@@ -224,20 +227,20 @@ def _share(
     axes: "Axes",
     runs: "xarray.Dataset",
     key: str | None,
-    left: NDArray[np.bool_],
+    early: NDArray[np.bool_],
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
-    axes.set_ylabel("share of runs that left the set")
+    axes.set_ylabel("share of runs that ended early")
     axes.set_ylim(-0.03, 1.03)
     if key is None:
         for number, (_, mine) in enumerate(lines):
-            axes.bar(number, left[mine].mean(), color=line_style(number)["color"], width=0.5)
-        _name(axes, lines if len(lines) > 1 else [("all", left)])
+            axes.bar(number, early[mine].mean(), color=line_style(number)["color"], width=0.5)
+        _name(axes, lines if len(lines) > 1 else [("all", early)])
         return
     swept = runs[key].to_numpy()
     for number, (_, mine) in enumerate(lines):
         xs = np.unique(swept[mine])
-        shares = [left[mine & (swept == x)].mean() for x in xs]
+        shares = [early[mine & (swept == x)].mean() for x in xs]
         axes.plot(xs, shares, marker=".", **line_style(number))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.files import refuse_existing, written
 from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style
 from gne_mj.trajectory import Trajectory
 from gne_mj.verdicts import SUCCESSES
@@ -42,19 +43,39 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
 
 
 def save(
-    trajectory: Trajectory, folder: str | Path, formats: tuple[str, ...] = ("png",)
+    trajectory: Trajectory,
+    folder: str | Path,
+    formats: tuple[str, ...] = ("png",),
+    *,
+    replace: bool = True,
 ) -> list[Path]:
-    """Write every figure of :func:`draw` into a folder; returns the files' paths."""
+    """Write every figure of :func:`draw` into a folder; returns the files' paths.
+
+    Args:
+        trajectory: what is drawn.
+        folder: where to.
+        formats: each one of ``FORMATS``.
+        replace: files of the same names are replaced, each once the new one is whole.
+
+    Raises:
+        InvalidInput: files exist and may not be replaced, or the folder cannot be written to.
+        StorageError: the disk is full, or fails.
+    """
     import matplotlib.pyplot as plt
 
-    paths = []
-    for name, figure in draw(trajectory).items():
-        for kind in formats:
-            path = Path(folder) / f"{name}.{kind}"
-            figure.savefig(path, dpi=200)
-            paths.append(path)
-        plt.close(figure)
-    return paths
+    figures = draw(trajectory)
+    paths = {name: [Path(folder) / f"{name}.{kind}" for kind in formats] for name in figures}
+    try:
+        if not replace:
+            refuse_existing("folder", [path for each in paths.values() for path in each])
+        for name, figure in figures.items():
+            for path in paths[name]:
+                with written("folder", path, replace=replace) as new:
+                    figure.savefig(new, dpi=200)
+    finally:
+        for figure in figures.values():
+            plt.close(figure)
+    return [path for each in paths.values() for path in each]
 
 
 def _plural(noun: str) -> str:

@@ -7,6 +7,7 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
+from gne_mj.files import written
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.replay import replay_pack
 
@@ -51,16 +52,16 @@ def html_page(trajectory: Trajectory, title: str | None = None) -> str:
 
 
 def write_html(trajectory: Trajectory, path: str | Path, title: str | None = None) -> Path:
-    """Write :func:`html_page` into a file, which it replaces only when it is whole."""
+    """Write :func:`html_page` into a file, which it replaces only when it is whole.
+
+    Raises:
+        InvalidInput: see :func:`html_page`; or it is in no place that can be written to.
+        StorageError: the disk is full, or fails.
+    """
     path = Path(path)
     text = html_page(trajectory, title)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with written("path", path, replace=True) as new:
+        new.write_text(text, encoding="utf-8")
     return path
 
 

@@ -21,6 +21,8 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=25, help="turns of which the median counts")
     parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
     options = parser.parse_args()
+    if options.out and options.out.exists():
+        parser.error(f"--out: {options.out} exists already; name another file")
     rows: list[dict[str, str]] = []
     for group in (batch, fleet, solver, twin, view, peer_mjx, peer_diffrax, peer_cbfpy):
         rows.extend(group.rows(options.runs))

@@ -22,8 +22,15 @@ def parser(name: str, about: str | None, runs: int) -> argparse.ArgumentParser:
     made.add_argument("--first", type=int, default=0, help="index of the first run")
     made.add_argument("--index", type=int, help="repeat this one alone")
     made.add_argument("--processes", type=int, default=2)
-    made.add_argument("--out", type=Path, help="JSON file for the rows of all that is notable")
+    made.add_argument("--out", type=_new_file, help="JSON file for the rows of all that is notable")
     return made
+
+
+def _new_file(text: str) -> Path:
+    path = Path(text)
+    if path.exists():
+        raise argparse.ArgumentTypeError(f"{path} exists already; name another file")
+    return path
 
 
 def campaign(

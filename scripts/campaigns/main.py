@@ -19,6 +19,8 @@ def main() -> int:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, help="JSON file for the counts of the first part")
     options = parser.parse_args()
+    if options.out and options.out.exists():
+        parser.error(f"--out: {options.out} exists already; name another file")
     broken = 0
     if options.runs:
         lines, broken, counts = held.campaign(options.runs, options.seed, options.processes)

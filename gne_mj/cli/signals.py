@@ -1,0 +1,39 @@
+"""Signals that ask a command to end: Ctrl-C, a scheduler (SIGTERM), a closed terminal."""
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_OTHERS = (signal.SIGTERM, signal.SIGHUP)  # than Ctrl-C, for which Python has an exception already
+
+
+def raise_on_signals() -> None:
+    """Let SIGTERM and SIGHUP unwind as Ctrl-C does, so that nothing half-written stays.
+
+    What is ignored stays so, as SIGHUP under nohup.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in _OTHERS:
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _end)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    sys.exit(128 + number)
+
+
+@contextmanager
+def stopping() -> Iterator[threading.Event]:
+    """An event that the first of these signals sets; a second one ends the command at once.
+
+    Nobody may wait for the event: the signal could come while its lock is held.
+    """
+    from gne_mj.simulation import interruption
+
+    heard = [number for number in _OTHERS if signal.getsignal(number) is not signal.SIG_IGN]
+    with interruption(signal.SIGINT, *heard) as stop:
+        yield stop
