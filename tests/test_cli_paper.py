@@ -4,6 +4,7 @@ In a file of its own, which comes late: by then others have compiled what the sy
 """
 
 import json
+import shutil
 import signal
 import time
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from commands import gne, gne_here, running
 
 import gne_mj
+from gne_mj.simulation import Simulation
 
 FIGURES = {"robots-velocities", "robots-gaps", "channels-powers", "channels-total-power"}
 SHORT = ("--set", "simulation.duration=0.2")
@@ -57,6 +59,36 @@ def test_paper_replaces_its_own_results_only(drawn, tmp_path):
     assert json.loads(done.stdout)["wall_time"] != before
     assert (folder / "channels-powers.png").stat().st_size > 5000
     assert [path.name for path in folder.parent.iterdir()] == ["paper"]
+
+
+def test_what_was_changed_while_paper_ran_is_not_replaced(drawn, tmp_path, monkeypatch):
+    folder = tmp_path / "paper"
+    shutil.copytree(drawn[0], folder)
+    run = Simulation.run
+
+    def meanwhile(*arguments):
+        (folder / "robots-gaps.png").write_bytes(b"mine")
+        return run(*arguments)
+
+    monkeypatch.setattr(Simulation, "run", meanwhile)
+    report = (folder / "report.json").read_text()
+    done = gne_here("paper", *SHORT, "--out", folder)
+    assert done.returncode == 0
+    assert (folder / "robots-gaps.png").read_bytes() == b"mine"
+    assert (folder / "report.json").read_text() == report
+    assert {path.name for path in tmp_path.iterdir()} == {"paper", "paper-2"}
+    assert f"these results are in {folder}-2" in done.stderr
+    assert str(tmp_path / "paper-2" / "replay.html") in done.stdout
+
+
+def test_paper_leaves_a_report_of_someone_elses_alone(drawn, tmp_path):
+    """All else there may be of `paper`."""
+    folder = tmp_path / "paper"
+    shutil.copytree(drawn[0], folder)
+    (folder / "report.json").write_text('{"author": "me"}')
+    assert gne_here("paper", *SHORT, "--out", folder).returncode == 2
+    assert (folder / "report.json").read_text() == '{"author": "me"}'
+    assert [path.name for path in tmp_path.iterdir()] == ["paper"]
 
 
 def test_paper_leaves_a_folder_of_someone_elses_with_a_report_alone(tmp_path):

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as arrays
 import gne_mj
 from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.faults import MessageLoss, Silence, for_native
 from gne_mj.games import velocity_game
 from gne_mj.loops import faults as native
@@ -317,7 +317,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch)
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(OSError, match="space"):
+    with pytest.raises(StorageError, match="space"):
         write_html(trajectory, path)
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]

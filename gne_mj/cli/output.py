@@ -79,8 +79,13 @@ class Results:
 def _is_of_paper(out: Path) -> bool:
     """Whether a folder holds what `paper` writes: `run` does not draw."""
     figures = ("robots-velocities", "robots-gaps", "channels-powers", "channels-total-power")
-    names = ("report.json", "trajectory.zarr", *(f"{figure}.png" for figure in figures))
-    return all((out / name).exists() for name in names)
+    names = ("trajectory.zarr", *(f"{figure}.png" for figure in figures))
+    try:
+        report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    ours = isinstance(report, dict) and "systems" in report
+    return ours and all((out / name).exists() for name in names)
 
 
 def _entries(folder: Path) -> dict[str, object]:
