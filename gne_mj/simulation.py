@@ -23,6 +23,8 @@ from gne_mj.verdicts import check_numbers
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s
 _CHUNK = 0.1
 
+_interruptions: list[threading.Event] = []  # the one that is open, if any
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -348,13 +350,17 @@ class SystemRun:
 def interruption() -> Iterator[threading.Event]:
     """An event that Ctrl-C sets, so that a run ends between chunks and keeps what it has.
 
-    A second Ctrl-C acts as usual. Outside the main thread signals are left alone.
+    A second Ctrl-C acts as usual. Inside another interruption the event is that one's. Outside the
+    main thread signals are left alone.
     """
-    event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield event
+        yield threading.Event()
         return
-    before = signal.getsignal(signal.SIGINT)
+    if _interruptions:
+        yield _interruptions[-1]
+        return
+    event, before = threading.Event(), signal.getsignal(signal.SIGINT)
+    _interruptions.append(event)
 
     def stop(number: int, frame: object) -> None:
         event.set()
@@ -365,3 +371,4 @@ def interruption() -> Iterator[threading.Event]:
         yield event
     finally:
         signal.signal(signal.SIGINT, before)
+        _interruptions.remove(event)

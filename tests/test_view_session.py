@@ -1,6 +1,8 @@
 """A live run: the same steps as any other, and what viewers may do to it."""
 
+import signal
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -405,6 +407,28 @@ def test_an_exit_is_told_with_its_words():
     (run,) = session.simulation.runs.values()
     assert status_now(run.system, run.loop.monitor) == state  # live and at the end the same words
     assert state["exit_time"] == trajectory.reports["robots"]["exit"]["time"]
+
+
+def test_a_signal_near_the_end_of_a_wait_does_not_prolong_it():
+    """queue.SimpleQueue waits for ever then, on Python 3.11 and 3.12."""
+    handled = []
+
+    def busy(number, frame):
+        handled.append(number)
+        time.sleep(0.2)  # beyond the wait's end
+
+    before = signal.signal(signal.SIGALRM, busy)
+    with watched() as (session, _):
+        late = threading.Timer(5.0, session._receive, ({"do": "pause"}, None))
+        late.start()
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+            session._look(0.1)
+            assert handled
+            assert session._playing  # what came late was not waited for
+        finally:
+            signal.signal(signal.SIGALRM, before)
+            late.cancel()
 
 
 def test_a_meshcat_visualizer_draws_into_the_page():

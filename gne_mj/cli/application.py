@@ -2,9 +2,13 @@
 
 import json
 import sys
-from typing import Annotated
+from contextlib import nullcontext
+from typing import Annotated, NoReturn
 
 import typer
+
+from gne_mj.cli.ending import watched
+from gne_mj.cli.output import emit, results_only
 
 app = typer.Typer(
     add_completion=False,
@@ -35,16 +39,28 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails or the disk is full.
+    The exit status is 2, but 1 where a function of the user's own fails or the disk is full. With
+    --json nothing but the report is printed to stdout, whatever a user's functions print.
     """
+    with watched(), results_only() if "--json" in sys.argv else nullcontext():
+        _main()
+
+
+def _main() -> None:
     try:
         app()
     except BrokenPipeError:
         sys.exit(1)
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
-    except Exception as error:
-        from gne_mj.errors import GneError, StorageError, UserCodeError
+    except SystemExit as ended:  # a command's own, unless a user's function asked for it
+        from gne_mj.errors import fault_of_user
+
+        if (fault := fault_of_user(ended)) is not None:
+            _fail(str(fault), fault.status, 1)
+        raise
+    except BaseException as error:
+        from gne_mj.errors import GneError, StorageError, UserCodeError, fault_of_user
 
         if type(error).__module__.startswith("numba"):
             from gne_mj.user_files import compiler_complaint
@@ -52,13 +68,15 @@ def main() -> None:
             if (complaint := compiler_complaint(error)) is not None:
                 _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
-            raise
+            if (fault := fault_of_user(error)) is None:
+                raise
+            _fail(str(fault), fault.status, 1)
         code = 1 if isinstance(error, UserCodeError | StorageError) else 2
         _fail(str(error), getattr(error, "status", None), code)
 
 
-def _fail(message: str, status: str | None = None, code: int = 2) -> None:
+def _fail(message: str, status: str | None = None, code: int = 2) -> NoReturn:
     if "--json" in sys.argv:
-        print(json.dumps({"status": status or "invalid_input", "message": message}))
+        emit(json.dumps({"status": status or "invalid_input", "message": message}))
     print(f"gne-mj: {status + ': ' if status else ''}{message}", file=sys.stderr)
     sys.exit(code)

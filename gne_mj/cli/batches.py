@@ -10,7 +10,7 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, JSON, SET, SYSTEM, WHERE, formats, settings
-from gne_mj.cli.output import on_terminal
+from gne_mj.cli.output import emit, on_terminal
 
 if TYPE_CHECKING:
     from gne_mj.batches import Progress, Store
@@ -119,7 +119,7 @@ def batch(
         if now.done:
             _print(store, now, write_report(store), as_json)
         elif as_json:
-            print(json.dumps({"runs": now.total, "done": 0, "statuses": {}, "combinations": []}))
+            emit(json.dumps({"runs": now.total, "done": 0, "statuses": {}, "combinations": []}))
     if not done and not as_json:
         print(
             f"\nstopped: {now.done} of {now.total} runs are stored; go on with"
@@ -155,7 +155,7 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
             "statuses": {str(name): int(count) for name, count in statuses.items()},
             "combinations": json.loads(report.table.to_json(orient="records")),
         }
-        print(json.dumps(words, indent=2))
+        emit(json.dumps(words, indent=2))
         return
     print("\n".join(summary(report.table, list(report.runs.attrs["swept"]))))
     print(f"\nruns        {store.folder / 'runs.zarr'}")

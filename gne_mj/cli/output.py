@@ -1,18 +1,52 @@
 """Where commands write: result folders, progress, words."""
 
 import json
+import os
 import shutil
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
 
 
 PREPARING = "preparing (a first run compiles for a few seconds)"
+
+_stdout: TextIO | None = None  # of results, where all else that is printed goes to stderr
+
+
+@contextmanager
+def results_only() -> Iterator[None]:
+    """Keep stdout for what :func:`emit` prints.
+
+    What else is printed goes to stderr: by a user's functions, and by libraries that these call.
+    """
+    global _stdout
+    own, _stdout = sys.__stdout__, sys.stdout
+    try:
+        with redirect_stdout(sys.stderr):
+            if own is None or own is not _stdout or sys.stderr is None:  # not the process's own
+                yield
+                return
+            kept = os.dup(own.fileno())
+            os.dup2(sys.stderr.fileno(), own.fileno())
+            _stdout = open(kept, "w", encoding=own.encoding, errors=own.errors)  # noqa: SIM115
+            try:
+                yield
+            finally:
+                os.dup2(kept, own.fileno())
+                with suppress(OSError):  # it was told when it was printed
+                    _stdout.close()
+    finally:
+        _stdout = None
+
+
+def emit(text: str) -> None:
+    """Print a result."""
+    print(text, file=_stdout, flush=True)
 
 
 @contextmanager
@@ -111,7 +145,7 @@ def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
     from gne_mj.summary import summary
 
     if as_json:
-        print(json.dumps(trajectory.report(), indent=2))
+        emit(json.dumps(trajectory.report(), indent=2))
         return
     for name, report in trajectory.reports.items():
         print(f"\n{name}")

@@ -61,7 +61,7 @@ class Session:
         self._ended: Trajectory | None = None
         self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
-        self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
+        self._asked: queue.Queue[tuple[dict[str, Any], Browser]] = queue.Queue()
         self._controls = {control.key: control for control in controls_of(scenario)}
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
