@@ -14,6 +14,16 @@ USER_MODULES = "gne_mj_user_"  # what the names of modules of users' files begin
 class GneError(Exception):
     """Base of every error that this package raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it come back from a cluster's worker, though it is not made of its message."""
+        return GneError._again, (type(self), self.args, self.__dict__)
+
+    @staticmethod
+    def _again(kind: "type[GneError]", args: tuple[Any, ...], about: dict[str, Any]) -> "GneError":
+        error = kind.__new__(kind, *args)
+        error.__dict__.update(about)
+        return error
+
 
 class InvalidInput(GneError, ValueError):
     """A value that cannot be used: names the key, the value and what would be right.
@@ -114,6 +124,12 @@ class StorageError(GneError, RuntimeError):
     """Results cannot be written, as on a full disk; what was written before is whole."""
 
     status = "not_stored"
+
+
+class ClusterError(GneError, RuntimeError):
+    """A cluster's scheduler no longer answers, or its workers end; what was stored is whole."""
+
+    status = "cluster_lost"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -125,7 +125,7 @@ def test_changed_numbers_act_at_once_between_adaptive_steps():
     assert not np.allclose(got.state, present.state, rtol=1e-2)
     simulation.advance(425)
     trajectory = simulation.trajectory()
-    assert trajectory.status == "completed"
+    assert trajectory.status in ("completed", "converged")
     assert np.all(np.diff(trajectory["channels"]["time"]) > 0.0)
 
 

@@ -17,11 +17,13 @@ class Progress:
         done: runs that are stored.
         total: of the batch.
         left: of those done, how many did not stay inside their set to the end.
+        workers: that a cluster has; None without one.
     """
 
     done: int
     total: int
     left: int
+    workers: int | None = None
 
     @classmethod
     def of(cls, store: Store) -> "Progress":

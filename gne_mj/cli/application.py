@@ -39,8 +39,9 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails or the disk is full. With
-    --json nothing but the report is printed to stdout, whatever a user's functions print.
+    The exit status is 2, but 1 where a function of the user's own fails, the disk is full or a
+    cluster is lost. With --json nothing but the report is printed to stdout, whatever a user's
+    functions print.
     """
     with watched(), results_only() if "--json" in sys.argv else nullcontext():
         _main()
@@ -60,7 +61,13 @@ def _main() -> None:
             _fail(str(fault), fault.status, 1)
         raise
     except BaseException as error:
-        from gne_mj.errors import GneError, StorageError, UserCodeError, fault_of_user
+        from gne_mj.errors import (
+            ClusterError,
+            GneError,
+            StorageError,
+            UserCodeError,
+            fault_of_user,
+        )
 
         if type(error).__module__.startswith("numba"):
             from gne_mj.user_files import compiler_complaint
@@ -71,7 +78,7 @@ def _main() -> None:
             if (fault := fault_of_user(error)) is None:
                 raise
             _fail(str(fault), fault.status, 1)
-        code = 1 if isinstance(error, UserCodeError | StorageError) else 2
+        code = 1 if isinstance(error, UserCodeError | StorageError | ClusterError) else 2
         _fail(str(error), getattr(error, "status", None), code)
 
 

@@ -1,7 +1,8 @@
 """Commands that run many runs, and tell of them."""
 
 import json
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, JSON, SET, SYSTEM, WHERE, formats, settings
-from gne_mj.cli.output import emit, on_terminal
+from gne_mj.cli.output import by_the_minute, emit, on_terminal
 
 if TYPE_CHECKING:
     from gne_mj.batches import Progress, Store
@@ -165,9 +166,23 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
 
 @contextmanager
 def _showing(total: int, quiet: bool) -> Iterator[Any]:
-    """A progress bar on a terminal's stderr: runs done, rate, time left, exits so far."""
-    if not on_terminal(quiet):
+    """A progress bar on a terminal's stderr: runs done, rate, time left, exits so far.
+
+    Elsewhere a line every minute. That a cluster has no workers is said at once.
+    """
+    if quiet:
         yield None
+        return
+    if not on_terminal(quiet):
+        with by_the_minute(quiet, f"0 of {total} runs") as change:
+            lonely = _Lonely(lambda words: print(words, file=sys.stderr, flush=True))
+
+            def note(now: "Progress") -> None:
+                lonely.look(now)
+                if change is not None:
+                    change(f"{now.done} of {total} runs, {now.left} left the set")
+
+            yield note
         return
     from rich import progress
     from rich.console import Console
@@ -182,10 +197,25 @@ def _showing(total: int, quiet: bool) -> Iterator[Any]:
         transient=True,
     ) as bar:
         task = bar.add_task("runs", total=total, rate="", left=0)
+        lonely = _Lonely(bar.console.print)
 
         def show(now: "Progress") -> None:
+            lonely.look(now)
             speed = bar.tasks[0].speed
             rate = f"{speed:.3g}/s" if speed else ""
             bar.update(task, completed=now.done, left=now.left, rate=rate)
 
         yield show
+
+
+class _Lonely:
+    """Says once that a cluster has no workers, whenever it has none."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._said = say, False
+
+    def look(self, now: "Progress") -> None:
+        """Now."""
+        if now.workers == 0 and not self._said:
+            self._say("gne-mj: waiting: the cluster has no workers (Ctrl-C ends)")
+        self._said = now.workers == 0

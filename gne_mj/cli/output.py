@@ -4,7 +4,8 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 
 PREPARING = "preparing (a first run compiles for a few seconds)"
+MINUTE = 60.0  # s between lines of progress where nobody watches
 
 _stdout: TextIO | None = None  # of results, where all else that is printed goes to stderr
 
@@ -107,10 +109,38 @@ def on_terminal(quiet: bool) -> bool:
 
 
 @contextmanager
-def working(quiet: bool, what: str) -> Iterator[Any]:
-    """A word on a terminal's stderr meanwhile; what is handed out changes it."""
-    if not on_terminal(quiet):
+def by_the_minute(quiet: bool, words: str) -> Iterator[Callable[[str], None] | None]:
+    """A line on stderr every minute meanwhile, for logs; what is handed out changes its words."""
+    if quiet:
         yield None
+        return
+    ended = threading.Event()
+
+    def tell() -> None:
+        minutes = 0
+        while not ended.wait(MINUTE):
+            minutes += 1
+            print(f"gne-mj: {minutes} min: {words}", file=sys.stderr, flush=True)
+
+    def change(to: str) -> None:
+        nonlocal words
+        words = to
+
+    thread = threading.Thread(target=tell, name="gne-mj progress", daemon=True)
+    thread.start()
+    try:
+        yield change
+    finally:
+        ended.set()
+        thread.join()
+
+
+@contextmanager
+def working(quiet: bool, what: str) -> Iterator[Any]:
+    """A word on a terminal's stderr meanwhile, else every minute; what is handed out changes it."""
+    if not on_terminal(quiet):
+        with by_the_minute(quiet, what) as change:
+            yield change
         return
     from rich.console import Console
 
@@ -120,9 +150,10 @@ def working(quiet: bool, what: str) -> Iterator[Any]:
 
 @contextmanager
 def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
-    """A progress bar on a terminal's stderr, else nothing."""
+    """A progress bar on a terminal's stderr, else a line every minute."""
     if not on_terminal(quiet):
-        yield None
+        with by_the_minute(quiet, f"0 of {total:g} {unit}") as change:
+            yield change and (lambda now: change(f"{now:.6g} of {total:g} {unit}"))
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
