@@ -1,14 +1,18 @@
 """The application, its errors and its entry point."""
 
 import json
+import os
 import sys
 from contextlib import nullcontext
+from io import TextIOWrapper
 from typing import Annotated, NoReturn
 
 import typer
 
 from gne_mj.cli.ending import watched
 from gne_mj.cli.output import emit, results_only
+
+_CTRL_C = 130  # typer's exit status
 
 app = typer.Typer(
     add_completion=False,
@@ -43,6 +47,11 @@ def main() -> None:
     cluster is lost. With --json nothing but the report is printed to stdout, whatever a user's
     functions print.
     """
+    # Nothing here needs a display, so that no setting for one may be in the way.
+    os.environ.update(MUJOCO_GL="disabled", MPLBACKEND="agg")
+    for stream in (sys.stdout, sys.stderr):  # whatever a terminal cannot show, and file names
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     with watched(), results_only() if "--json" in sys.argv else nullcontext():
         _main()
 
@@ -59,6 +68,8 @@ def _main() -> None:
 
         if (fault := fault_of_user(ended)) is not None:
             _fail(str(fault), fault.status, 1)
+        if ended.code == _CTRL_C:
+            print("gne-mj: interrupted", file=sys.stderr)
         raise
     except BaseException as error:
         from gne_mj.errors import (

@@ -53,7 +53,7 @@ def watched() -> Iterator[None]:
 
 
 def _watch(reader: int) -> None:
-    asked, second = 0, 0.0
+    asked, sent, second = 0, 0, 0.0  # signals that came, that were sent from here
     since: dict[int, tuple[_Call, float, bool]] = {}  # of each thread; whether it was told to end
     while True:
         if select.select([reader], [], [], LOOK if asked else None)[0]:
@@ -62,7 +62,7 @@ def _watch(reader: int) -> None:
                 return
             asked += sum(number in (signal.SIGINT, signal.SIGTERM) for number in told)
         now = time.monotonic()
-        if asked > 1:
+        if asked - sent > 1:
             second = second or now
             if now > second + GRACE:
                 _end("interrupted: nothing more is kept", 128 + signal.SIGINT)
@@ -75,7 +75,7 @@ def _watch(reader: int) -> None:
                 _end(_words(call), 1)
             if now > began + call.allowed and not ending:
                 ending = True
-                _interrupt(thread)
+                sent += _interrupt(thread)
             since[thread] = call, began, ending
         since = {thread: known for thread, known in since.items() if thread in calls}
 
@@ -100,13 +100,14 @@ def _module(frame: FrameType) -> str:
     return str(frame.f_globals.get("__name__"))
 
 
-def _interrupt(thread: int) -> None:
-    """Raise Ctrl-C's exception in a thread, when it next runs Python code."""
+def _interrupt(thread: int) -> int:
+    """Raise Ctrl-C's exception in a thread, when it next runs Python code; returns signals sent."""
     if thread == threading.main_thread().ident:
         signal.pthread_kill(thread, signal.SIGINT)  # which ends a sleep too
-    else:
-        error = ctypes.py_object(KeyboardInterrupt)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), error)
+        return 1
+    error = ctypes.py_object(KeyboardInterrupt)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), error)
+    return 0
 
 
 def _words(call: _Call) -> str:
