@@ -9,10 +9,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import own_games
 import pytest
 from commands import gne_here
 
-from gne_mj.errors import UserCodeError
+from gne_mj.equilibrium import penalised_equilibrium
+from gne_mj.errors import InfeasibleStart, InvalidInput, UserCodeError
+from gne_mj.game import Game
 from gne_mj.plain import number_of
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -152,6 +155,64 @@ def test_numbers():
     for value in (2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0), True + 1):
         number = number_of(len, value)
         assert (number, type(number)) == (2.0, float)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("name", None), ("name", "\udcff"), ("action_unit", 3), ("agent_name", ["a"]),
+        ("constraint_names", ("a", 2)), ("constraint_names", "ab"), ("axes", 3), ("axes", (1,)),
+        ("sizes", (1.0, 1.0)), ("sizes", ("1", "1")), ("sizes", None), ("sizes", 3),
+        ("in_cost", None), ("in_cost", [[0.5], [1]]), ("in_cost", "ab"), ("in_cost", [0, 1]),
+        ("in_constraint", [None, None]), ("in_constraint", [["a"], [1]]),
+        ("parameters", "abc"), ("parameters", [1j]), ("parameters", [[1.0]]),
+        ("parameters", [1, [2]]), ("parameters", None),
+        ("quantities", 3), ("quantities", (3,)), ("quantities", "ab"),
+        ("box", 3), ("box", (1.0, 2.0)), ("box", ("a", "b")), ("box", ([0j, 0j], [1.0, 1.0])),
+        ("jacobian_bounds", 3), ("feasible_jacobian_bounds", 3),
+        ("feasible_jacobian_bounds", ("a", "b")), ("feasible_jacobian_bounds", ([0.0], [1.0])),
+        ("gap_bounds", "a"), ("gap_bounds", [1j, 1j]), ("gap_bounds", [1.0]),
+        ("affine", 3), ("affine", np.ones(3)), ("smooth", "no"), ("tested", np.ones(3)),
+        ("row_scaled", None),
+        ("tightening", 3), ("tightening", "a"), ("tightening", -np.ones(2)),
+        ("tightening", np.ones(3)), ("tightening", np.ones(2) * 1j),
+    ],
+)  # fmt: skip
+def test_fields_of_a_game_that_are_of_another_kind(field, value):
+    """Each ended in a traceback, or was dropped in silence."""
+    module, parameters = own_games.quadratic(np.eye(2)).written
+    given = {
+        "name": "own", "kernels": module, "parameters": parameters, "sizes": (1, 1),
+        "in_cost": [(0, 1)] * 2, "in_constraint": [(0,), (1,)], "constraint_names": ("a", "b"),
+    }  # fmt: skip
+    Game(**given)
+    with pytest.raises(InvalidInput) as caught:
+        Game(**{**given, field: value})
+    assert caught.value.key == f"game.{field}"
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        (lambda: 3, "it must return (lower, upper), each of shape (2, 2)"),
+        (lambda: (None, None), "it must return (lower, upper)"),
+        (lambda: (np.zeros(2), np.ones(2)), "it must return (lower, upper)"),
+        (lambda: sys.exit(0), "SystemExit: 0"),
+        (lambda: 1 / 0, "ZeroDivisionError"),
+    ],
+)
+def test_bounds_of_slopes_that_are_none(returned, words):
+    game = own_games.quadratic(np.eye(2), jacobian_bounds=lambda box: returned())
+    with pytest.raises(UserCodeError) as caught:
+        game.jacobian_bounds((np.zeros(2), np.ones(2)))
+    assert words in str(caught.value)
+
+
+def test_a_start_outside_a_game_of_plain_functions():
+    """Its constraints are looked at in Python then."""
+    with pytest.raises(InfeasibleStart, match="g = 1"):
+        penalised_equilibrium(own_games.quadratic(np.eye(2)), 0.1, np.array([2.0, 0.5]))
 
 
 # Processes
