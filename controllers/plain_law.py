@@ -88,9 +88,9 @@ class PlainLaw(Law):
             return np.zeros(0)
         try:
             memory = _numbers(self._memory, y.copy())
-        except UserCodeError:
+        except (KeyboardInterrupt, UserCodeError):
             raise
-        except Exception as error:
+        except BaseException as error:
             raise UserCodeError(self._memory, error) from error
         if memory.ndim != 1 or not len(memory):
             raise UserCodeError(
@@ -102,11 +102,13 @@ class PlainLaw(Law):
 def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:
     value = function(*arguments)
     try:
-        return np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        if array.dtype.kind in "fiub":  # NumPy would drop an imaginary part, and read a text
+            return array.astype(np.float64)
     except (TypeError, ValueError):
-        raise UserCodeError(
-            function, f"it must return numbers, not {type(value).__name__}"
-        ) from None
+        pass
+    kind = "complex ones" if np.iscomplexobj(value) else type(value).__name__
+    raise UserCodeError(function, f"it must return numbers, not {kind}")
 
 
 @kernel

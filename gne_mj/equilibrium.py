@@ -155,7 +155,7 @@ class Solver:
         self._data = game.data
         self._name, self._constraint_names = game.name, game.constraint_names
         self._written = game.written
-        self._kernels, self._native = game.kernels, method.build(game.kernels)
+        self._native = method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
         position, self._half_band = order(game)
@@ -317,8 +317,8 @@ class Solver:
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
         raise_pending()
         if ended == method.OUTSIDE:
-            q, count = self._data.parameters, len(self._point.slack)
-            g = np.array([self._kernels.constraint(q, k, y) for k in range(count)])
+            module, q = self._written  # as Python can call it
+            g = np.array([module.constraint(q, k, y) for k in range(len(self._point.slack))])
             g += self._data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(

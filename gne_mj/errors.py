@@ -5,11 +5,24 @@ import traceback
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
+from types import CodeType
 from typing import Any
+
+USER_MODULES = "gne_mj_user_"  # what the names of modules of users' files begin with
 
 
 class GneError(Exception):
     """Base of every error that this package raises on purpose."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it come back from a cluster's worker, though it is not made of its message."""
+        return GneError._again, (type(self), self.args, self.__dict__)
+
+    @staticmethod
+    def _again(kind: "type[GneError]", args: tuple[Any, ...], about: dict[str, Any]) -> "GneError":
+        error = kind.__new__(kind, *args)
+        error.__dict__.update(about)
+        return error
 
 
 class InvalidInput(GneError, ValueError):
@@ -50,26 +63,47 @@ class UserCodeError(GneError, RuntimeError):
     """A function of the user's own raised, or returned something of no use; the cause is chained.
 
     Args:
-        function: the user's.
+        function: the user's, or its code.
         error: what it raised, or a sentence about what it returned.
         at: for what it was called, e.g. "for agent 2 at y = [0.5, -0.1]".
     """
 
     status = "user_code_failed"
 
-    def __init__(self, function: Callable[..., Any], error: Exception | str, at: str = "") -> None:
+    def __init__(
+        self, function: Callable[..., Any] | CodeType, error: BaseException | str, at: str = ""
+    ) -> None:
         inner = function.func if isinstance(function, partial) else function
-        name = getattr(inner, "__name__", repr(inner))
-        code = getattr(inner, "__code__", None)
+        code = inner if isinstance(inner, CodeType) else getattr(inner, "__code__", None)
+        name = getattr(inner, "__name__", repr(inner) if code is None else code.co_name)
         where = f"{name}: "
         if code is not None:
             line = code.co_firstlineno
-            if isinstance(error, Exception):  # the deepest line of the user's own file
+            if isinstance(error, BaseException):  # the deepest line of the user's own file
                 lines = traceback.extract_tb(error.__traceback__)
                 line = next((f.lineno for f in lines[::-1] if f.filename == code.co_filename), line)
             where = f"{Path(code.co_filename).name}, line {line}, in {name}: "
-        what = f"{type(error).__name__}: {error}" if isinstance(error, Exception) else error
+        what = raised(error) if isinstance(error, BaseException) else error
         super().__init__(where + " ".join(f"{what} {at}".split()))
+
+
+def raised(error: BaseException) -> str:
+    """What an exception is and says, for a sentence."""
+    if isinstance(error, KeyboardInterrupt):
+        return "Ctrl-C ended it"
+    name, said = type(error).__name__, str(error)
+    return f"{name}: {said}" if said else name
+
+
+def fault_of_user(error: BaseException | None) -> UserCodeError | None:
+    """The same as an error of a user's file, if it, or what it came of, was raised in one."""
+    while error is not None:
+        frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+        for frame in reversed(frames):
+            if str(frame.f_globals.get("__name__")).startswith(USER_MODULES):
+                return UserCodeError(frame.f_code, error)
+        error = error.__cause__ or error.__context__
+    return None
 
 
 class EngineError(GneError, RuntimeError):
@@ -90,6 +124,12 @@ class StorageError(GneError, RuntimeError):
     """Results cannot be written, as on a full disk; what was written before is whole."""
 
     status = "not_stored"
+
+
+class ClusterError(GneError, RuntimeError):
+    """A cluster's scheduler no longer answers, or its workers end; what was stored is whole."""
+
+    status = "cluster_lost"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

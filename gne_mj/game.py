@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
+from gne_mj.game_fields import check_kinds, checked_bounds
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
@@ -131,8 +132,12 @@ class Game:
     written: tuple[ModuleType, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_kinds(self)
         self._check()
         self._check_declarations()
+        if self.jacobian_bounds is not None and not self.tested:
+            checked = checked_bounds(self.jacobian_bounds, sum(self.sizes))
+            object.__setattr__(self, "jacobian_bounds", checked)
         object.__setattr__(self, "written", (self.kernels, self.parameters))
         if is_plain(self.kernels):
             own = [

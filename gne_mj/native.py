@@ -6,6 +6,9 @@ that they are given and allocate nothing. Games, agents and laws are
 modules of kernels with agreed names; a native loop is a function built for such modules by a
 factory, so that each rule is written in one place and serves the ODE twin, MuJoCo's callbacks and
 the array API alike.
+
+With numba switched off (``NUMBA_DISABLE_JIT=1``) kernels and the loops of ODE agents run as the
+plain Python that they are written in, slowly, for whoever debugs a kernel.
 """
 
 import hashlib
@@ -17,10 +20,13 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, register_jitable
 from numba.np.arrayobj import make_array, populate_array
+
+from gne_mj.machine_code import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -29,6 +35,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 # the compiler then checks, and array views cost no reference counting (a factor of 20 here).
 _KERNEL: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "forceinline": True}
 _LOOP: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
+
+INTERPRETED = bool(numba.config.DISABLE_JIT)  # numba is switched off
 
 
 def kernel(function: F) -> F:
@@ -49,12 +57,31 @@ def compiled(function: Callable[..., Any]) -> Any:
     A function that calls kernels of other files must hold :func:`source_key` of them in its
     closure, since numba notices a changed closure but not a changed callee.
     """
-    return njit(cache=True, **_LOOP)(function)
+    return kept(lambda cache: njit(cache=cache, **_LOOP)(function))
 
 
 def callback(signature: types.Type, function: Callable[..., Any]) -> Any:
     """Compile a C callback (numba's ``cfunc``), kept on disk as :func:`compiled` does."""
-    return numba.cfunc(signature, cache=True, error_model="numpy", _nrt=False)(function)
+    if INTERPRETED:
+        return _Interpreted(function)
+    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+    return kept(lambda cache: numba.cfunc(signature, cache=cache, **options)(function))
+
+
+class _Interpreted:
+    """Stands for a compiled callback where numba is switched off: only Python calls it."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        def called(*arguments: Any) -> Any:
+            with np.errstate(all="ignore"):  # division as in compiled code
+                return function(*arguments)
+
+        self.ctypes = self.address = called
+
+
+def intrinsic_or(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
+    """Make an intrinsic, of what Python cannot say; or ``plain`` where numba is switched off."""
+    return (lambda written: plain) if INTERPRETED else intrinsic
 
 
 @cache
@@ -108,7 +135,7 @@ def array_at(context: Any, builder: Any, kind: types.Array, address: Any, length
     return array._getvalue()
 
 
-@intrinsic
+@intrinsic_or(lambda function, table, room, steps: function(table, room, steps))
 def call_loop(typingctx: Any, function: Any, table: Any, room: Any, steps: Any) -> Any:
     """Call a native loop, a C function of three integers, at an address; returns an integer."""
 

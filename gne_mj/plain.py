@@ -23,11 +23,10 @@ from typing import Any
 import numpy as np
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.native import is_kernel, kernel
+from gne_mj.native import intrinsic_or, is_kernel, kernel
 
 Array = NDArray[np.float64]
 
@@ -60,19 +59,24 @@ def raise_pending() -> None:
 
     Raises:
         UserCodeError: names the function, its file and line.
+        KeyboardInterrupt: Ctrl-C, which is no error of the function's.
     """
     if _pending:
         function, error, at = _pending[0]
         _pending.clear()
-        if isinstance(error, Exception) and not isinstance(error, UserCodeError):
-            raise UserCodeError(function, error, at) from error
-        raise error
+        if isinstance(error, KeyboardInterrupt | UserCodeError):
+            raise error
+        raise UserCodeError(function, error, at) from error
 
 
 def forgive_pending() -> None:
-    """Forget what plain functions raised, where a solver found its way around such a profile."""
+    """Forget what plain functions raised, where a solver found its way around such a profile.
+
+    What would end the program (``sys.exit``, Ctrl-C) is not forgiven, but raised.
+    """
     if _pending:
         _pending[:] = [each for each in _pending if not isinstance(each[1], Exception)]
+        raise_pending()
 
 
 def not_a_number(function: Callable[..., Any], call: Callable[[], Any], at: str) -> UserCodeError:
@@ -86,7 +90,9 @@ def not_a_number(function: Callable[..., Any], call: Callable[[], Any], at: str)
     try:
         with np.errstate(divide="raise", invalid="raise"):
             call()
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         return UserCodeError(function, error, at)
     return UserCodeError(function, "what it returns is not a number", at)
 
@@ -124,9 +130,11 @@ def _check(module: ModuleType, name: str, q: Array, number: int, *rest: Any) -> 
     try:
         with np.errstate(all="ignore"):
             value = function(q, number, *rest)
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise UserCodeError(function, error, at) from error
-    if not np.all(np.isfinite(rest[-1] if value is None else value)):
+    if not np.all(np.isfinite(rest[-1] if value is None else number_of(function, value))):
         raise not_a_number(function, lambda: function(q, number, *rest), at)
 
 
@@ -172,7 +180,14 @@ def callable_address(
     return float(ctypes.cast(kept, ctypes.c_void_p).value or 0), kept
 
 
-@intrinsic
+def _call_out(function: int, a: int, b: int, c: int, scale: float, *arrays: Array) -> float:
+    """The same in plain Python."""
+    flat = (number for array in arrays for number in (array.ctypes.data, len(array)))
+    value: float = _SIGNATURE(int(function))(a, b, c, scale, *flat)
+    return value
+
+
+@intrinsic_or(_call_out)
 def call_out(
     typingctx: Any, function: Any, a: Any, b: Any, c: Any, scale: Any, x: Any, y: Any, z: Any
 ) -> Any:
@@ -370,12 +385,25 @@ def _shifted(y: Array, b: int, step: float) -> Array:
 
 
 def _number(function: Callable[..., Any], *arguments: Any) -> float:
-    value = function(*arguments)
-    try:
+    return number_of(function, function(*arguments))
+
+
+def number_of(function: Callable[..., Any], value: Any) -> float:
+    """What a user's function returned, as the one real number that it must be.
+
+    Raises:
+        UserCodeError: it is something else.
+    """
+    if isinstance(value, float):
         return float(value)
+    try:
+        # NumPy would drop an imaginary part, and read a text
+        if not (isinstance(value, str | bytes) or np.iscomplexobj(value)):
+            return float(value)
     except (TypeError, ValueError):
-        shown = "None" if value is None else f"{type(value).__name__} {value!r:.40}"
-        raise UserCodeError(function, f"it must return a number, not {shown}") from None
+        pass
+    shown = "None" if value is None else f"{type(value).__name__} {value!r:.40}"
+    raise UserCodeError(function, f"it must return a number, not {shown}")
 
 
 # The six kernels of a game of plain functions; q holds their addresses.

@@ -42,7 +42,9 @@ def load_scenario(
     """
     tables = json.loads(json.dumps(source)) if isinstance(source, Mapping) else _read(source)
     for key, value in (changes or {}).items():
+        _check_text(key, value)
         _change(tables, key, value)
+    _check_text("scenario", tables)
     try:
         return Scenario.model_validate(tables)
     except ValidationError as error:
@@ -95,6 +97,20 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
             elif isinstance(given, list):
                 table["file"] = [str((folder / str(name)).resolve()) for name in given]
     return tables
+
+
+def _check_text(key: str, value: Any) -> None:
+    """Refuse what is not UTF-8, as a file's name can be: results keep the scenario as text."""
+    if isinstance(value, Mapping):
+        for name, entry in value.items():
+            _check_text(str(name) if key == "scenario" else f"{key}.{name}", entry)
+    elif isinstance(value, list):
+        for entry in value:
+            _check_text(key, entry)
+    else:
+        for text in (key, str(value)):
+            if text != text.encode(errors="ignore").decode():
+                raise InvalidInput(key, value, "it must be UTF-8 text, names of files too")
 
 
 def full_key(tables: Mapping[str, Any], key: str, value: Any = None) -> list[str]:

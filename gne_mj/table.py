@@ -4,16 +4,16 @@ A callback gets two pointers and nothing else, and a loop over many runs wants o
 Both find their arrays through the address of a block of (address, length) pairs.
 """
 
+import ctypes
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
-from gne_mj.native import array_at, load_word
+from gne_mj.native import array_at, intrinsic_or, load_word
 
 
 class Table:
@@ -53,13 +53,25 @@ def exact(address: int) -> int:
     return address
 
 
-@intrinsic
+def _array(item: Any, address: int, length: int) -> NDArray[Any]:
+    """An array at an address, in plain Python."""
+    if not length:
+        return np.zeros(0, dtype=item)
+    return np.ctypeslib.as_array((item * int(length)).from_address(int(address)))
+
+
+def _indexed(item: Any, table: int, index: int) -> NDArray[Any]:
+    """An array of a table, in plain Python."""
+    return _array(item, *_array(ctypes.c_int64, table + 16 * index, 2))
+
+
+@intrinsic_or(lambda table, index: _indexed(ctypes.c_double, table, index))
 def floats(typingctx: Any, table: Any, index: Any) -> Any:
     """The float array at this index of the table at an address."""
     return _entry(types.float64)
 
 
-@intrinsic
+@intrinsic_or(lambda table, index: _indexed(ctypes.c_int64, table, index))
 def integers(typingctx: Any, table: Any, index: Any) -> Any:
     """The integer array at this index of the table at an address."""
     return _entry(types.int64)
@@ -79,13 +91,13 @@ def _entry(item: types.Type) -> Any:
     return kind(types.int64, types.int64), codegen
 
 
-@intrinsic
+@intrinsic_or(lambda address, length: _array(ctypes.c_double, address, length))
 def floats_at(typingctx: Any, address: Any, length: Any) -> Any:
     """The float array of a length at an address."""
     return _block(types.float64)
 
 
-@intrinsic
+@intrinsic_or(lambda address, length: _array(ctypes.c_int64, address, length))
 def integers_at(typingctx: Any, address: Any, length: Any) -> Any:
     """The integer array of a length at an address."""
     return _block(types.int64)

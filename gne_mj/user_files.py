@@ -20,13 +20,11 @@ from types import ModuleType
 from typing import Any
 
 from gne_mj.controllers import Law, PlainLaw
-from gne_mj.errors import GneError, InvalidInput
+from gne_mj.errors import USER_MODULES, GneError, InvalidInput, raised
 from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.native import is_kernel
 from gne_mj.plain import check_arguments
-
-_PREFIX = "gne_mj_user_"  # of the names of modules made of users' files
 
 # What the functions of a plain law are called, and take besides the scenario's parameters
 _LAW_FUNCTIONS = {
@@ -113,7 +111,7 @@ def _check_law(law: Law, file: str) -> None:
         check_arguments("controller.file", file, function, name, arguments)
 
 
-def compiler_complaint(error: Exception) -> str | None:
+def compiler_complaint(error: BaseException) -> str | None:
     """The one sentence in numba's pages about a user's kernel; None if no user's file is named.
 
     Its deepest reason stands behind the last "Failed in ..." line, and after it, innermost first,
@@ -124,7 +122,7 @@ def compiler_complaint(error: Exception) -> str | None:
     own = {
         Path(module.__file__).name
         for name, module in sys.modules.items()
-        if name.startswith(_PREFIX) and module.__file__
+        if name.startswith(USER_MODULES) and module.__file__
     }
     found = [(Path(file).name, line) for file, line in places if Path(file).name in own]
     if not found:
@@ -139,11 +137,11 @@ def compiler_complaint(error: Exception) -> str | None:
 def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
     try:
         return function()
-    except GneError:
+    except (KeyboardInterrupt, GneError):
         raise
-    except Exception as error:
+    except BaseException as error:
         raise InvalidInput(
-            key, dict(parameters), f"the file must accept them: {type(error).__name__}: {error}"
+            key, dict(parameters), f"the file must accept them: {raised(error)}"
         ) from error
 
 
@@ -155,7 +153,7 @@ def _load(path: str | Path, key: str) -> ModuleType:
         raise InvalidInput(key, str(path), f"it cannot be read: {error.strerror}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
     digest = hashlib.sha256(str(path).encode() + text).hexdigest()[:16]
-    name = f"{_PREFIX}{path.stem}_{digest}"
+    name = f"{USER_MODULES}{path.stem}_{digest}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
@@ -167,9 +165,9 @@ def _load(path: str | Path, key: str) -> ModuleType:
     warnings.filterwarnings("ignore", category=RuntimeWarning, module=re.escape(name))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except BaseException as error:
         del sys.modules[name]
-        raise InvalidInput(
-            key, str(path), f"Python must run it: {type(error).__name__}: {error}"
-        ) from error
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        raise InvalidInput(key, str(path), f"Python must run it: {raised(error)}") from error
     return module

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import shutil
 import signal
 import socket
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 
 import mujoco
 import numpy as np
+import psutil
 import pytest
 from batch_plans import (
     ODE,
@@ -27,7 +29,13 @@ from gne_mj.batches import (
     cluster,
     make_plan,
 )
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import (
+    InfeasibleStart,
+    InvalidInput,
+    SolverError,
+    StorageError,
+    UserCodeError,
+)
 
 BATCH = [
     "velocity-sync", "--set", "simulation.duration=4", "--set", "simulation.timestep=0.01",
@@ -179,6 +187,50 @@ def test_a_cluster_runs_a_batch_and_survives_a_lost_worker(tmp_path):
     assert before < 120, "the worker was killed too late to matter"
     assert "runs.zarr" in printed
     assert contents(spread) == contents(whole)
+
+
+@pytest.mark.slow
+def test_a_lost_scheduler_is_told_in_one_sentence(tmp_path):
+    folder, longer = tmp_path / "a", ["--set", "simulation.duration=400"]
+    with dask_cluster(1, tmp_path) as (address, _):
+        process = subprocess.Popen(
+            command(folder, *longer, "--cluster", address),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        while not (folder.exists() and Progress.of(Store.open(folder)).done > 3):
+            assert process.poll() is None
+            time.sleep(0.05)
+        with socket.socket() as probe:
+            port = int(address.rsplit(":", 1)[1])
+            assert probe.connect_ex(("127.0.0.1", port)) == 0
+        (scheduler,) = (
+            each for each in psutil.process_iter(["cmdline"]) if str(port) in each.info["cmdline"]
+        )
+        scheduler.kill()
+        _, told = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert told.count("\n") == 1
+    assert told.startswith(f"gne-mj: cluster_lost: {folder}: the scheduler no longer answers")
+    assert f"`gne-mj batch --resume --out {folder}`" in told
+    assert Progress.of(Store.open(folder)).done > 3
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InvalidInput("a.key", 3, "it must be less"),
+        InfeasibleStart("s", "start", "gap", 0.5),
+        UserCodeError(len, "it must return a number"),
+        SolverError("no way on", 1e-3, 7),
+        StorageError("full"),
+    ],
+)
+def test_errors_come_back_from_workers(error):
+    """Most are not made of their messages, which is how Python would make them again."""
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is type(error)
+    assert str(back) == str(error)
+    assert back.__dict__ == error.__dict__
 
 
 def test_a_worker_keeps_nothing_of_an_earlier_batch(tmp_path):

@@ -107,6 +107,28 @@ def test_changed_numbers_are_those_of_a_system_that_starts_there(engine):
     assert report["equilibrium"]["penalised"] == changed.equilibrium.action.tolist()
 
 
+def test_changed_numbers_act_at_once_between_adaptive_steps():
+    """An adaptive step that goes beyond the change is not of the changed run."""
+    simulation = load_scenario("osnr", {**OSNR, "simulation.duration": 3.0}).simulation_object()
+    simulation.advance(1000)
+    (run,) = simulation.runs.values()
+    present, clock = run.loop.present(), simulation.clock
+    changed = replace(run.system, rho=10.0, state=present.state, memory=present.memory)
+    simulation.change(changed, "rho = 10")
+    afresh = changed.closed_loop(clock)
+    for _ in range(3):
+        simulation.advance(25)
+        afresh.advance(1, 25)
+        got, expected = run.loop.present(), afresh.present()
+        # to the integrator's tolerance, 1e-6, whose scale is the greatest state so far
+        assert np.allclose(got.state, expected.state, rtol=1e-5)
+    assert not np.allclose(got.state, present.state, rtol=1e-2)
+    simulation.advance(425)
+    trajectory = simulation.trajectory()
+    assert trajectory.status in ("completed", "converged")
+    assert np.all(np.diff(trajectory["channels"]["time"]) > 0.0)
+
+
 @pytest.mark.parametrize("mode", ["continuous", "sampled"])
 def test_a_changed_gain_reaches_the_estimates(mode):
     law = PartialInformation(graphs.ring(5), 1.0, 1.0)

@@ -1,6 +1,8 @@
 """A live run: the same steps as any other, and what viewers may do to it."""
 
+import signal
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -205,6 +207,42 @@ def test_what_counts_is_where_the_outputs_are_now():
         assert session.simulation.time > 30.0
 
 
+@pytest.mark.parametrize(
+    ("scenario", "system", "moves", "refused"),
+    [
+        ("desired-velocity", "robots", [(11.0, 10.0)], []),  # its steps are divided
+        # its estimates cannot follow, however short the steps; with 1/100 of epsilon they can
+        ("osnr", "channels", [(1.0, 10.0), (2.0, 0.001)], [0.001]),
+        ("osnr", "channels", [(1.0, 10.0), (2.0, 0.1)], []),
+    ],
+)
+def test_no_slider_drives_a_run_out_of_its_set(scenario, system, moves, refused):
+    key = f"systems.{system}.barrier.rho"
+    with watched(scenario, {"simulation.duration": 14.0}) as (session, page):
+        for time, rho in moves:
+            session._move(session.simulation.clock.steps(time - session.simulation.time))
+            page.ask(do="set", key=key, value=rho)
+        assert [text.split(",")[0] for text in page.errors] == [
+            f"{key}: got {rho}" for rho in refused
+        ]
+        for text in page.errors:
+            assert "with it the run would end in 0." in text
+            assert text.endswith("s as 'left_feasible_set'")
+        taken = [rho for _, rho in moves if rho not in refused]
+        assert [done["value"] for done in session.simulation.interventions] == taken
+        assert session.simulation.systems[0].rho == session._values[key] == taken[-1]
+        assert to_the_end(session).status in ("completed", "converged")
+
+
+def test_a_trial_ends_with_the_run_it_is_for():
+    with watched("osnr", {"simulation.duration": 2.05}) as (session, page):
+        for time, rho in ((1.0, 10.0), (2.0, 0.001)):  # which would leave at 2.079 s
+            session._move(session.simulation.clock.steps(time - session.simulation.time))
+            page.ask(do="set", key="systems.channels.barrier.rho", value=rho)
+        assert page.errors == []
+        assert to_the_end(session).status == "completed"
+
+
 def test_a_restart_ends_the_run_and_its_trajectory_is_kept():
     with watched(changes={"simulation.duration": 1000.0}) as (session, page):
         session._move(100)
@@ -405,6 +443,28 @@ def test_an_exit_is_told_with_its_words():
     (run,) = session.simulation.runs.values()
     assert status_now(run.system, run.loop.monitor) == state  # live and at the end the same words
     assert state["exit_time"] == trajectory.reports["robots"]["exit"]["time"]
+
+
+def test_a_signal_near_the_end_of_a_wait_does_not_prolong_it():
+    """queue.SimpleQueue waits for ever then, on Python 3.11 and 3.12."""
+    handled = []
+
+    def busy(number, frame):
+        handled.append(number)
+        time.sleep(0.2)  # beyond the wait's end
+
+    before = signal.signal(signal.SIGALRM, busy)
+    with watched() as (session, _):
+        late = threading.Timer(5.0, session._receive, ({"do": "pause"}, None))
+        late.start()
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+            session._look(0.1)
+            assert handled
+            assert session._playing  # what came late was not waited for
+        finally:
+            signal.signal(signal.SIGALRM, before)
+            late.cancel()
 
 
 def test_a_meshcat_visualizer_draws_into_the_page():

@@ -70,6 +70,7 @@ def run_batch(
     Raises:
         InvalidInput: names the key, the value and what would be right.
         StorageError: results could not be written; what was stored before is readable.
+        ClusterError: the cluster's scheduler no longer answers; likewise.
     """
     plan = make_plan(
         source,

@@ -34,20 +34,21 @@ def execute(
         threads: native threads of this process; 0 for one a processor.
         cluster: a Dask client (:func:`gne_mj.batches.cluster.connected`) whose workers run the
             chunks, and see the folder under the same path.
-        progress: called after each chunk.
+        progress: called after each chunk; with a cluster several times a minute at least.
         stopped: says whether to end early; asked several times a second.
 
     Raises:
         InvalidInput: threads that are negative, or another process that runs this batch.
         StorageError: a chunk could not be written.
         UserCodeError: a function of the user's own failed.
+        ClusterError: the scheduler no longer answers, or its workers end.
     """
     if threads < 0:
         raise InvalidInput("--threads", threads, "it must not be negative")
     now = Progress.of(store)
 
-    def tell(done: int, early: int) -> Progress:
-        after = Progress(now.done + done, now.total, now.ended_early + early)
+    def tell(done: int, early: int, workers: int | None = None) -> Progress:
+        after = Progress(now.done + done, now.total, now.ended_early + early, workers)
         if progress is not None:
             progress(after)
         return after
@@ -55,8 +56,8 @@ def execute(
     now = tell(0, 0)
     with store.locked():
         if cluster is not None:
-            for done, early in on_cluster(store, cluster, stopped):
-                now = tell(done, early)
+            for finished in on_cluster(store, cluster, stopped):
+                now = tell(*finished)
             return Progress.of(store)
         runner = Runner(store.plan, threads or cores())
         for chunk in store.missing():

@@ -17,11 +17,13 @@ class Progress:
         done: runs that are stored.
         total: of the batch.
         ended_early: of those done, how many did not run to their end inside their set.
+        workers: that a cluster has; None without one.
     """
 
     done: int
     total: int
     ended_early: int
+    workers: int | None = None
 
     @property
     def complete(self) -> bool:

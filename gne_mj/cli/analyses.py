@@ -7,7 +7,7 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
-from gne_mj.cli.output import PREPARING, Results, progress, say, working
+from gne_mj.cli.output import PREPARING, Results, emit, progress, say, working
 from gne_mj.cli.signals import stopping
 
 
@@ -62,7 +62,7 @@ def solve(
                     solving.write_path(each, folder / f"{each.name}-path.csv")
                     plots.save_path(each, folder / f"{each.name}-path.png")
     if as_json:
-        print(report)
+        emit(report)
     else:
         texts = [
             "\n".join([*solving.summary(each), *_moved(moved.get(each.name))]) for each in solutions
@@ -142,7 +142,7 @@ def certify(
             reports[system.name] = replace(reports[system.name], held=held)
     if as_json:
         found_starts = {name: {"start_found": done} for name, done in moved.items()}
-        print(
+        emit(
             json.dumps(
                 {
                     name: {**report.to_dict(), **found_starts.get(name, {})}
@@ -175,7 +175,7 @@ def check(scenario: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
             head = f"\n{name}: {reports[name].game}, {reports[name].points} profiles"
             print("\n".join([head, *(f"  {line}" for line in reports[name].summary())]))
     if as_json:
-        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+        emit(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
     raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
 
 
@@ -216,7 +216,7 @@ def passivity(
         if not as_json:
             print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))
     if as_json:
-        print(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
+        emit(json.dumps({name: report.to_dict() for name, report in reports.items()}, indent=2))
     raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
 
 
@@ -289,7 +289,7 @@ def map_(
                     mapping.write(cells, folder / "map.csv")
                     plots.save_map(cells, folder / "map.png")
     if as_json:
-        print(json.dumps([asdict(cell) for cell in cells], indent=2))
+        emit(json.dumps([asdict(cell) for cell in cells], indent=2))
     else:
         print("\n".join(mapping.summary(cells)))
         if cells and results.out is not None:

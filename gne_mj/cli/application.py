@@ -1,13 +1,19 @@
 """The application, its errors and its entry point."""
 
 import json
+import os
 import sys
-from typing import Annotated
+from contextlib import nullcontext
+from io import TextIOWrapper
+from typing import Annotated, NoReturn
 
 import typer
 
-from gne_mj.cli.output import give_up, say
-from gne_mj.cli.signals import raise_on_signals
+from gne_mj.cli.ending import watched
+from gne_mj.cli.output import emit, give_up, results_only, results_stream, say
+from gne_mj.cli.signals import raise_on_signals, received
+
+_CTRL_C = 130  # typer's exit status
 
 app = typer.Typer(
     add_completion=False,
@@ -38,10 +44,21 @@ def _options(
 def main() -> None:
     """Entry point: an error meant for the user is one sentence on stderr.
 
-    The exit status is 2, but 1 where a function of the user's own fails, the disk is full, or what
-    is printed cannot be written.
+    The exit status is 2, but 1 where a function of the user's own fails, the disk is full, what is
+    printed cannot be written or a cluster is lost. With --json nothing but the report is printed to
+    stdout, whatever a user's functions print.
     """
+    # Nothing here needs a display, so that no setting for one may be in the way.
+    os.environ.update(MUJOCO_GL="disabled", MPLBACKEND="agg")
+    for stream in (sys.stdout, sys.stderr):  # whatever a terminal cannot show, and file names
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     raise_on_signals()
+    with watched(), results_only() if "--json" in sys.argv else nullcontext():
+        _main()
+
+
+def _main() -> None:
     try:
         try:
             app()
@@ -49,15 +66,30 @@ def main() -> None:
             if sys.stdout is not None:
                 sys.stdout.flush()
     except BrokenPipeError:
-        give_up(sys.stdout)
+        give_up(results_stream())
         sys.exit(1)
     except OSError as error:
         if error.filename:
             _fail(f"{error.filename}: {error.strerror}")
-        give_up(sys.stdout)
+        give_up(results_stream())
         _fail(f"standard output: {error.strerror or error}", "not_stored", 1)
-    except Exception as error:
-        from gne_mj.errors import GneError, StorageError, UserCodeError
+    except SystemExit as ended:  # a command's own, unless a user's function asked for it
+        from gne_mj.errors import fault_of_user
+
+        if (fault := fault_of_user(ended)) is not None:
+            _fail(str(fault), fault.status, 1)
+        if ended.code == _CTRL_C:
+            say("gne-mj: interrupted")
+            sys.exit(128 + received())
+        raise
+    except BaseException as error:
+        from gne_mj.errors import (
+            ClusterError,
+            GneError,
+            StorageError,
+            UserCodeError,
+            fault_of_user,
+        )
 
         if type(error).__module__.startswith("numba"):
             from gne_mj.user_files import compiler_complaint
@@ -65,17 +97,18 @@ def main() -> None:
             if (complaint := compiler_complaint(error)) is not None:
                 _fail(complaint, UserCodeError.status, 1)
         if not isinstance(error, GneError):
-            raise
-        code = 1 if isinstance(error, UserCodeError | StorageError) else 2
+            if (fault := fault_of_user(error)) is None:
+                raise
+            _fail(str(fault), fault.status, 1)
+        code = 1 if isinstance(error, UserCodeError | StorageError | ClusterError) else 2
         _fail(str(error), getattr(error, "status", None), code)
 
 
-def _fail(message: str, status: str | None = None, code: int = 2) -> None:
+def _fail(message: str, status: str | None = None, code: int = 2) -> NoReturn:
     if "--json" in sys.argv:
         try:
-            document = {"status": status or "invalid_input", "message": message}
-            print(json.dumps(document), flush=True)
+            emit(json.dumps({"status": status or "invalid_input", "message": message}))
         except OSError:
-            give_up(sys.stdout)
+            give_up(results_stream())
     say(f"gne-mj: {status + ': ' if status else ''}{message}")
     sys.exit(code)

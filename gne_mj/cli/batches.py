@@ -1,7 +1,7 @@
 """Commands that run many runs, and tell of them."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +10,7 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, JSON, REPLACE, SET, SYSTEM, WHERE, formats, settings
-from gne_mj.cli.output import console, folder_for, on_terminal
+from gne_mj.cli.output import by_the_minute, console, emit, folder_for, on_terminal, say
 from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def batch(
         if now.done:
             _print(store, now, write_report(store, store.folder, replace=True), as_json)
         elif as_json:
-            print(json.dumps({**_counts(now), "statuses": {}, "combinations": []}))
+            emit(json.dumps({**_counts(now), "statuses": {}, "combinations": []}))
     if not now.complete and not as_json:
         print(f"\nstopped: {_partial(store, now)}")
     raise typer.Exit(1 if not now.complete or (fail_on_exit and now.ended_early) else 0)
@@ -169,7 +169,7 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
             "statuses": {str(name): int(count) for name, count in statuses.items()},
             "combinations": json.loads(report.table.to_json(orient="records")),
         }
-        print(json.dumps(words, indent=2))
+        emit(json.dumps(words, indent=2))
         return
     print("\n".join(summary(report.table, list(report.runs.attrs["swept"]))))
     print(f"\nruns        {store.folder / 'runs.zarr'}")
@@ -179,9 +179,23 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
 
 @contextmanager
 def _showing(total: int, quiet: bool) -> Iterator[Any]:
-    """A progress bar on a terminal's stderr: runs done, rate, time left, early ends so far."""
-    if not on_terminal(quiet):
+    """A progress bar on a terminal's stderr: runs done, rate, time left, early ends so far.
+
+    Elsewhere a line every minute. That a cluster has no workers is said at once.
+    """
+    if quiet:
         yield None
+        return
+    if not on_terminal(quiet):
+        with by_the_minute(quiet, f"0 of {total} runs") as change:
+            lonely = _Lonely(say)
+
+            def note(now: "Progress") -> None:
+                lonely.look(now)
+                if change is not None:
+                    change(f"{now.done} of {total} runs, {now.ended_early} ended early")
+
+            yield note
         return
     from rich import progress
 
@@ -195,10 +209,25 @@ def _showing(total: int, quiet: bool) -> Iterator[Any]:
         transient=True,
     ) as bar:
         task = bar.add_task("runs", total=total, rate="", early=0)
+        lonely = _Lonely(bar.console.print)
 
         def show(now: "Progress") -> None:
+            lonely.look(now)
             speed = bar.tasks[0].speed
             rate = f"{speed:.3g}/s" if speed else ""
             bar.update(task, completed=now.done, early=now.ended_early, rate=rate)
 
         yield show
+
+
+class _Lonely:
+    """Says once that a cluster has no workers, whenever it has none."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._said = say, False
+
+    def look(self, now: "Progress") -> None:
+        """Now."""
+        if now.workers == 0 and not self._said:
+            self._say("gne-mj: waiting: the cluster has no workers (Ctrl-C ends)")
+        self._said = now.workers == 0

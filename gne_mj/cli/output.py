@@ -3,8 +3,9 @@
 import json
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -15,6 +16,45 @@ if TYPE_CHECKING:
 
 
 PREPARING = "preparing (a first run compiles for a few seconds)"
+MINUTE = 60.0  # s between lines of progress where nobody watches
+
+_stdout: TextIO | None = None  # of results, where all else that is printed goes to stderr
+
+
+@contextmanager
+def results_only() -> Iterator[None]:
+    """Keep stdout for what :func:`emit` prints.
+
+    What else is printed goes to stderr: by a user's functions, and by libraries that these call.
+    """
+    global _stdout
+    own, _stdout = sys.__stdout__, sys.stdout
+    try:
+        with redirect_stdout(sys.stderr):
+            if own is None or own is not _stdout or sys.stderr is None:  # not the process's own
+                yield
+                return
+            kept = os.dup(own.fileno())
+            os.dup2(sys.stderr.fileno(), own.fileno())
+            _stdout = open(kept, "w", encoding=own.encoding, errors=own.errors)  # noqa: SIM115
+            try:
+                yield
+            finally:
+                os.dup2(kept, own.fileno())
+                with suppress(OSError):  # it was told when it was printed
+                    _stdout.close()
+    finally:
+        _stdout = None
+
+
+def emit(text: str) -> None:
+    """Print a result."""
+    print(text, file=_stdout, flush=True)
+
+
+def results_stream() -> TextIO:
+    """Where :func:`emit` prints."""
+    return _stdout or sys.stdout
 
 
 class Results:
@@ -181,10 +221,38 @@ def on_terminal(quiet: bool) -> bool:
 
 
 @contextmanager
-def working(quiet: bool, what: str) -> Iterator[Any]:
-    """A word on a terminal's stderr meanwhile; what is handed out changes it."""
-    if not on_terminal(quiet):
+def by_the_minute(quiet: bool, words: str) -> Iterator[Callable[[str], None] | None]:
+    """A line on stderr every minute meanwhile, for logs; what is handed out changes its words."""
+    if quiet:
         yield None
+        return
+    ended = threading.Event()
+
+    def tell() -> None:
+        minutes = 0
+        while not ended.wait(MINUTE):
+            minutes += 1
+            say(f"gne-mj: {minutes} min: {words}")
+
+    def change(to: str) -> None:
+        nonlocal words
+        words = to
+
+    thread = threading.Thread(target=tell, name="gne-mj progress", daemon=True)
+    thread.start()
+    try:
+        yield change
+    finally:
+        ended.set()
+        thread.join()
+
+
+@contextmanager
+def working(quiet: bool, what: str) -> Iterator[Any]:
+    """A word on a terminal's stderr meanwhile, else every minute; what is handed out changes it."""
+    if not on_terminal(quiet):
+        with by_the_minute(quiet, what) as change:
+            yield change
         return
     with console().status(what) as status:
         yield status.update
@@ -192,9 +260,10 @@ def working(quiet: bool, what: str) -> Iterator[Any]:
 
 @contextmanager
 def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
-    """A progress bar on a terminal's stderr, else nothing."""
+    """A progress bar on a terminal's stderr, else a line every minute."""
     if not on_terminal(quiet):
-        yield None
+        with by_the_minute(quiet, f"0 of {total:g} {unit}") as change:
+            yield change and (lambda now: change(f"{now:.6g} of {total:g} {unit}"))
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -216,7 +285,7 @@ def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
     from gne_mj.summary import summary
 
     if as_json:
-        print(json.dumps(trajectory.report(), indent=2))
+        emit(json.dumps(trajectory.report(), indent=2))
         return
     for name, report in trajectory.reports.items():
         print(f"\n{name}")

@@ -1,13 +1,15 @@
 """Signals that ask a command to end: Ctrl-C, a scheduler (SIGTERM), a closed terminal."""
 
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import NoReturn
 
 _OTHERS = (signal.SIGTERM, signal.SIGHUP)  # than Ctrl-C, for which Python has an exception already
+ENDING = (signal.SIGINT, *_OTHERS)
+_received = int(signal.SIGINT)
 
 
 def raise_on_signals() -> None:
@@ -22,8 +24,15 @@ def raise_on_signals() -> None:
             signal.signal(number, _end)
 
 
-def _end(number: int, frame: FrameType | None) -> None:
-    sys.exit(128 + number)
+def received() -> int:
+    """Number of the signal that ended the command."""
+    return _received
+
+
+def _end(number: int, frame: FrameType | None) -> NoReturn:
+    global _received
+    _received = number
+    raise KeyboardInterrupt
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def view(
         raise InvalidInput("--html", str(html), "it must be a file, in a folder that exists")
     if html is not None and not replace:
         refuse_existing("--html", [html])
-    title = run_folder.resolve().name
+    title = _title(run_folder.resolve().name)
     if index is None:
         trajectory = stored(run_folder)
     elif is_batch(run_folder):
@@ -98,7 +98,7 @@ def watch(
             from gne_mj.view import Session
 
             scenario = load_scenario(source, settings(changes))
-            session = Session(scenario, title, speed=factor, port=port or 0)
+            session = Session(scenario, _title(title), speed=factor, port=port or 0)
         page.callback(session.server.close)
         page.enter_context(_announced(session.server.url))
         trajectory = session.run(stop)
@@ -111,6 +111,11 @@ def watch(
             session.show(trajectory)
             session.linger(stop)
     return trajectory
+
+
+def _title(name: str) -> str:
+    """A page's title from a file's name, which need not be UTF-8."""
+    return name.encode(errors="replace").decode()
 
 
 def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gne_mj.errors import UserCodeError
 from gne_mj.game import Game
 from gne_mj.game_check.differences import derivative, steps
-from gne_mj.plain import not_a_number
+from gne_mj.plain import not_a_number, number_of
 
 Array = NDArray[np.float64]
 _HALVINGS = 60
@@ -146,20 +146,14 @@ class Functions:
         function = getattr(self._module, name)
         try:
             return function(self._q, *arguments)
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise UserCodeError(function, error, self._place(name, y, arguments[0])) from error
-        except SystemExit as error:
-            raise UserCodeError(function, "it ended the program") from error
 
     def _number(self, name: str, y: Array, *numbers: int) -> float:
         value = self._call(name, y, *numbers, _readonly(y))
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            shown = "None" if value is None else f"{type(value).__name__} {value!r:.40}"
-            raise UserCodeError(
-                getattr(self._module, name), f"it must return a number, not {shown}"
-            ) from None
+        number = number_of(getattr(self._module, name), value)
         if not math.isfinite(number):
             raise self._no_number(name, y, *numbers, _readonly(y))
         return number

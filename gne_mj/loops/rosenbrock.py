@@ -350,24 +350,34 @@ class RosenbrockLoop(ClosedLoop):
         self._fixed = (problem, channels, modes, method(rtol, atol))
         self._h = h
         self._step = 0
-        self._length = state.size + len(memory)
-        self._state = np.concatenate([state.ravel(), memory, to_modes(modes, memory[: agents * m])])
+        self._length, self._estimates = state.size + len(memory), agents * m
+        self._state = self._flat(state, memory)
         self._progress = np.zeros(COUNT)
-        self._progress[NEXT] = min(h, float(problem.settings[EPSILON]))
         self._u = np.zeros(m)
         self._work = work(m, constraints, agents)
-        dense = np.zeros((5, self._length))
-        dense[:2] = self._state[: self._length]
         self._solver = Solver(
             trial=np.zeros_like(self._state),
             k=np.zeros((STAGES, len(self._state))),
-            dense=dense,
+            dense=np.zeros((5, self._length)),
             greatest=np.abs(state).max(axis=0),
             exit=np.zeros(watch.HEADER),
             u=np.zeros(m),
             system=stage_system(input_columns(agent, channels.parameters), agents),
         )
         self.monitor = np.zeros(watch.length(m, constraints))
+        self._begin()
+
+    def _flat(self, state: NDArray[np.float64], memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        modes = self._fixed[2]
+        return np.concatenate([state.ravel(), memory, to_modes(modes, memory[: self._estimates])])
+
+    def _begin(self) -> None:
+        """Let the next adaptive step be from this state at the present time."""
+        problem, dense = self._fixed[0], self._solver.dense
+        dense[:2], dense[2:] = self._state[: self._length], 0.0
+        self._progress[:ACCEPTED] = 0.0
+        self._progress[START] = self._progress[END] = self.time
+        self._progress[NEXT] = min(self._h, float(problem.settings[EPSILON]))
 
     @property
     def time(self) -> float:
@@ -407,8 +417,11 @@ class RosenbrockLoop(ClosedLoop):
         return Present(row[:size].reshape(self._shape), row[size:], row[:0])
 
     def _adopt(self, setup: Setup) -> None:
+        state, memory, _ = self.present()
         _, channels, modes, how = self._fixed
         self._fixed = (setup.problem, Channels(channels.parameters, setup.rest), modes, how)
+        self._state[:] = self._flat(state, memory)  # the last step's end lies beyond, by the old
+        self._begin()
 
     def _samples(self, states: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:
         size = self._shape[0] * self._shape[1]

@@ -10,6 +10,7 @@ import numpy as np
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, for_native, sensor_delay, strikes_messages
 from gne_mj.loops.feedback import Problem
+from gne_mj.native import INTERPRETED
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.mjcf_robot import MjcfRobots
 
@@ -147,6 +148,12 @@ def check_engine(system: "System") -> None:
             "it is for a penalty that does not change in time; use 'rk4'",
         )
     own_model = isinstance(system.agents, MjcfRobots)
+    if system.engine == "mujoco" and INTERPRETED:
+        raise InvalidInput(
+            f"{key}.engine",
+            system.engine,
+            "MuJoCo calls machine code only: unset NUMBA_DISABLE_JIT, or use engine 'ode'",
+        )
     if system.engine == "mujoco" and not own_model and system.agents.kind is not flexible_robot:
         raise InvalidInput(
             f"{key}.engine",

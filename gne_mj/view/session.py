@@ -26,6 +26,7 @@ from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
 from gne_mj.view.stage import Stage
+from gne_mj.view.trial import Trials
 
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can
@@ -61,7 +62,8 @@ class Session:
         self._ended: Trajectory | None = None
         self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
-        self._asked: queue.SimpleQueue[tuple[dict[str, Any], Browser]] = queue.SimpleQueue()
+        self._trials = Trials()
+        self._asked: queue.Queue[tuple[dict[str, Any], Browser]] = queue.Queue()
         self._controls = {control.key: control for control in controls_of(scenario)}
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
@@ -256,6 +258,7 @@ class Session:
         run = self.simulation.runs[control.system]
         if run.inside and not self.simulation.ended:
             system = _changed(run, scenario, control, value)
+            self._try(system, control, value)
             what = f"{control.key} = {value!r}"
             self.simulation.change(system, what, key=control.key, value=value)
             self._tell_interventions()
@@ -263,6 +266,17 @@ class Session:
             self._notice("This holds from the next start on: its run has ended.", level="info")
         self._scenario = scenario
         self._changes[changed] = given
+
+    def _try(self, system: System, control: Control, value: float) -> None:
+        """Refuse a number with which the run, as far as a trial shows, would end early."""
+        clock = self.simulation.clock
+        left = clock.steps(clock.duration) - clock.steps(self.simulation.time)
+        found = self._trials.exit(system, clock, left)
+        if found is not None:
+            time, status = found
+            raise InvalidInput(
+                control.key, value, f"with it the run would end in {time:.3g} s as '{status}'"
+            )
 
     def _push(self, message: Mapping[str, Any]) -> None:
         name, agent, axis = message.get("system"), message.get("agent"), message.get("axis", 0)

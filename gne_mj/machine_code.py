@@ -1,0 +1,58 @@
+"""Where numba keeps machine code where it can write neither to the package's folder nor to a home.
+
+It keeps it beside the sources, else in the user's cache folder, and gives up without either, as in
+an installation of another user's without a home. ``NUMBA_CACHE_DIR`` names a folder.
+"""
+
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+
+def kept(compile: Callable[[bool], Any]) -> Any:
+    """What ``compile(cache)`` makes, its machine code kept on disk wherever that can be.
+
+    Args:
+        compile: a decorator of numba's, told whether to keep machine code.
+    """
+    try:
+        return compile(True)
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+    return compile(_temporary())
+
+
+@cache
+def _temporary() -> bool:
+    """Let numba keep machine code in a temporary folder, and say so; False if there is none."""
+    try:
+        folder = str(_folder())
+    except OSError:
+        folder = ""
+        words = "nowhere, and made anew for every command: no folder can be written"
+    else:
+        words = f"in {folder}: neither the package's folder nor a home can be written"
+    numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
+    print(
+        f"gne-mj: warning: machine code is kept {words}; NUMBA_CACHE_DIR names another folder",
+        file=sys.stderr,
+    )
+    return bool(folder)
+
+
+def _folder() -> Path:
+    """A temporary folder, the same every time: the user's alone, since code from it is run."""
+    folder = Path(tempfile.gettempdir(), f"gne-mj-{os.getuid()}")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    about = folder.lstat()
+    if stat.S_ISDIR(about.st_mode) and about.st_uid == os.getuid() and not about.st_mode & 0o077:
+        return folder
+    return Path(tempfile.mkdtemp(prefix="gne-mj-"))
