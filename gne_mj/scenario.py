@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from gne_mj.bounds import check_nesting, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
@@ -40,13 +41,20 @@ def load_scenario(
     Raises:
         InvalidInput: names the key, the value and what would be right.
     """
-    tables = json.loads(json.dumps(source)) if isinstance(source, Mapping) else _read(source)
+    if isinstance(source, Mapping):
+        check_nesting("scenario", source)
+        tables = json.loads(json.dumps(source))
+    else:
+        tables = _read(source)
     for key, value in (changes or {}).items():
+        check_nesting(key, value)
         _change(tables, key, value)
     try:
-        return Scenario.model_validate(tables)
+        scenario = Scenario.model_validate(tables)
     except ValidationError as error:
         raise _first(error) from None
+    scenario.clock()  # what does not fit together is told before anything is built
+    return scenario
 
 
 def run(
@@ -60,7 +68,7 @@ def parse_value(text: str) -> Any:
     """What ``--set key=TEXT`` means: a TOML value, else the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 
@@ -76,12 +84,16 @@ def _read(source: str | Path) -> dict[str, Any]:
             f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
-        return _resolve(tomllib.loads(path.read_text(encoding="utf-8")), path.parent)
+        tables = tomllib.loads(read_file(path).decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InvalidInput("scenario", str(source), f"it cannot be read: {reason}") from None
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InvalidInput("scenario", str(source), "it is nested too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
         raise InvalidInput("scenario", str(source), f"it is not valid TOML: {error}") from None
+    check_nesting("scenario", tables)
+    return _resolve(tables, path.parent)
 
 
 def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -159,9 +171,10 @@ def _first(error: ValidationError) -> InvalidInput:
     context = detail.get("ctx", {})
     kind = detail["type"]
     if kind == "unknown_key":
-        unknown = context["name"].strip("'")
         return InvalidInput(
-            ".".join([*where, unknown]), value[unknown], f"there is no such key; {context['hint']}"
+            ".".join([*where, str(context["key"])]),
+            value[context["key"]],
+            f"there is no such key; {context['hint']}",
         )
     if kind == "missing":
         return InvalidInput(".".join(where), None, "this key must be given")

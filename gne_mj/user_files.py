@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import GneError, InvalidInput
 from gne_mj.game import Game
@@ -150,7 +151,7 @@ def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
 def _load(path: str | Path, key: str) -> ModuleType:
     path = Path(path).resolve()
     try:
-        text = path.read_bytes()
+        text = read_file(path)
     except OSError as error:
         raise InvalidInput(key, str(path), f"it cannot be read: {error.strerror}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
