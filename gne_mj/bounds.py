@@ -15,6 +15,10 @@ SHORTEST, LONGEST, MOST_STEPS = 1e-12, 1e12, 2**53
 # What a run keeps until its end, and what it is set up with, in bytes
 MOST_RECORDED, MOST_SET_UP = 2**30, 2**30
 MOST_AGENTS = 20_000
+MOST_ACTIONS = 50_000  # entries of a profile, and constraints
+MOST_MEMBERS = 10_000_000  # agents in all costs and constraints together
+MOST_COUPLED = 2000  # agents whose costs all depend on all
+MOST_EDGES = 500_000  # of a graph
 MOST_FILE = 2**26  # bytes of a scenario or of a user's Python file
 DEEPEST = 32  # tables and lists within each other
 

@@ -28,6 +28,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
@@ -161,7 +162,10 @@ class Game:
                 f"{constraints} lists and {len(self.constraint_names)} constraint_names",
                 "there must be as many of both, and at least one",
             )
+        check_count("agents.count: the actions of all", sum(self.sizes), MOST_ACTIONS)
+        check_count("game.in_constraint: the constraints", constraints, MOST_ACTIONS)
         for key in ("in_cost", "in_constraint"):
+            check_count(f"game.{key}: the agents", sum(map(len, getattr(self, key))), MOST_MEMBERS)
             for members in getattr(self, key):
                 inside = min(members, default=0) >= 0 and max(members, default=0) < count
                 if not inside or len(set(members)) != len(members):

@@ -190,10 +190,11 @@ class System:
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop
+            from gne_mj.plants.fleet import MANY
 
             fleet: MujocoPlant | MjcfPlant
             if plant is None:
-                fleet = self.mujoco_plant(clock)
+                fleet = self.mujoco_plant(clock, decorated=self.agents.count <= MANY)
                 if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
                     steps.try_slopes(self, fleet, clock)
             else:
