@@ -12,12 +12,15 @@ from gne_mj.errors import InvalidInput
 
 # Times in s; multiples of the timestep that floats count exactly
 SHORTEST, LONGEST, MOST_STEPS = 1e-12, 1e12, 2**53
+MOST_HELD = 500_000  # timesteps in a control period that is looked ahead over
+MOST_POINTS, MOST_RUNS = 10_000, 10_000_000  # of a range, and of what runs again and again
 # What a run keeps until its end, and what it is set up with, in bytes
 MOST_RECORDED, MOST_SET_UP = 2**30, 2**30
 MOST_AGENTS = 20_000
 MOST_ACTIONS = 50_000  # entries of a profile, and constraints
 MOST_MEMBERS = 10_000_000  # agents in all costs and constraints together
 MOST_COUPLED = 2000  # agents whose costs all depend on all
+MOST_EXAMINED = 5000  # actions of a system for whose guarantees matrices are made
 MOST_EDGES = 500_000  # of a graph
 MOST_FILE = 2**26  # bytes of a scenario or of a user's Python file
 DEEPEST = 32  # tables and lists within each other

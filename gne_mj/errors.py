@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-
 # Characters of a message, and of a value or name in it: the rest is left out
 LONGEST, LONGEST_VALUE = 350, 100
 

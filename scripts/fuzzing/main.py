@@ -1,4 +1,4 @@
-"""Mutated scenario files and bad command lines: nothing may end in a traceback, hang or fill memory.
+"""Mutated scenario files and bad command lines: none may end in a traceback, hang or fill memory.
 
 Inputs follow from the seed and their number alone; --file and --line repeat one.
 """
@@ -93,7 +93,11 @@ def one(process: worker.Worker, kind: str, index: int, seed: int) -> dict[str, A
         done = process.run(words, contents, limit=worker.LIMIT)
     shown = " ".join(word if len(word) < 60 else word[:57] + "..." for word in words)
     row = {"kind": kind, "index": index, "what": what, "words": shown, **done}
-    return row | {"wrong": judged(done, words), "out": done["out"][:500], "err": done["err"][-1500:]}
+    return row | {
+        "wrong": judged(done, words),
+        "out": done["out"][:500],
+        "err": done["err"][-1500:],
+    }
 
 
 def asked_to_be_long(done: dict[str, Any]) -> bool:
@@ -140,7 +144,10 @@ def _is_json(text: str) -> bool:
 
 def report(rows: list[dict[str, Any]]) -> list[str]:
     """A table of how inputs ended, and what is wrong."""
-    lines = ["| inputs | all | exit 0 | exit 1 | exit 2 | long | wrong |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| inputs | all | exit 0 | exit 1 | exit 2 | long | wrong |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for kind in ("file", "line"):
         own = [row for row in rows if row["kind"] == kind]
         codes = [sum(row["code"] == code for row in own) for code in (0, 1, 2)]
@@ -150,7 +157,10 @@ def report(rows: list[dict[str, Any]]) -> list[str]:
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     found = [row for row in rows if row["wrong"]]
     groups = Counter((row["wrong"], _cause(row["err"])) for row in found)
-    lines += ["", *(f"{count} x {wrong}: {cause}" for (wrong, cause), count in groups.most_common())]
+    lines += [
+        "",
+        *(f"{count} x {wrong}: {cause}" for (wrong, cause), count in groups.most_common()),
+    ]
     for row in found[:SHOWN]:
         lines.append(
             f"--{row['kind']} {row['index']}: {row['wrong']}, {row['seconds']:.1f} s;"

@@ -57,7 +57,9 @@ class Worker:
         for name, place in places.items():
             words = [word.replace(name, place) for word in words]
         process = self._process
-        assert process is not None and process.stdin is not None and process.stdout is not None
+        assert process is not None
+        assert process.stdin is not None
+        assert process.stdout is not None
         started = time.perf_counter()
         process.stdin.write(json.dumps(words).encode() + b"\n")
         process.stdin.flush()
@@ -113,7 +115,7 @@ def _serve(folder: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     import gne_mj.cli
     import gne_mj.scenario
-    import gne_mj.trajectory  # noqa: F401  so that none of their memory counts as an input's
+    import gne_mj.trajectory  # so that none of their memory counts as an input's
 
     warnings.simplefilter("always")
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
