@@ -4,6 +4,7 @@ The bounds are far beyond what is of use, and below what fills a machine's memor
 """
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ MOST_MEMBERS = 10_000_000  # agents in all costs and constraints together
 MOST_COUPLED = 2000  # agents whose costs all depend on all
 MOST_EXAMINED = 5000  # actions of a system for whose guarantees matrices are made
 MOST_EDGES = 500_000  # of a graph
-MOST_FILE = 2**26  # bytes of a scenario or of a user's Python file
+MOST_FILE = 2**25  # bytes of a scenario or of a user's Python file
 DEEPEST = 32  # tables and lists within each other
 
 
@@ -47,6 +48,18 @@ def check_count(option: str, value: int, most: int) -> None:
     """Refuse a count beyond ``most``."""
     if value > most:
         raise InvalidInput(option, value, f"it must be at most {most}")
+
+
+# More parts of one dotted TOML key than DEEPEST: reading them takes time by their number's square
+_DOTTED = re.compile(
+    rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % DEEPEST
+)
+
+
+def check_text(key: str, text: bytes) -> None:
+    """Refuse TOML with keys so deep that it could not be read soon."""
+    if _DOTTED.search(text):
+        raise InvalidInput(key, "...", f"tables may be {DEEPEST} deep at most")
 
 
 def check_nesting(key: str, value: Any) -> None:

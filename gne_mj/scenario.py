@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from gne_mj.bounds import check_nesting, read_file
+from gne_mj.bounds import check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
@@ -84,7 +84,9 @@ def _read(source: str | Path) -> dict[str, Any]:
             f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
-        tables = tomllib.loads(read_file(path).decode("utf-8"))
+        contents = read_file(path)
+        check_text("scenario", contents)
+        tables = tomllib.loads(contents.decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InvalidInput("scenario", str(source), f"it cannot be read: {reason}") from None

@@ -38,7 +38,7 @@ def main() -> None:
     The exit status is 2, but 1 where a function of the user's own fails or the disk is full.
     """
     try:
-        sys.exit(app(standalone_mode=False) or 0)
+        sys.exit(app(prog_name="gne-mj", standalone_mode=False) or 0)
     except BrokenPipeError:
         sys.exit(1)
     except OSError as error:

@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable
 from datetime import date, datetime, time
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ TABLES = (
 PLACES = ("game", "agents", "controller", "barrier", "plant", "initial", "margin", "faults")
 
 
+@cache
 def bases() -> dict[str, str]:
     """The files that are mutated: name to TOML text, all of them short runs."""
     texts = shipped()

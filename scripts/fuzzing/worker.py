@@ -77,6 +77,8 @@ class Worker:
             return {"code": None, "out": "", "err": "", "seconds": seconds, "memory": 0,
                     "ended": "killed", "interrupted": True}  # fmt: skip
         line = process.stdout.readline()
+        if interrupted:  # which leaves a compiler in any state
+            self._left = 0
         about = {"seconds": time.perf_counter() - started, "interrupted": interrupted}
         if not line:
             code = process.wait()
