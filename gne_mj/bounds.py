@@ -17,7 +17,7 @@ MOST_HELD = 500_000  # timesteps in a control period that is looked ahead over
 MOST_POINTS, MOST_RUNS = 10_000, 10_000_000  # of a range, and of what runs again and again
 # What a run keeps until its end, and what it is set up with, in bytes
 MOST_RECORDED, MOST_SET_UP = 2**30, 2**30
-MOST_AGENTS = 20_000
+MOST_SYSTEMS, MOST_AGENTS = 100, 20_000
 MOST_ACTIONS = 50_000  # entries of a profile, and constraints
 MOST_MEMBERS = 10_000_000  # agents in all costs and constraints together
 MOST_COUPLED = 2000  # agents whose costs all depend on all

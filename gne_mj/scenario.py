@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from gne_mj.bounds import check_nesting, check_text, read_file
+from gne_mj.bounds import MOST_SYSTEMS, check_count, check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
@@ -49,6 +49,9 @@ def load_scenario(
     for key, value in (changes or {}).items():
         check_nesting(key, value)
         _change(tables, key, value)
+    systems = tables.get("systems")
+    if isinstance(systems, Mapping):
+        check_count("systems: their number", len(systems), MOST_SYSTEMS)
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:
@@ -105,10 +108,17 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
         for table in system.values() if isinstance(system, dict) else ():
             given = table.get("file") if isinstance(table, dict) else None
             if isinstance(given, str):
-                table["file"] = str((folder / given).resolve())
+                table["file"] = _absolute(folder, given)
             elif isinstance(given, list):
-                table["file"] = [str((folder / str(name)).resolve()) for name in given]
+                table["file"] = [_absolute(folder, str(name)) for name in given]
     return tables
+
+
+def _absolute(folder: Path, name: str) -> str:
+    try:
+        return str((folder / name).resolve())
+    except (ValueError, OSError):  # no file can be called so: whoever reads it will say so
+        return name
 
 
 def full_key(tables: Mapping[str, Any], key: str, value: Any = None) -> list[str]:

@@ -149,11 +149,12 @@ def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
 
 
 def _load(path: str | Path, key: str) -> ModuleType:
-    path = Path(path).resolve()
     try:
+        path = Path(path).resolve()
         text = read_file(path)
-    except OSError as error:
-        raise InvalidInput(key, str(path), f"it cannot be read: {error.strerror}") from None
+    except (OSError, ValueError) as error:  # or a name that no file can have
+        why = getattr(error, "strerror", error)
+        raise InvalidInput(key, str(path), f"it cannot be read: {why}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
     digest = hashlib.sha256(str(path).encode() + text).hexdigest()[:16]
     name = f"{_PREFIX}{path.stem}_{digest}"

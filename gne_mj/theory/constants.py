@@ -203,7 +203,7 @@ class Slopes:
         here = self.game.pseudo_gradient_jacobian(self.center)
         others = profiles(self.game, self.center, self.box, 3, self.feasible)
         away = 0.9 * (others - self.center)  # not to the boundary, where no step has room
-        slopes = [self.game.pseudo_gradient_jacobian(self.center + way) for way in away]
+        slopes = (self.game.pseudo_gradient_jacobian(self.center + way) for way in away)
         return max(float(np.max(np.abs(slope - here))) for slope in slopes)
 
     @cached_property
