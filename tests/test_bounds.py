@@ -317,3 +317,14 @@ def test_steps_without_rows(monkeypatch):
     pieces.pass_over(100)
     assert pieces.time == once.time
     np.testing.assert_array_equal(pieces.present().state, once.present().state)
+
+
+@pytest.mark.parametrize("start", [1e200, -1e300, 1.7e308])
+def test_starts_that_overflow(start):
+    """They are outside, in one sentence and without a warning, which here is an error."""
+    done = gne_here("run", "velocity-sync", "--set", f"initial.action={start}")
+    assert done.returncode == 2
+    assert "must be negative" in done.stderr
+    (system,), moved = load_scenario("velocity-sync", {"initial.action": start}).inside_systems()
+    assert np.all(system.game.constraints(system.start) < 0.0)
+    assert moved

@@ -125,11 +125,12 @@ def check_lists(system: "System", problem: Problem) -> None:
 def check_start(system: "System") -> None:
     """Refuse a start that is not strictly inside, or within the barrier's tightening."""
     key = f"systems.{system.name}.initial.action"
-    what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
-    worst, value = system.game.tightest(system.start)
+    with np.errstate(over="ignore"):  # a constraint that overflows is not kept either
+        what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
+        worst, value = system.game.tightest(system.start)
+        tight = system.game.constraints(system.start) + system.game.margins
     if not value < 0.0:
         raise InfeasibleStart(key, what, system.game.constraint_names[worst], value)
-    tight = system.game.constraints(system.start) + system.game.margins
     worst = int(np.argmax(tight))
     if not tight[worst] < 0.0:
         name = (

@@ -5,6 +5,7 @@ import random
 import re
 import tomllib
 from collections.abc import Callable
+from copy import deepcopy
 from datetime import date, datetime, time
 from functools import cache
 from pathlib import Path
@@ -162,8 +163,9 @@ def kind(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> N
 
 def delete(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> None:
     """An entry less."""
-    at, key = _named(rng, tables)
-    del at[key]
+    if tables:
+        at, key = _named(rng, tables)
+        del at[key]
 
 
 def rename(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> None:
@@ -176,8 +178,8 @@ def rename(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) ->
 def move(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> None:
     """An entry in another table."""
     at, key = _named(rng, tables)
-    into, beside = _named(rng, tables)
     value = at.pop(key)
+    into, beside = _named(rng, tables or other)  # the value is in neither
     (into[beside] if isinstance(into.get(beside), dict) else into)[key] = value
 
 
@@ -189,7 +191,7 @@ def graft(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> 
         return
     place, donor = rng.choice(PLACES), rng.choice(others)
     if place in donor and rng.random() < 0.5:
-        rng.choice(systems)[place] = donor[place]
+        rng.choice(systems)[place] = deepcopy(donor[place])
     else:
         rng.choice(systems)[place] = Raw(rng.choice(TABLES))
 
@@ -198,7 +200,7 @@ def insert(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) ->
     """An entry of another scenario in a table of the same name, or anywhere."""
     at, key = _named(rng, other)
     into, beside = _named(rng, tables)
-    (into[beside] if isinstance(into.get(beside), dict) else into)[key] = at[key]
+    (into[beside] if isinstance(into.get(beside), dict) else into)[key] = deepcopy(at[key])
 
 
 def _tables(table: Any) -> list[Any]:
