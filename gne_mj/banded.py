@@ -9,34 +9,90 @@ import numpy as np
 
 from gne_mj.native import kernel
 
+# Columns that a dense matrix is factorised by, and from how many on
+BLOCK, LARGE = 32, 128
+
 
 @kernel
 def factorise(band, n, b, pivots):
     """LU factors of the first n rows in place, with partial pivoting; False if singular."""
-    for k in range(n):
-        last = min(k + b, n - 1)
+    if n < LARGE or b < n - 1:
+        return eliminate(band, 0, n, n, n, b, pivots)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        if not eliminate(band, first, last, last, n, b, pivots):
+            return False
+        catch_up(band, first, last, n, b, pivots)
+    return True
+
+
+@kernel
+def eliminate(band, first, last, width, n, b, pivots):
+    """Eliminate some columns, up to ``last``, from columns up to ``width``; False if singular."""
+    for k in range(first, last):
+        lowest = min(k + b, n - 1)
         pivot, largest = k, abs(band[k, b])
-        for r in range(k + 1, last + 1):
+        for r in range(k + 1, lowest + 1):
             size = abs(band[r, k - r + b])
             if size > largest:
                 pivot, largest = r, size
         pivots[k] = pivot
         if not largest > 0.0:
             return False
-        end = min(k + 2 * b, n - 1)
-        if pivot != k:
-            for c in range(k, end + 1):
-                held = band[k, c - k + b]
-                band[k, c - k + b] = band[pivot, c - pivot + b]
-                band[pivot, c - pivot + b] = held
+        end = min(k + 2 * b, width - 1)
+        swap(band, k, pivot, k, end + 1, b)
         inverse = 1.0 / band[k, b]
-        for r in range(k + 1, last + 1):
+        for r in range(k + 1, lowest + 1):
             factor = band[r, k - r + b] * inverse
             band[r, k - r + b] = factor
             if factor != 0.0:
                 for c in range(end - k):
                     band[r, k + 1 - r + b + c] -= factor * band[k, 1 + b + c]
     return True
+
+
+@kernel
+def swap(band, k, pivot, first, last, b):
+    """Swap two rows in columns from ``first`` up to ``last``."""
+    if pivot != k:
+        for c in range(first, last):
+            held = band[k, c - k + b]
+            band[k, c - k + b] = band[pivot, c - pivot + b]
+            band[pivot, c - pivot + b] = held
+
+
+@kernel
+def catch_up(band, first, last, n, b, pivots):
+    """Do to the columns from ``last`` on what eliminating those from ``first`` on did to others.
+
+    Each entry goes through the same operations in the same order as without blocks, so that the
+    factors are the same to the last bit, but a row stays in the cache meanwhile. Until then the
+    block's multipliers are swapped along with their rows.
+    """
+    for k in range(first, last):
+        swap(band, k, pivots[k], last, n, b)
+        swap(band, k, pivots[k], first, k, b)
+    for r in range(first + 1, n):
+        row, k = band[r, last - r + b : n - r + b], first
+        end = min(r, last)
+        while k < end:
+            f0, u0 = band[r, k - r + b], band[k, last - k + b : n - k + b]
+            if k + 4 <= end:
+                f1, f2, f3 = band[r, k - r + b + 1], band[r, k - r + b + 2], band[r, k - r + b + 3]
+                if f0 != 0.0 and f1 != 0.0 and f2 != 0.0 and f3 != 0.0:
+                    u1 = band[k + 1, last - k - 1 + b : n - k - 1 + b]
+                    u2 = band[k + 2, last - k - 2 + b : n - k - 2 + b]
+                    u3 = band[k + 3, last - k - 3 + b : n - k - 3 + b]
+                    for c in range(len(row)):
+                        row[c] = row[c] - f0 * u0[c] - f1 * u1[c] - f2 * u2[c] - f3 * u3[c]
+                    k += 4
+                    continue
+            if f0 != 0.0:
+                for c in range(len(row)):
+                    row[c] -= f0 * u0[c]
+            k += 1
+    for k in range(last - 1, first - 1, -1):
+        swap(band, k, pivots[k], first, k, b)
 
 
 @kernel

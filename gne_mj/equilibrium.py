@@ -27,6 +27,8 @@ TOLERANCE = 1e-12
 # The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
 # order of lambda_l s_l counts, so that it may be off by half.
 TO_ZERO = Path(0.0, 1e-12, TOLERANCE, 0.5, True)
+# Multiplications for each step of Newton's method, roughly: some seconds
+MOST_WORK = 1e10
 # Random lines for each entry of an action of several, on which a best response is looked for
 RANDOM_LINES = 4
 
@@ -159,6 +161,13 @@ class Solver:
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
         position, self._half_band = order(game)
+        if not m * float(self._half_band) ** 2 <= MOST_WORK:
+            raise InvalidInput(
+                "agents.count",
+                game.agents,
+                f"the {game.name} game couples up to {self._half_band} actions with each other,"
+                " which is too much work for its equilibria",
+            )
         agents, constraints = np.arange(game.agents), np.arange(p)
         agents.flags.writeable = constraints.flags.writeable = False
         self._everyone = Free(agents, constraints, position)

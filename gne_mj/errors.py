@@ -9,10 +9,15 @@ from types import CodeType
 from typing import Any
 
 USER_MODULES = "gne_mj_user_"  # what the names of modules of users' files begin with
+# Characters of a message, and of a value or name in it: the rest is left out
+LONGEST, LONGEST_VALUE = 350, 100
 
 
 class GneError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base of every error that this package raises on purpose; its message is one short line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let it come back from a cluster's worker, though it is not made of its message."""
@@ -36,8 +41,8 @@ class InvalidInput(GneError, ValueError):
 
     def __init__(self, key: str, value: object, expected: str) -> None:
         self.key, self.value, self.expected = key, value, expected
-        given = "nothing is given" if value is None else f"got {value!r}"
-        super().__init__(f"{key}: {given}, but {expected}")
+        given = "nothing is given" if value is None else f"got {shown(value)}"
+        super().__init__(f"{one_line(key, LONGEST_VALUE)}: {given}, but {expected}")
 
 
 class InfeasibleStart(GneError, ValueError):
@@ -130,6 +135,26 @@ class ClusterError(GneError, RuntimeError):
     """A cluster's scheduler no longer answers, or its workers end; what was stored is whole."""
 
     status = "cluster_lost"
+
+
+def one_line(text: str, most: int = LONGEST) -> str:
+    """A text in one line of at most so many characters, without the middle of a longer one."""
+    if len(text) > most:
+        end = most // 3
+        text = f"{text[: most - end - 5]} ... {text[len(text) - end :]}"
+    if text.isprintable():
+        return text
+    escaped = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return escaped if len(escaped) <= most else one_line(escaped, most)
+
+
+def shown(value: object) -> str:
+    """A value in a message: as Python writes it, without the middle of what is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # of an integer of thousands of digits, or very deep
+        text = f"{type(value).__name__} that is too large to be shown"
+    return one_line(text, LONGEST_VALUE)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_RUNS, check_count
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.faults import steady_push
 from gne_mj.loops import monitor as watch
@@ -56,8 +57,9 @@ class Grid:
         if np.any(np.asarray(self.margins) >= 1.0):
             raise InvalidInput("--margins", self.margins, "they are shares, below 1")
         for key in ("runs", "duration"):
-            if not getattr(self, key) > 0:
+            if not 0 < getattr(self, key) < np.inf:
                 raise InvalidInput(f"--{key}", getattr(self, key), "it must be positive")
+        check_count("--runs: all together", self.total, MOST_RUNS)
 
     @property
     def cells(self) -> int:
@@ -228,7 +230,7 @@ def _run(
     except (InvalidInput, InfeasibleStart, SolverError):
         return "refused", np.nan
     plants[key] = getattr(loop, "plant", None)
-    loop.advance(1, clock.steps(duration))
+    loop.pass_over(clock.steps(duration))
     loop.finish()
     raise_pending()
     monitor, p = loop.monitor, system.game.constraints_count

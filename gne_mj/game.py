@@ -28,6 +28,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
 from gne_mj.errors import InvalidInput
 from gne_mj.game_fields import check_kinds, checked_bounds
 from gne_mj.native import compiled, source_key
@@ -166,7 +167,10 @@ class Game:
                 f"{constraints} lists and {len(self.constraint_names)} constraint_names",
                 "there must be as many of both, and at least one",
             )
+        check_count("agents.count: the actions of all", sum(self.sizes), MOST_ACTIONS)
+        check_count("game.in_constraint: the constraints", constraints, MOST_ACTIONS)
         for key in ("in_cost", "in_constraint"):
+            check_count(f"game.{key}: the agents", sum(map(len, getattr(self, key))), MOST_MEMBERS)
             for members in getattr(self, key):
                 inside = min(members, default=0) >= 0 and max(members, default=0) < count
                 if not inside or len(set(members)) != len(members):
@@ -305,21 +309,21 @@ class Game:
 
     def pseudo_gradient_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dF/dy, shape (m, m), at one profile y of shape (m,)."""
-        out = np.zeros((self.actions, self.actions))
+        out = self._matrix(self.actions)
         _native(self.kernels).pseudo_gradient_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
     def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dg/dy, shape (p, m), at one profile y of shape (m,)."""
-        out = np.zeros((self.constraints_count, self.actions))
+        out = self._matrix(self.constraints_count)
         _native(self.kernels).constraint_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
     def weighted_constraint_hessian(self, y: ArrayLike, weights: ArrayLike) -> NDArray[np.float64]:
         """sum_l w_l d2g_l/dy2, shape (m, m), at one profile y (m,) with weights w (p,)."""
-        out = np.zeros((self.actions, self.actions))
+        out = self._matrix(self.actions)
         weights = np.ascontiguousarray(weights, dtype=np.float64)
         if weights.shape != (self.constraints_count,):
             raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
@@ -349,6 +353,11 @@ class Game:
         values = self.constraints(y)
         worst = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
         return worst, float(values[worst])
+
+    def _matrix(self, rows: int) -> NDArray[np.float64]:
+        size = rows * self.actions
+        check_room("agents.count", self.agents, size, f"a matrix of the {self.name} game")
+        return np.zeros((rows, self.actions))
 
     def _profile(self, y: ArrayLike) -> NDArray[np.float64]:
         profile = np.ascontiguousarray(y, dtype=np.float64)

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.csgraph import laplacian as csgraph_laplacian
 from scipy.sparse.linalg import eigsh
 
+from gne_mj.bounds import MOST_EDGES, check_count
 from gne_mj.errors import InvalidInput
 
 # Up to this many agents eigenvalues come from dense matrices
@@ -129,7 +130,8 @@ def ring(agents: int) -> Graph:
 
 
 def complete(agents: int) -> Graph:
-    """Everyone hears everyone."""
+    """Everyone hears everyone: up to 1,000 agents."""
+    check_count("controller.graph: the edges", agents * (agents - 1) // 2, MOST_EDGES)
     return Graph(agents, tuple((i, j) for i in range(agents) for j in range(i + 1, agents)))
 
 

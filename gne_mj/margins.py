@@ -15,6 +15,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.plants import mixed
@@ -88,6 +89,7 @@ def influence(
             agents.kind.NAME,
             "margins follow from the agents' ODE, and of these robots none is known",
         )
+    check_count("simulation.control_period: its timesteps", period * (delay + 1), MOST_HELD)
     gains = np.zeros((3, agents.channels))
     known: dict[bytes, tuple[float, float, float]] = {}
     exact = True

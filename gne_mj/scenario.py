@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from gne_mj.bounds import MOST_SYSTEMS, check_count, check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.scenario_tables import Scenario, SystemTable, union_tags
 from gne_mj.trajectory import Trajectory
@@ -40,15 +41,25 @@ def load_scenario(
     Raises:
         InvalidInput: names the key, the value and what would be right.
     """
-    tables = json.loads(json.dumps(source)) if isinstance(source, Mapping) else _read(source)
+    if isinstance(source, Mapping):
+        check_nesting("scenario", source)
+        tables = json.loads(json.dumps(source))
+    else:
+        tables = _read(source)
     for key, value in (changes or {}).items():
+        check_nesting(key, value)
         _check_text(key, value)
         _change(tables, key, value)
+    systems = tables.get("systems")
+    if isinstance(systems, Mapping):
+        check_count("systems: their number", len(systems), MOST_SYSTEMS)
     _check_text("scenario", tables)
     try:
-        return Scenario.model_validate(tables)
+        scenario = Scenario.model_validate(tables)
     except ValidationError as error:
         raise _first(error) from None
+    scenario.clock()  # what does not fit together is told before anything is built
+    return scenario
 
 
 def run(
@@ -62,7 +73,7 @@ def parse_value(text: str) -> Any:
     """What ``--set key=TEXT`` means: a TOML value, else the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 
@@ -78,12 +89,18 @@ def _read(source: str | Path) -> dict[str, Any]:
             f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
-        return _resolve(tomllib.loads(path.read_text(encoding="utf-8")), path.parent)
+        contents = read_file(path)
+        check_text("scenario", contents)
+        tables = tomllib.loads(contents.decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InvalidInput("scenario", str(source), f"it cannot be read: {reason}") from None
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InvalidInput("scenario", str(source), "it is nested too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
         raise InvalidInput("scenario", str(source), f"it is not valid TOML: {error}") from None
+    check_nesting("scenario", tables)
+    return _resolve(tables, path.parent)
 
 
 def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -93,9 +110,9 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
         for table in system.values() if isinstance(system, dict) else ():
             given = table.get("file") if isinstance(table, dict) else None
             if isinstance(given, str):
-                table["file"] = str((folder / given).resolve())
+                table["file"] = _absolute(folder, given)
             elif isinstance(given, list):
-                table["file"] = [str((folder / str(name)).resolve()) for name in given]
+                table["file"] = [_absolute(folder, str(name)) for name in given]
     return tables
 
 
@@ -111,6 +128,13 @@ def _check_text(key: str, value: Any) -> None:
         for text in (key, str(value)):
             if text != text.encode(errors="ignore").decode():
                 raise InvalidInput(key, value, "it must be UTF-8 text, names of files too")
+
+
+def _absolute(folder: Path, name: str) -> str:
+    try:
+        return str((folder / name).resolve())
+    except (ValueError, OSError):  # no file can be called so: whoever reads it will say so
+        return name
 
 
 def full_key(tables: Mapping[str, Any], key: str, value: Any = None) -> list[str]:
@@ -175,9 +199,10 @@ def _first(error: ValidationError) -> InvalidInput:
     context = detail.get("ctx", {})
     kind = detail["type"]
     if kind == "unknown_key":
-        unknown = context["name"].strip("'")
         return InvalidInput(
-            ".".join([*where, unknown]), value[unknown], f"there is no such key; {context['hint']}"
+            ".".join([*where, str(context["key"])]),
+            value[context["key"]],
+            f"there is no such key; {context['hint']}",
         )
     if kind == "missing":
         return InvalidInput(".".join(where), None, "this key must be given")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_RECORDED, check_room
 from gne_mj.certificate import Certificate, certify_run
 from gne_mj.errors import InvalidInput
 from gne_mj.loops import monitor as watch
@@ -20,8 +21,8 @@ from gne_mj.system import Clock, System
 from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
 from gne_mj.verdicts import check_numbers
 
-# Real time between looks at the user's wishes (progress, Ctrl-C), in s
-_CHUNK = 0.1
+# Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
+_CHUNK, _FIRST = 0.1, 10_000
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class Simulation:
         names = [system.name for system in systems]
         if len(set(names)) != len(names) or not names:
             raise InvalidInput("systems", names, "there must be systems, with different names")
+        check_recording(systems, clock)
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
         self.interventions: list[dict[str, Any]] = []
@@ -169,10 +171,11 @@ class Simulation:
         """
         every = self.clock.steps(self.clock.sample_period)
         total = self.clock.steps(self.clock.duration)
+        unit = min(every, _FIRST)  # samples may be far apart
         size = 1
         with interruption() as interrupted:
             while not self.ended and not interrupted.is_set():
-                steps = min(size * every, total - self.clock.steps(self.time))
+                steps = min(size * unit, total - self.clock.steps(self.time))
                 started = real_time.perf_counter()
                 self.advance(steps)
                 elapsed = real_time.perf_counter() - started
@@ -198,6 +201,14 @@ class Simulation:
             wall_time=sum(run.wall_time for run in self._runs.values()),
             interventions=self.interventions,
         )
+
+
+def check_recording(systems: Sequence[System], clock: Clock) -> None:
+    """Refuse a run whose samples would fill the memory."""
+    rows = clock.steps(clock.duration) // clock.steps(clock.sample_period) + 2
+    numbers = sum(system.recorded for system in systems)
+    what = f"{rows} samples of {numbers} numbers"
+    check_room("recording.period", clock.sample_period, rows * numbers, what, MOST_RECORDED)
 
 
 class SystemRun:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_POINTS
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import (
     Equilibrium,
@@ -148,12 +149,13 @@ def parse_path(text: str, option: str = "--path") -> list[float]:
     try:
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
         right = len(parts) == 3 and 0 < first < np.inf and 0 < last < np.inf and count >= 2
+        right = right and count <= MOST_POINTS
     except (ValueError, IndexError):
         right = False
     if not right:
         raise InvalidInput(
             option, text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive numbers and"
-            " how many, at least 2)",
+            f" how many, from 2 to {MOST_POINTS})",
         )  # fmt: skip
     return np.geomspace(first, last, count).tolist()
 

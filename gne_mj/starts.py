@@ -71,11 +71,12 @@ def interior_profile(game: Game, start: NDArray[np.float64]) -> NDArray[np.float
     begins = [start, np.zeros(game.actions)]
     if game.box is not None:
         begins.insert(1, 0.5 * (game.box[0] + game.box[1]))
-    for y in begins:
-        for depth in DEPTHS:
-            y = _towards(game, y, depth)
-            if _inside(game, y):
-                return middle(game, y)
+    with np.errstate(all="ignore"):  # a profile that is no number is not inside either
+        for y in begins:
+            for depth in DEPTHS:
+                y = _towards(game, y, depth)
+                if _inside(game, y):
+                    return middle(game, y)
     raise InvalidInput("game", game.name, "no profile strictly inside its constraints was found")
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import USER_MODULES, GneError, InvalidInput, raised
 from gne_mj.game import Game
@@ -146,11 +147,12 @@ def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
 
 
 def _load(path: str | Path, key: str) -> ModuleType:
-    path = Path(path).resolve()
     try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise InvalidInput(key, str(path), f"it cannot be read: {error.strerror}") from None
+        path = Path(path).resolve()
+        text = read_file(path)
+    except (OSError, ValueError) as error:  # or a name that no file can have
+        why = getattr(error, "strerror", error)
+        raise InvalidInput(key, str(path), f"it cannot be read: {why}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
     digest = hashlib.sha256(str(path).encode() + text).hexdigest()[:16]
     name = f"{USER_MODULES}{path.stem}_{digest}"

@@ -8,10 +8,13 @@ from gne_mj.batches.chunk import Runner
 from gne_mj.batches.cluster import on_cluster
 from gne_mj.batches.progress import Progress, count_early
 from gne_mj.batches.store import Store
+from gne_mj.bounds import check_count
 from gne_mj.errors import InvalidInput
 
 if TYPE_CHECKING:
     from distributed import Client
+
+MOST_THREADS = 1024
 
 
 def cores() -> int:
@@ -45,6 +48,7 @@ def execute(
     """
     if threads < 0:
         raise InvalidInput("--threads", threads, "it must not be negative")
+    check_count("--threads", threads, MOST_THREADS)
     now = Progress.of(store)
 
     def tell(done: int, early: int, workers: int | None = None) -> Progress:

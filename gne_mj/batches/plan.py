@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.sweep import Sweep
+from gne_mj.bounds import MOST_RECORDED, MOST_RUNS, check_room
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.starts import random_starts
@@ -32,7 +33,6 @@ _NOT_SWEPT = {
     "recording.period": "all runs of a batch share their sample times",
     "description": "it changes nothing",
 }
-MOST_RUNS = 10_000_000
 _OPTIONS = {"starts": "--runs", "seed": "--seed", "record": "--record", "chunk": "--chunk"}
 _CHUNK_RUNS = 256
 _CHUNK_BYTES = 2**27  # of rows in memory
@@ -112,12 +112,23 @@ class Plan:
     def _fitting_chunk(self) -> int:
         """So many that their rows, which are in memory meanwhile, fit into the budget."""
         runs = min(_CHUNK_RUNS, max(1, -(-self.runs // _LEAST_CHUNKS)))
+        return max(1, min(runs, _CHUNK_BYTES // (8 * self._numbers_of_run)))
+
+    @cached_property
+    def _numbers_of_run(self) -> int:
+        """Numbers in memory while a run is computed and stored."""
         system, clock = self._first_system, self._clock
-        width = system.agents.channels * (system.agents.states + 3) + len(system.loop_memory)
+        width = system.recorded
         if self.record:  # variables made of them
             width = 4 * width + 2 * system.game.constraints_count
         rows = clock.steps(clock.duration) // clock.steps(clock.sample_period) + 2
-        return max(1, min(runs, _CHUNK_BYTES // (8 * width * rows)))
+        return width * rows
+
+    def check_room(self) -> None:
+        """Refuse a chunk whose runs fill the memory."""
+        each = self._numbers_of_run
+        check_room("recording.period", self._clock.sample_period, each, "a run", MOST_RECORDED)
+        check_room("--chunk", self.chunk, self.chunk * each, "its runs", MOST_RECORDED)
 
     @cached_property
     def _clock(self) -> Clock:
@@ -293,7 +304,9 @@ def make_plan(
     name = scenario.name_of(system)
     one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
     tables = json.loads(one.model_dump_json(exclude_none=True))
-    return Plan(scenario=tables, sweeps=tuple(sweeps), **options)
+    plan = Plan(scenario=tables, sweeps=tuple(sweeps), **options)
+    plan.check_room()
+    return plan
 
 
 def parse_record(given: str | int) -> int:

@@ -204,6 +204,7 @@ def passivity(
     for name in loaded.systems if system is None else (loaded.name_of(system),):
         with working(as_json, PREPARING):
             built = loaded.systems[name].build(name, loaded.simulation)
+        with progress(100.0, as_json, "% of all trials") as show:
             reports[name] = examine(
                 plants_of(built.agents, built.engine, built.integrator),
                 loaded.simulation.timestep,
@@ -212,6 +213,7 @@ def passivity(
                 seed=seed,
                 outputs=built.game.box or (-1.0, 1.0),
                 owners=built.game.agent_of_action,
+                progress=show,
             )
         if not as_json:
             print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))

@@ -5,7 +5,7 @@ import os
 import sys
 from contextlib import nullcontext
 from io import TextIOWrapper
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -13,9 +13,21 @@ from gne_mj.cli.ending import watched
 from gne_mj.cli.output import emit, give_up, results_only, results_stream, say
 from gne_mj.cli.signals import raise_on_signals, received
 
-_CTRL_C = 130  # typer's exit status
+
+class Interrupted(Exception):
+    """A signal ended the command; typer would take KeyboardInterrupt for an exit status."""
+
+
+class _Commands(typer.core.TyperGroup):
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise Interrupted from error
+
 
 app = typer.Typer(
+    cls=_Commands,
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -61,7 +73,7 @@ def main() -> None:
 def _main() -> None:
     try:
         try:
-            app()
+            sys.exit(app(prog_name="gne-mj", standalone_mode=False) or 0)
         finally:
             if sys.stdout is not None:
                 sys.stdout.flush()
@@ -73,15 +85,17 @@ def _main() -> None:
             _fail(f"{error.filename}: {error.strerror}")
         give_up(results_stream())
         _fail(f"standard output: {error.strerror or error}", "not_stored", 1)
-    except SystemExit as ended:  # a command's own, unless a user's function asked for it
+    except MemoryError:
+        _fail("there is not enough memory for this", code=1)
+    except (SystemExit, Interrupted) as ended:  # a command's own, unless a user's function's
         from gne_mj.errors import fault_of_user
 
         if (fault := fault_of_user(ended)) is not None:
             _fail(str(fault), fault.status, 1)
-        if ended.code == _CTRL_C:
-            say("gne-mj: interrupted")
-            sys.exit(128 + received())
-        raise
+        if isinstance(ended, SystemExit):
+            raise
+        say("gne-mj: interrupted")
+        sys.exit(128 + received())
     except BaseException as error:
         from gne_mj.errors import (
             ClusterError,
@@ -96,6 +110,8 @@ def _main() -> None:
 
             if (complaint := compiler_complaint(error)) is not None:
                 _fail(complaint, UserCodeError.status, 1)
+        if hasattr(error, "format_message"):  # typer's, about the command line
+            _misused(error)
         if not isinstance(error, GneError):
             if (fault := fault_of_user(error)) is None:
                 raise
@@ -104,7 +120,20 @@ def _main() -> None:
         _fail(str(error), getattr(error, "status", None), code)
 
 
+def _misused(error: Any) -> NoReturn:
+    """Tell of a command line that cannot be; show the help where there was nothing on it."""
+    context = getattr(error, "ctx", None)
+    if len(sys.argv) == 1 and context is not None:
+        print(context.get_help(), file=sys.stderr)
+        sys.exit(2)
+    path = context.command_path if context is not None else "gne-mj"
+    _fail(f"{error.format_message().rstrip('.')}; see `{path} --help`")
+
+
 def _fail(message: str, status: str | None = None, code: int = 2) -> NoReturn:
+    from gne_mj.errors import one_line
+
+    message = one_line(message)
     if "--json" in sys.argv:
         try:
             emit(json.dumps({"status": status or "invalid_input", "message": message}))

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gne_mj.bounds import MOST_COUPLED, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
@@ -32,12 +33,13 @@ def cournot_game(
     """The Cournot game of N firms; what is left out has the published numbers.
 
     Args:
-        agents: N.
+        agents: N, at most 2,000, since each one's cost depends on all.
         unit_cost: c_i, cost of one unit; N (1 + (i - 1) / 2) if left out.
         demand_intercept: D, the price of an empty market; 60 N if left out.
         lower_bound: least quantities, one for all or one each.
         upper_bound: greatest quantities, above the least ones.
     """
+    check_count("agents.count", agents, MOST_COUPLED)
     cost_of = agents * (1.0 + 0.5 * np.arange(agents)) if unit_cost is None else unit_cost
     columns = {"unit_cost": cost_of, "lower_bound": lower_bound, "upper_bound": upper_bound}
     arrays = {key: np.asarray(values, dtype=np.float64) for key, values in columns.items()}

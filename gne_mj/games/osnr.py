@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.bounds import MOST_COUPLED, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Box, Game
 from gne_mj.native import kernel
@@ -30,7 +31,7 @@ def osnr_game(
     system_matrix: ArrayLike,
     total_power_limit: float,
 ) -> Game:
-    """The OSNR game of N channels.
+    """The OSNR game of N channels, at most 2,000, since each one's cost depends on all.
 
     Args:
         price: a_i > 0, per mW.
@@ -41,6 +42,7 @@ def osnr_game(
         total_power_limit: P_0 > 0 in mW.
     """
     agents = np.size(price)
+    check_count("agents.count", agents, MOST_COUPLED)
     columns = {
         "price": price,
         "utility_weight": utility_weight,

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from gne_mj.loops.layout import Setup
 
 
+# Steps that a loop takes without a look at the user's wishes
+PIECE = 1_000_000
+
+
 @dataclass(frozen=True)
 class Samples:
     """What a loop recorded at the sample times, one row each.
@@ -78,6 +82,15 @@ class ClosedLoop(ABC):
         Fewer rows come back if the run leaves the set; the state then stays as it was at the
         start of the step in which that was seen, and the monitor says where and when.
         """
+
+    def pass_over(self, steps: int) -> None:
+        """Take so many steps, or as many as stay in the set, and keep no row.
+
+        In pieces, so that Ctrl-C is heard between them.
+        """
+        while steps > 0 and self.monitor[watch.EXIT] == watch.INSIDE:
+            self.advance(1, min(steps, PIECE))
+            steps -= PIECE
 
     @abstractmethod
     def finish(self) -> Samples:

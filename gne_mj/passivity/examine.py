@@ -1,12 +1,13 @@
 """The examination of a plant: trials of all its channels, and the worst that they showed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.bounds import MOST_RUNS, check_count, check_room
 from gne_mj.errors import InvalidInput
 from gne_mj.passivity.report import (
     CHECKS,
@@ -19,7 +20,7 @@ from gne_mj.passivity.report import (
     Range,
     widest,
 )
-from gne_mj.passivity.trials import Build, Rest, Storage, Trials, least_storage
+from gne_mj.passivity.trials import HOLDS, Build, Rest, Storage, Trials, least_storage
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -31,6 +32,8 @@ REACHES = (1.0, 30.0, 1e3, 1e4, 1e5, 1e6)
 SIMULATED, ROUNDING = 1e3, 1e-12
 # Channels in one simulation, at most
 _CHANNELS = 512
+# Timesteps of a trial at most, and numbers that are kept of each held input of a channel
+MOST_TRIAL, _KEPT = 1_000_000_000, 12
 
 
 def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
@@ -67,6 +70,7 @@ def examine(
     equilibrium: Rest | None = None,
     storage: Storage | Literal["agents"] | None = "agents",
     reaches: Sequence[float] = REACHES,
+    progress: Callable[[float], None] | None = None,
 ) -> PassivityReport:
     """Look for a violation of equilibrium-independent passivity.
 
@@ -86,6 +90,8 @@ def examine(
         reaches: how many times the outputs' range amplitudes and deviations are in proportion to,
             one after the other until a violation is found or the step no longer resolves the
             motion; beyond a thousand times only where V is seen to be negative.
+        progress: called now and then with the share of all trials that is done, in percent; some
+            may not be needed.
 
     Raises:
         InvalidInput: numbers that cannot be used, or a plant that does not rest at its equilibria.
@@ -97,7 +103,11 @@ def examine(
         raise InvalidInput("timestep", timestep, "it must be positive and finite")
     if not (np.isfinite(duration) and duration >= 40 * timestep):
         raise InvalidInput("duration", duration, "it must be finite and at least 40 timesteps")
+    check_count("duration: its timesteps", round(min(duration / timestep, 1e300)), MOST_TRIAL)
+    check_count("trials", trials, MOST_RUNS)
     channels = build(1, timestep).agents.channels
+    held = min(duration / timestep, HOLDS)
+    check_room("agents.count", channels, _KEPT * held * channels, "what a trial of them shows")
     owner = np.arange(channels) if owners is None else np.asarray(owners, dtype=np.int64)
     if owner.shape != (channels,):
         raise InvalidInput("owners", owners, f"it must list {channels} agents, one a channel")
@@ -108,13 +118,18 @@ def examine(
     rest = 0.5 * (lower + upper)
     levels: list[_Level] = []
     unresolved = None
-    for reach in reaches:
+    for number, reach in enumerate(reaches):
+
+        def tell(share: float, number: int = number) -> None:
+            if progress is not None:
+                progress(100.0 * (number + share) / len(reaches))
+
         if reach > SIMULATED and not (
             least_storage(build, reach * (upper - lower), rest, equilibrium, storage) < -ROUNDING
         ):
             continue
         level = _level(build, trials, timestep, duration, seed, where, owner, equilibrium, storage,
-                       reach)  # fmt: skip
+                       reach, tell)  # fmt: skip
         sure = level.counterexample is None or level.counterexample.confirmed
         if levels and (not sure or (level.escaped and level.counterexample is None)):
             unresolved = reach
@@ -148,6 +163,7 @@ def _level(
     equilibrium: Rest | None,
     storage: Storage | Literal["agents"] | None,
     reach: float,
+    tell: Callable[[float], None],
 ) -> _Level:
     """All trials of one amplitude, so many channels at a time."""
     worst: dict[tuple[int, int], Finding] = {}
@@ -170,6 +186,7 @@ def _level(
             counterexample is None or _rank(shown) > _rank(counterexample.finding)
         ):
             counterexample = part.counterexample(shown)
+        tell(min(1.0, (first + batch) / trials))
     return _Level(worst, counterexample, examined, escaped, has_storage, widest(ranges))
 
 

@@ -19,7 +19,7 @@ Rest = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.flo
 Storage = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 # Inputs held one after the other in a trial, at most
-_HOLDS = 2000
+HOLDS = 2000
 # The step's error is taken as this many times the difference to half the step.
 _SAFETY = 2.0
 # A difference may vanish by chance: its greatest within so many holds counts from the start.
@@ -53,7 +53,7 @@ class Trials:
         reach: float = 1.0,
     ) -> None:
         steps = round(duration / timestep)
-        self.substeps = 2 * max(1, -(-steps // (2 * _HOLDS)))
+        self.substeps = 2 * max(1, -(-steps // (2 * HOLDS)))
         holds = steps // self.substeps
         self.trials, self.timestep, self.owner, self.reach = trials, timestep, owner, reach
         self.hold = self.substeps * timestep

@@ -1,8 +1,8 @@
 """The MJCF of a fleet: robots attached to the lane or the plane, each with its own numbers."""
 
-import warnings
+import copy
 from importlib.resources import as_file, files
-from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -16,6 +16,12 @@ MODELS = {
     2: ("plane.xml", "planar_robot.xml", ("_x", "_y")),
 }
 
+# Robots that are attached at a time: each attaching costs by what is there, each robot by its group
+GROUP = 200
+# Fleets of more have no decoration, and memory in bytes by their number
+MANY = 500
+_LEAST_ARENA, _ARENA_FOR_EACH = 2**24, 2**14
+
 
 def element_names(what: str, channels: int, dimension: int = 1) -> list[str]:
     """Each channel's element: robot_2/position on the lane, robot_2/position_x on the plane."""
@@ -23,7 +29,9 @@ def element_names(what: str, channels: int, dimension: int = 1) -> list[str]:
     return [f"robot_{r // dimension + 1}/{what}{ends[r % dimension]}" for r in range(channels)]
 
 
-def compose(parameters: NDArray[np.float64], *, dimension: int = 1, decorated: bool = True) -> Any:
+def compose(
+    parameters: NDArray[np.float64], *, dimension: int = 1, decorated: bool = True
+) -> mujoco.MjSpec:
     """The lane (or, of dimension 2, the plane) with its flexible robots.
 
     Args:
@@ -35,7 +43,7 @@ def compose(parameters: NDArray[np.float64], *, dimension: int = 1, decorated: b
         decorated: keep what is for the eye only; without it MuJoCo steps somewhat faster.
 
     Returns:
-        A ``dm_control.mjcf.RootElement``; robot i's elements are named ``robot_i/...``, from 1.
+        What MuJoCo compiles; robot i's elements are named ``robot_i/...``, from 1.
 
     Raises:
         InvalidInput: another dimension, or masses that differ between a robot's axes.
@@ -49,70 +57,106 @@ def compose(parameters: NDArray[np.float64], *, dimension: int = 1, decorated: b
         raise InvalidInput(
             "agents.main_mass", "one a channel", "a robot's masses must be the same on all axes"
         )
-    place, robot_model, ends = MODELS[dimension]
-    mjcf = _import_mjcf()
-    lane = mjcf.from_xml_string(read_model(place))
-    robot_xml = read_model(robot_model)
+    place, model, ends = MODELS[dimension]
+    world = mujoco.MjSpec.from_string(read_model(place))
     if not decorated:
-        lane.worldbody.light.clear()
-        lane.worldbody.geom.clear()
-    for i, rows in enumerate(robots, start=1):
-        robot = mjcf.from_xml_string(robot_xml)
-        robot.model = f"robot_{i}"
-        robot.find("body", "main").inertial.mass = rows[0, 0]
-        robot.find("body", "appendage").inertial.mass = rows[0, 1]
+        for element in (*world.lights, *world.geoms):
+            world.delete(element)
+    robot = _robot(model, decorated)
+    for first in range(0, len(robots), GROUP):
+        group = _group(robot, robots[first : first + GROUP], first + 1, ends)
+        frame = world.worldbody.add_frame()
+        world.attach(mujoco.MjSpec.from_string(group), prefix="robot_", frame=frame)
+    if len(robots) > MANY:
+        # Else so much as contacts of all with all would need; there are none.
+        world.memory = _LEAST_ARENA + _ARENA_FOR_EACH * len(robots)
+    return world
+
+
+def _robot(model: str, decorated: bool) -> ElementTree.Element:
+    """The file of one robot, without what is for the eye only if that is not wanted."""
+    robot = ElementTree.fromstring(read_model(model))
+    if not decorated:
+        for parent in (*robot.iter("body"), robot.find("tendon")):
+            for element in list(parent if parent is not None else ()):
+                if element.tag in ("geom", "site", "spatial"):
+                    parent.remove(element)  # type: ignore[union-attr]
+    return robot
+
+
+def _group(
+    robot: ElementTree.Element, robots: NDArray[np.float64], first: int, ends: tuple[str, ...]
+) -> str:
+    """MJCF of some robots, numbered from ``first``; elements' names lack "robot_" in front."""
+    group = ElementTree.Element("mujoco")
+    group.extend(copy.deepcopy(robot.findall("default")))
+    sections = {part.tag: ElementTree.SubElement(group, part.tag) for part in robot}
+    for number, rows in enumerate(robots, start=first):
+        one = copy.deepcopy(robot)
+        for element in one.iter():
+            for reference in ("name", "joint", "site"):
+                if reference in element.attrib and element.tag != "default":
+                    element.set(reference, f"{number}/{element.get(reference)}")
+        within = {element.get("name"): element for element in one.iter()}
+        for kind, mass in (("main", rows[0, 0]), ("appendage", rows[0, 1])):
+            inertial = within[f"{number}/{kind}"].find("inertial")
+            assert inertial is not None
+            inertial.set("mass", repr(float(mass)))
         for end, (_, _, stiffness, _, damping) in zip(ends, rows, strict=True):
-            spring = robot.find("tendon", f"spring{end}")
-            spring.stiffness, spring.damping = stiffness, damping
-        if not decorated:
-            robot.find("tendon", "coil").remove()
-            for kind in ("geom", "site"):
-                for element in robot.find_all(kind):
-                    element.remove()
-        lane.attach(robot)
-    return lane
+            spring = within[f"{number}/spring{end}"]
+            spring.set("stiffness", repr(float(stiffness)))
+            spring.set("damping", repr(float(damping)))
+        body = ElementTree.SubElement(sections["worldbody"], "body", name=f"{number}/")
+        for part in one:
+            if part.tag != "default":
+                (body if part.tag == "worldbody" else sections[part.tag]).extend(part)
+    return ElementTree.tostring(group, encoding="unicode")
 
 
 def compile_model(
-    lane: Any, *, timestep: float, integrator: str, userdata: int = 0, memory: int = 0
+    world: mujoco.MjSpec, *, timestep: float, integrator: str, userdata: int = 0, memory: int = 0
 ) -> mujoco.MjModel:
     """Compile a composed fleet.
 
     Args:
-        lane: what :func:`compose` returned.
+        world: what :func:`compose` returned.
         timestep: in s.
         integrator: MuJoCo's name of it.
         userdata: entries of mjData's ``userdata``.
-        memory: entries of ``act`` for a law's memory; an actuator without any force, ``memory``,
-            holds them, and its rates come from a callback.
+        memory: entries of ``act`` for a law's memory, see :func:`add_memory`.
 
     Raises:
         InvalidInput: numbers that MuJoCo does not take, as a mass below its least.
     """
     if memory:
-        lane.actuator.add(
-            "general", name="memory", joint=lane.find_all("joint")[0], dyntype="user",
-            actdim=memory, gear=[0], gainprm=[0],
-        )  # fmt: skip
-    lane.option.timestep = timestep
-    lane.option.integrator = integrator
-    lane.size.nuserdata = userdata
+        add_memory(world, memory)
+    world.option.timestep = timestep
+    world.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    world.nuserdata = userdata
     try:
-        return mujoco.MjModel.from_xml_string(lane.to_xml_string())
+        return world.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
         raise InvalidInput("agents", "...", f"MuJoCo must compile it: {said}") from None
+
+
+def add_memory(world: mujoco.MjSpec, memory: int) -> None:
+    """An actuator without any force that holds a law's memory, last in ``act``.
+
+    Its rates come from a callback.
+    """
+    holder = world.add_actuator(name="memory")
+    holder.trntype = mujoco.mjtTrn.mjTRN_JOINT
+    joint = world.joints[0]
+    joint.name = joint.name or "memory"
+    holder.target = joint.name
+    holder.dyntype = mujoco.mjtDyn.mjDYN_USER
+    holder.actdim = memory
+    holder.gear = np.zeros(6)
+    holder.gainprm = np.zeros(10)
 
 
 def read_model(name: str) -> str:
     """The text of a packaged MJCF file."""
     with as_file(files("gne_mj.models").joinpath(name)) as path:
         return path.read_text(encoding="utf-8")
-
-
-def _import_mjcf() -> Any:
-    # Late, since it is slow; quiet, since glfw warns wherever there is no display.
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from dm_control import mjcf
-    return mjcf

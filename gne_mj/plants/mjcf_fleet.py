@@ -13,7 +13,7 @@ from gne_mj.native import kernel
 from gne_mj.plants import mjcf_ahead, mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
-from gne_mj.plants.fleet import read_model
+from gne_mj.plants.fleet import add_memory, read_model
 from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_ahead import (
     ACTUATOR,
@@ -98,7 +98,7 @@ class MjcfPlant(Plant):
         )
         world.nuserdata = USERDATA_HEADER + userdata
         if memory:
-            _add_memory(world, memory)
+            add_memory(world, memory)
         self.model = mjcf_file.compiled(world, "...")
         if memory_asked > self.model.narena:
             world.memory = memory_asked
@@ -282,19 +282,6 @@ def _check_sensor(model: mujoco.MjModel, robot: RobotFile, sensor: int) -> Any:
     if expected:
         raise InvalidInput("agents.output", robot.output, expected)
     return kind
-
-
-def _add_memory(world: Any, memory: int) -> None:
-    """An actuator without any force that holds a law's memory, last in ``act``."""
-    holder = world.add_actuator(name="memory")
-    holder.trntype = mujoco.mjtTrn.mjTRN_JOINT
-    joint = world.joints[0]
-    joint.name = joint.name or "memory"
-    holder.target = joint.name
-    holder.dyntype = mujoco.mjtDyn.mjDYN_USER
-    holder.actdim = memory
-    holder.gear = np.zeros(6)
-    holder.gainprm = np.zeros(10)
 
 
 def _named(model: mujoco.MjModel, kind: Any, name: str) -> int:

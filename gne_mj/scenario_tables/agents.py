@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gne_mj.bounds import MOST_AGENTS
 from gne_mj.errors import InvalidInput
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
@@ -24,7 +25,7 @@ from gne_mj.scenario_tables.table import (
 
 
 class _AgentsTable(Table):
-    count: int = Field(gt=0, description="N")
+    count: int = Field(gt=0, le=MOST_AGENTS, description="N")
     input_limit: PerAction | None = Field(
         None, description="greatest |u| that the actuators deliver; no limit if left out"
     )

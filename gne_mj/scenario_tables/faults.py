@@ -138,7 +138,7 @@ class MarginTable(Table):
 
     push: PerAgent = Field(0.0, description="greatest force besides the input, in its unit")
     noise: PerAgent = Field(0.0, description="greatest error of an output")
-    delay: int = Field(0, ge=0, description="of the sensors, in control periods")
+    delay: int = Field(0, ge=0, le=1000, description="of the sensors, in control periods")
 
     def disturbance(self, game: Game) -> Disturbance:
         """The bounds, for each channel."""

@@ -43,6 +43,7 @@ from gne_mj.scenario_tables.table import PerAction, Sizes, Table, per_action
 from gne_mj.simulation import Simulation
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System
+from gne_mj.system.checks import check_estimates
 from gne_mj.theory.periods import least_rho
 
 
@@ -194,6 +195,7 @@ class SystemTable(Table):
         try:
             game, agents = self._parts(simulation)
             law = self.controller.build(game)
+            check_estimates(name, game, law)
             if at is None:
                 state = self.initial.build(
                     agents, game.sizes, lambda: self.game.default_start(count)

@@ -36,8 +36,8 @@ class Table(BaseModel):
                 if key not in cls.model_fields:
                     raise PydanticCustomError(
                         "unknown_key",
-                        "{name} is not a key here; {hint}",
-                        {"name": repr(key), "hint": cls._hint(str(key))},
+                        "'{key}' is not a key here; {hint}",
+                        {"key": key, "hint": cls._hint(str(key))},
                     )
         return values
 

@@ -7,8 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gne_mj.bounds import check_room
+from gne_mj.controllers import Law
 from gne_mj.errors import InfeasibleStart, InvalidInput
-from gne_mj.faults import Bias, Noise, SensorDelay, for_native, sensor_delay, strikes_messages
+from gne_mj.faults import (
+    Bias,
+    Noise,
+    SensorDelay,
+    for_native,
+    message_delay,
+    sensor_delay,
+    strikes_messages,
+)
+from gne_mj.game import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.native import INTERPRETED
 from gne_mj.plants import flexible_robot
@@ -19,6 +30,16 @@ if TYPE_CHECKING:
 
 # The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
 ROSENBROCK_AGENTS = 200
+# How many copies of all estimates a loop makes: stages of the integrator, and some for itself
+ESTIMATES = 8
+
+
+def check_estimates(name: str, game: Game, law: Law) -> None:
+    """Refuse laws whose agents' estimates, and what a loop makes of them, fill the memory."""
+    if law.graph is not None:
+        size = ESTIMATES * game.agents * game.actions
+        what = f"what {game.agents} agents estimate of each other"
+        check_room(f"systems.{name}.agents.count", game.agents, size, what)
 
 
 def check_parts(system: "System") -> None:
@@ -105,11 +126,12 @@ def check_lists(system: "System", problem: Problem) -> None:
 def check_start(system: "System") -> None:
     """Refuse a start that is not strictly inside, or within the barrier's tightening."""
     key = f"systems.{system.name}.initial.action"
-    what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
-    worst, value = system.game.tightest(system.start)
+    with np.errstate(over="ignore"):  # a constraint that overflows is not kept either
+        what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
+        worst, value = system.game.tightest(system.start)
+        tight = system.game.constraints(system.start) + system.game.margins
     if not value < 0.0:
         raise InfeasibleStart(key, what, system.game.constraint_names[worst], value)
-    tight = system.game.constraints(system.start) + system.game.margins
     worst = int(np.argmax(tight))
     if not tight[worst] < 0.0:
         name = (
@@ -194,6 +216,11 @@ def check_faults(system: "System") -> None:
         except InvalidInput as error:
             where = error.key.replace("faults", f"{key}.{number}", 1)
             raise InvalidInput(where, error.value, error.expected) from None
+    m, graph = system.game.actions, system.law.graph
+    kept = (sensor_delay(system.faults) + 1) * m * (system.agents.states + 1)
+    if strikes_messages(system.faults) and graph is not None:
+        kept += (2 * len(graph.edges) + (message_delay(system.faults) + 1) * graph.agents) * m
+    check_room(key, "late", ESTIMATES * kept, "what was sent or measured before")
     late = sensor_delay(system.faults) > 0
     if late and system.decentralised:
         raise InvalidInput(

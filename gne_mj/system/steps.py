@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.controllers import PartialInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.margins import influence
@@ -59,11 +60,13 @@ def check_step(system: "System", clock: Clock) -> None:
 
 def check_slopes(system: "System", clock: Clock) -> None:
     """Refuse periods over which dy+/du is not positive: exactly, or else from this start."""
-    if system.mode != "implicit" or isinstance(system.agents, MjcfRobots):
+    if system.mode != "implicit":
         return
-    effect = influence(
-        system.agents, clock.timestep, system.integrator, clock.steps(clock.control_period)
-    )
+    steps = clock.steps(clock.control_period)
+    check_count("simulation.control_period: its timesteps", steps, MOST_HELD)
+    if isinstance(system.agents, MjcfRobots):
+        return
+    effect = influence(system.agents, clock.timestep, system.integrator, steps)
     if effect.exact:
         _refuse_slopes(system, effect.least_slope, clock)
     elif not np.all(effect.least_slope > 0):

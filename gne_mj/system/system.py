@@ -95,6 +95,7 @@ class System:
         checks.check_parts(self)
         checks.check_start(self)
         refuse(self.game, self.start, f"systems.{self.name}")
+        checks.check_estimates(self.name, self.game, self.law)
         expected = self.law.initial_memory(self.start)
         if not len(self.memory):
             object.__setattr__(self, "memory", expected)
@@ -190,10 +191,11 @@ class System:
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop
+            from gne_mj.plants.fleet import MANY
 
             fleet: MujocoPlant | MjcfPlant
             if plant is None:
-                fleet = self.mujoco_plant(clock)
+                fleet = self.mujoco_plant(clock, decorated=self.agents.count <= MANY)
                 if self.mode == "implicit" and isinstance(self.agents, MjcfRobots):
                     steps.try_slopes(self, fleet, clock)
             else:
@@ -217,6 +219,11 @@ class System:
     def fault_kernels(self) -> ModuleType:
         """The module of what goes wrong in this system's loops."""
         return native_faults if self.faults else faultless
+
+    @property
+    def recorded(self) -> int:
+        """Numbers that are kept of one sample."""
+        return self.agents.channels * (self.agents.states + 3) + len(self.loop_memory)
 
     @property
     def loop_memory(self) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import UserCodeError
 from gne_mj.game import Box, Game
+from gne_mj.theory import spectra
 from gne_mj.theory.monotonicity import Bound, least_eigenvalue
 
 EXACT, BOUNDED, SAMPLED = "exact", "bounded", "sampled"
@@ -124,7 +125,7 @@ class Slopes:
         """Lipschitz constant of F: the greatest singular value of dF/dy."""
         if self._bounds is None and not self._affine:
             return Constant(self.samples["theta_1"], SAMPLED)
-        return self._constant(float(np.linalg.norm(self._greatest, 2)), "theta_1")
+        return self._constant(spectra.norm(self._greatest), "theta_1")
 
     @cached_property
     def theta_2(self) -> Constant:
@@ -202,7 +203,7 @@ class Slopes:
         here = self.game.pseudo_gradient_jacobian(self.center)
         others = profiles(self.game, self.center, self.box, 3, self.feasible)
         away = 0.9 * (others - self.center)  # not to the boundary, where no step has room
-        slopes = [self.game.pseudo_gradient_jacobian(self.center + way) for way in away]
+        slopes = (self.game.pseudo_gradient_jacobian(self.center + way) for way in away)
         return max(float(np.max(np.abs(slope - here))) for slope in slopes)
 
     @cached_property
@@ -268,15 +269,6 @@ def profiles(
     # In a set that is not convex a part of the way can be outside where its end is not
     good = np.all(game.constraints(found) < 0.0, axis=1)
     return np.where(good[:, None], found, center + inside[:, None] * (ends - center))
-
-
-def positive_definite(matrices: NDArray[np.float64]) -> bool:
-    """Whether all symmetric matrices (..., m, m) are, by Cholesky's method."""
-    try:
-        np.linalg.cholesky(matrices)
-    except np.linalg.LinAlgError:
-        return False
-    return True
 
 
 def _symmetric(slopes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,7 +18,8 @@ from gne_mj.errors import UserCodeError
 from gne_mj.game import Box, Game
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
-from gne_mj.theory.constants import EXACT, Slopes, positive_definite, profiles
+from gne_mj.theory.constants import EXACT, Slopes, profiles
+from gne_mj.theory.spectra import positive_definite
 
 Array = NDArray[np.float64]
 
@@ -182,7 +183,8 @@ def strictly_convex_barrier(system: System) -> bool:
         size = float(np.max(np.abs(curved)))
         span += (unit.T @ unit).toarray() + (curved / size if size > 0.0 else 0.0)
     floor = (1e-12 if _given(game, "constraint_hessian") else 1e-7) * np.max(np.abs(span))
-    return positive_definite(span - floor * np.eye(game.actions))
+    span[np.diag_indices(game.actions)] -= floor
+    return positive_definite(span)
 
 
 def shown(y: Array) -> str:
@@ -223,6 +225,9 @@ def _samples(
 
 def _least_own(game: Game, slopes: Array) -> tuple[float, int]:
     """The least eigenvalue of an agent's own block of a dF/dy (m, m), and which agent's."""
+    if max(game.sizes) == 1:
+        worst = int(np.argmin(np.diag(slopes)))
+        return float(slopes[worst, worst]), worst
     at = game.data.offsets
     each = [
         float(np.linalg.eigvalsh(0.5 * (own + own.T))[0])

@@ -22,7 +22,8 @@ from scipy.sparse import block_diag, csr_array
 from scipy.sparse.linalg import eigsh
 
 from gne_mj.graph import Graph
-from gne_mj.theory.constants import Slopes, positive_definite
+from gne_mj.theory.constants import Slopes
+from gne_mj.theory.spectra import positive_definite
 
 Array = NDArray[np.float64]
 

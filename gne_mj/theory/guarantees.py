@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from gne_mj.bounds import MOST_EXAMINED, check_count
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
 from gne_mj.system import Clock, System
@@ -55,7 +56,13 @@ class Guarantees:
 
 
 def certify(system: System, clock: Clock) -> Guarantees:
-    """Examine a system that is to run on a clock."""
+    """Examine a system that is to run on a clock.
+
+    Raises:
+        InvalidInput: so many actions that matrices of so many rows and columns fill the memory.
+    """
+    actions = f"systems.{system.name}.agents.count: the actions of all"
+    check_count(actions, system.game.actions, MOST_EXAMINED)
     theorem = Theorem(system)
     held = Held(system, clock) if system.mode == "implicit" else None
     law, game, pieces = system.law, system.game, forecast(system, clock)

@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from gne_mj.theory import spectra
+
 Array = NDArray[np.float64]
 
 # How closely the smooth bound follows the least eigenvalue, and steps at each of these
@@ -46,12 +48,11 @@ class Bound(NamedTuple):
 
 def least_eigenvalue(short: Array, long: Array) -> Bound:
     """The bound for rows between those of two matrices (m, m), the shorter ones first."""
-    change = long - short
-    moves = np.any(change != 0.0, axis=1)
-    symmetric, change, unit = 0.5 * (short + short.T), change[moves], np.eye(len(short))[moves]
-    best, loss = float(np.linalg.eigvalsh(symmetric)[0]), np.zeros_like(short)
+    moves = np.any(long != short, axis=1)
+    symmetric, loss = 0.5 * (short + short.T), np.zeros_like(short)
     if not np.any(moves):
-        return Bound(best, short, loss)
+        return Bound(spectra.least_eigenvalue(symmetric), short, loss)
+    change, unit = (long - short)[moves], np.eye(len(short))[moves]
     best = -np.inf
 
     def smooth(log_s: Array, sharpness: float, size: float) -> tuple[float, Array]:

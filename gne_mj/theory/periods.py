@@ -16,8 +16,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.bounds import MOST_EXAMINED
 from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.system import System
+from gne_mj.theory import spectra
 
 Array = NDArray[np.float64]
 
@@ -37,9 +39,9 @@ def push_period(system: System, y: Array) -> float | None:
 
 
 def linear_period(system: System, y: Array) -> float | None:
-    """The second rule at a feasible profile y (m,)."""
+    """The second rule at a feasible profile y (m,); of many agents to 1e-4, if lambda is real."""
     inverse = system.agents.mobility
-    if inverse is None:
+    if inverse is None or system.game.actions > MOST_EXAMINED:
         return None
     game, law = system.game, system.law
     matrix = system.barrier.hessian(y) + game.pseudo_gradient_jacobian(y)
@@ -48,7 +50,7 @@ def linear_period(system: System, y: Array) -> float | None:
     if isinstance(law, PartialInformation):
         neighbours = np.diff(law.graph.data.pointer)[game.agent_of_action]
         matrix += law.coupling * np.diag(neighbours)
-    values = np.linalg.eigvals(inverse[:, None] * matrix)
+    values = spectra.eigenvalues(inverse[:, None] * matrix)
     values = values[values.real > 0]
     return float(np.min(2.0 * values.real / np.abs(values) ** 2, initial=np.inf))
 

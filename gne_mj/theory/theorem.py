@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gne_mj.bounds import MOST_EXAMINED
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.game import Box
@@ -21,6 +22,7 @@ from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.demand import Demand, limited
 from gne_mj.theory.disturbances import estimate_error
 from gne_mj.theory.gain import Gain, required_gain
+from gne_mj.theory.spectra import DENSE
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
 HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.held
@@ -71,10 +73,12 @@ class Theorem:
     def under_partial_information(self) -> tuple[str, Coupling] | None:
         """What agents under another law would need under partial information (c = 1 is tried).
 
-        On the law's "own" graph or, without one, on the "complete" one.
+        On the law's "own" graph or, without one, on the "complete" one, of up to 300 agents.
         """
         law = self.system.law
         if self.coupling is not None or self.system.game.agents == 1:
+            return None
+        if law.graph is None and self.system.game.agents > DENSE:
             return None
         own = law.graph is not None
         graph = law.graph if law.graph is not None else complete(self.system.game.agents)
@@ -128,6 +132,8 @@ class Theorem:
     @cached_property
     def obstacles(self) -> tuple[str, ...]:
         """Why the theorem does not apply to the law in continuous time; empty if it does."""
+        if self.system.game.actions > MOST_EXAMINED:
+            return (f"it has more than {MOST_EXAMINED} actions, which are too many to examine",)
         if self.name is None:
             return (f"the {self.system.law.information} law is none of the paper's",)
         found = [f"[{a.label}] {a.status}: {a.why}" for a in self.assumptions if not a.granted]

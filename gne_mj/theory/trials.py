@@ -59,7 +59,7 @@ class PushSearch:
 def stays_inside(system: System, clock: Clock) -> bool:
     """Whether a run stays inside at every integration step to the clock's end."""
     loop = system.closed_loop(clock)
-    loop.advance(1, clock.steps(clock.duration))
+    loop.pass_over(clock.steps(clock.duration))
     loop.finish()
     raise_pending()
     return bool(loop.monitor[watch.EXIT] == watch.INSIDE)
