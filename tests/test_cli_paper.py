@@ -61,19 +61,27 @@ def test_paper_replaces_its_own_results_only(drawn, tmp_path):
     assert [path.name for path in folder.parent.iterdir()] == ["paper"]
 
 
-def test_what_was_changed_while_paper_ran_is_not_replaced(drawn, tmp_path, monkeypatch):
+@pytest.mark.parametrize("changed", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_what_was_changed_while_paper_ran_is_not_replaced(changed, drawn, tmp_path, monkeypatch):
     folder = tmp_path / "paper"
     shutil.copytree(drawn[0], folder)
     run = Simulation.run
 
     def meanwhile(*arguments):
-        (folder / "robots-gaps.png").write_bytes(b"mine")
+        (folder / "notes.txt").write_text("mine")
+        if changed:
+            (folder / "robots-gaps.png").write_bytes(b"mine")
         return run(*arguments)
 
     monkeypatch.setattr(Simulation, "run", meanwhile)
     report = (folder / "report.json").read_text()
     done = gne_here("paper", *SHORT, "--out", folder)
     assert done.returncode == 0
+    assert (folder / "notes.txt").read_text() == "mine"
+    if not changed:
+        assert [path.name for path in tmp_path.iterdir()] == ["paper"]
+        assert (folder / "report.json").read_text() != report
+        return
     assert (folder / "robots-gaps.png").read_bytes() == b"mine"
     assert (folder / "report.json").read_text() == report
     assert {path.name for path in tmp_path.iterdir()} == {"paper", "paper-2"}

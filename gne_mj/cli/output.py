@@ -143,16 +143,17 @@ def _replace(folder: Path, out: Path, before: dict[str, object]) -> bool:
     At every moment each of them is there, whole: the old one or the new one.
 
     Returns:
-        Whether it was done: not if ``out`` is no longer as it was before.
+        Whether it was done: not if one of these in ``out`` is not what it was before.
     """
     from gne_mj.files import exchange, locked, rename_new
 
     if not out.is_dir():
         return False
     with locked(out):
-        if _entries(out) != before:
+        now, entries = _entries(out), sorted(folder.iterdir())
+        if any(now.get(entry.name) != before.get(entry.name) for entry in entries):
             return False
-        for entry in sorted(folder.iterdir()):
+        for entry in entries:
             if (out / entry.name).exists():
                 exchange(entry, out / entry.name)
             else:
