@@ -216,6 +216,7 @@ def test_the_kill_script_notices_what_is_half_written(tmp_path, monkeypatch):
         monkeypatch.setattr(kills, "GNE", (sys.executable, "-c", f"{fault}; {program}"))
         known = kills.Reference(reference, dict.fromkeys(kills.COMMANDS, 100.0))
         index = 5 + 9 * 2  # view --html, SIGTERM
+        monkeypatch.setattr(kills, "ATTEMPTS", 1)
         name, _, ended, found = kills.kill(tmp_path / "kill", known, 0, index)
         assert name == "view --html"
         assert ended == "before"
