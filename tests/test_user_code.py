@@ -263,6 +263,7 @@ def stuck(folder, command, statement, interrupts=1):
         assert process.stdout.readline() == "stuck\n"
         for _ in range(interrupts):
             process.send_signal(signal.SIGINT)
+            time.sleep(0.2)  # two at once would be one
         _, told = process.communicate(timeout=60)
     finally:
         if process.poll() is None:
@@ -373,6 +374,7 @@ def test_ctrl_c_ends_a_kernel_that_never_returns(tmp_path, interrupts):
         time.sleep(0.5)
         for _ in range(interrupts):
             process.send_signal(signal.SIGINT)
+            time.sleep(0.2)  # two at once would be one
         _, told = process.communicate(timeout=30)
     finally:
         process.kill()
