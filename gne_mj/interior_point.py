@@ -398,7 +398,11 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             last = path.last_rho * size
         if not careful:
             # On the way only nearness to the path matters.
-            while rho > last and residual <= max(10.0 * rho / size, path.tolerance) and off <= 0.9:
+            while (
+                last < rho < np.inf
+                and residual <= max(10.0 * rho / size, path.tolerance)
+                and off <= 0.9
+            ):
                 highest = 0.0
                 rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
                 off = spread(constraints, rho, point, work)
