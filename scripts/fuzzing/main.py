@@ -102,10 +102,11 @@ def one(process: worker.Worker, kind: str, index: int, seed: int) -> dict[str, A
 
 
 def asked_to_be_long(done: dict[str, Any]) -> bool:
-    """Whether it ended by Ctrl-C as a run does that was going well."""
-    return done["interrupted"] and not done["ended"] and done["code"] == 1 and (
-        "interrupted" in done["out"] or "stopped" in done["out"]
-    )  # fmt: skip
+    """Whether it ended after Ctrl-C as a run does that was going well."""
+    if not done["interrupted"] or done["ended"]:
+        return False
+    stopped = "interrupted" in done["out"] or "stopped" in done["out"]
+    return done["code"] == 0 or (done["code"] == 1 and stopped)
 
 
 def judged(done: dict[str, Any], words: list[str]) -> str:
