@@ -79,6 +79,7 @@ class Certificate:
         return asdict(self)
 
 
+@np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def certify_run(
     system: System,
     time: NDArray[np.float64],

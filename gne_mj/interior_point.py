@@ -389,8 +389,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
     length = whole
     last = path.last_rho * size if path.to_zero else path.last_rho
     distance, still = np.inf, False
-    before, stalled = np.inf, 0
-    slow, careful = 0, False
+    before, stalled, slow, careful = np.inf, 0, 0, False
     for iteration in range(LARGEST_COUNT):
         residual = stationarity_error(count, work)
         off, near_enough = spread(constraints, rho, point, work), False
@@ -398,7 +397,9 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             last = path.last_rho * size
         if not careful:
             # On the way only nearness to the path matters.
-            while rho > last and residual <= max(10.0 * rho / size, path.tolerance) and off <= 0.9:
+            while last < rho < np.inf and off <= 0.9:
+                if not residual <= max(10.0 * rho / size, path.tolerance):
+                    break
                 highest = 0.0
                 rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
                 off = spread(constraints, rho, point, work)

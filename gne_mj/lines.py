@@ -4,6 +4,8 @@ A best response that is found by Newton's method is a stationary point near wher
 lines, costs are compared: for an action of one entry, on all of the feasible interval.
 """
 
+import numpy as np
+
 from gne_mj import scales
 from gne_mj.native import copy, kernel
 
@@ -36,7 +38,7 @@ def place(data, i, y, direction, t, trial):
 def end(game, data, i, own, y, direction, sign, length, trial):
     """The greatest t, as far as FARTHEST, up to which y + sign t direction stays inside."""
     low, high, left = 0.0, FIRST * length, False
-    while high <= FARTHEST * length:
+    while 0.0 < high < np.inf and high <= FARTHEST * length:  # what does not grow ends, too
         place(data, i, y, direction, sign * high, trial)
         left = not stays(game, data, own, trial)
         if left:

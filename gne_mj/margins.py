@@ -189,7 +189,7 @@ def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Arr
     if not np.all(t > 0) or not covered(0.0):
         return 0.0
     low, high = 0.0, 1e-6
-    while covered(high):
+    while covered(high) and high < 1e300:
         low, high = high, 4.0 * high
     for _ in range(60):
         middle = 0.5 * (low + high)

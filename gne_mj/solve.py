@@ -109,6 +109,7 @@ class Solution:
         }
 
 
+@np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def solve_system(
     system: System, rhos: Sequence[float] = (), path_rhos: Sequence[float] = ()
 ) -> Solution:

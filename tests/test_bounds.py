@@ -10,7 +10,7 @@ import pytest
 from builders import integrators
 from commands import gne_here
 
-from gne_mj import bounds, graph
+from gne_mj import bounds, graph, lines
 from gne_mj.errors import GneError, InvalidInput, UserCodeError, shown
 from gne_mj.exit_map import Grid
 from gne_mj.games import cournot_game, velocity_game
@@ -328,3 +328,18 @@ def test_starts_that_overflow(start):
     (system,), moved = load_scenario("velocity-sync", {"initial.action": start}).inside_systems()
     assert np.all(system.game.constraints(system.start) < 0.0)
     assert moved
+
+
+@pytest.mark.parametrize("length", [5e-324, 1e-310, 1.0, 1e300, 1.7e308])
+@pytest.mark.parametrize("own", [[], [0, 1]])
+def test_lines_of_any_length_end(length, own):
+    """Doubling neither begins at zero nor goes on at infinity."""
+    game = velocity_game(3, 3.0, 3.0)
+    y, direction = np.full(3, 3.0), np.array([1.0, 0.0, 0.0])
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = lines.end(
+            game.kernels, game.data, 0, np.array(own), y, direction, 1.0, length, y.copy()
+        )
+    assert 0.0 <= found < np.inf
+    if own and length == 1.0:
+        assert found == pytest.approx(3.0, rel=1e-12)

@@ -55,6 +55,7 @@ class Guarantees:
         return plain
 
 
+@np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock.
 

@@ -69,9 +69,10 @@ def campaign(jobs: list[tuple[str, int]], seed: int, processes: int) -> list[dic
         with worker.Worker(scenarios.companions()) as process:
             while not waiting.empty():
                 rows.append(one(process, *waiting.get(), seed))
+                if rows[-1]["wrong"]:
+                    print(f"{told(rows[-1])}: {_cause(rows[-1]['err'])}", file=sys.stderr)
                 if len(rows) % 100 == 0:
-                    wrong = sum(bool(row["wrong"]) for row in rows)
-                    print(f"{len(rows)} of {len(jobs)}, {wrong} wrong", file=sys.stderr)
+                    print(f"{len(rows)} of {len(jobs)}", file=sys.stderr)
 
     with ThreadPoolExecutor(processes) as pool:
         for running in [pool.submit(work) for _ in range(processes)]:
@@ -101,10 +102,11 @@ def one(process: worker.Worker, kind: str, index: int, seed: int) -> dict[str, A
 
 
 def asked_to_be_long(done: dict[str, Any]) -> bool:
-    """Whether it ended by Ctrl-C as a run does that was going well."""
-    return done["interrupted"] and not done["ended"] and done["code"] == 1 and (
-        "interrupted" in done["out"] or "stopped" in done["out"]
-    )  # fmt: skip
+    """Whether it ended after Ctrl-C as a run does that was going well."""
+    if not done["interrupted"] or done["ended"]:
+        return False
+    stopped = "interrupted" in done["out"] or "stopped" in done["out"]
+    return done["code"] == 0 or (done["code"] == 1 and stopped)
 
 
 def judged(done: dict[str, Any], words: list[str]) -> str:
@@ -161,14 +163,16 @@ def report(rows: list[dict[str, Any]]) -> list[str]:
         "",
         *(f"{count} x {wrong}: {cause}" for (wrong, cause), count in groups.most_common()),
     ]
-    for row in found[:SHOWN]:
-        lines.append(
-            f"--{row['kind']} {row['index']}: {row['wrong']}, {row['seconds']:.1f} s;"
-            f" {row['what']}; {row['words']}"
-        )
+    lines += map(told, found[:SHOWN])
     most = max((row["memory"] for row in rows), default=0) / worker.GIB
     slowest = max((row["seconds"] for row in rows), default=0.0)
     return [*lines, f"most memory {most:.2f} GiB, longest {slowest:.1f} s"]
+
+
+def told(row: dict[str, Any]) -> str:
+    """One input that did what it should not, and how to repeat it."""
+    head = f"--{row['kind']} {row['index']}: {row['wrong']}, {row['seconds']:.1f} s"
+    return f"{head}; {row['what']}; {row['words']}"
 
 
 def _cause(err: str) -> str:

@@ -22,7 +22,7 @@ from typing import Any, Self
 GIB = 2**30
 MOST_MEMORY = 4 * GIB
 KEPT = 20_000  # characters of what is printed
-INTERRUPT, LIMIT, WARM = 10.0, 20.0, 240.0  # s: Ctrl-C, the end, and the end if code is compiled
+LIMIT, WARM = 40.0, 480.0  # s: half of it until Ctrl-C, the rest until it is killed; if compiling
 
 
 class Worker:
