@@ -52,7 +52,7 @@ OPTIONS = {
             "--speed NUMBER", "--port NUMBER", "--json", "--nothing", "--json=NUMBER"),
     "solve": ("--path RANGE", "--rho NUMBER", "--system NAME", "--set SETTING", "--out PLACE",
               "--json"),
-    "certify": ("--set SETTING", "--search-epsilon", "--search-period", "--json", "NAME"),
+    "certify": ("--set SETTING", "--json", "NAME"),
     "check": ("--set SETTING", "--json", "NAME"),
     "passivity": ("--trials NUMBER", "--trials 1000000000", "--seed NUMBER", "--system NAME",
                   "--set SETTING", "--json"),

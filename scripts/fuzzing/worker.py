@@ -119,7 +119,8 @@ def _serve(folder: str) -> None:
     import gne_mj.scenario
     import gne_mj.trajectory  # so that none of their memory counts as an input's
 
-    warnings.simplefilter("always")
+    for kind in (RuntimeWarning, UserWarning):  # in a process of its own each would be the first
+        warnings.simplefilter("always", kind)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + MOST_MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
