@@ -110,7 +110,7 @@ def test_progress_of_a_batch_tells_of_a_cluster_without_workers(monkeypatch, cap
         time.sleep(0.07)
     told = capsys.readouterr().err.splitlines()
     assert told[:2] == ["gne-mj: waiting: the cluster has no workers (Ctrl-C ends)"] * 2
-    assert told[2] == "gne-mj: 1 min: 3 of 9 runs, 1 left the set"
+    assert told[2] == "gne-mj: 1 min: 3 of 9 runs, 1 ended early"
 
 
 def test_with_json_nothing_is_told(monkeypatch, capsys):

@@ -33,11 +33,13 @@ _DYNAMICS = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, 
 _WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
-# What a step of MuJoCo starts from, but the loops' own userdata; and what a law may know of it, to
-# look ahead: not the pushes from outside
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) & ~int(mujoco.mjtState.mjSTATE_USERDATA)
-KNOWN_STATE = STATE & ~int(
-    mujoco.mjtState.mjSTATE_QFRC_APPLIED | mujoco.mjtState.mjSTATE_XFRC_APPLIED
+_BITS = mujoco.mjtState
+# What a step of MuJoCo moves, so that putting it back is as if the step had not been taken
+STATE = int(_BITS.mjSTATE_FULLPHYSICS | _BITS.mjSTATE_WARMSTART)
+# All that it starts from and a law may know of, to look ahead: not the pushes from outside, and
+# not the loops' own userdata
+KNOWN_STATE = int(_BITS.mjSTATE_INTEGRATION) & ~int(
+    _BITS.mjSTATE_QFRC_APPLIED | _BITS.mjSTATE_XFRC_APPLIED | _BITS.mjSTATE_USERDATA
 )
 
 # What userdata begins with. All zero, as after a reset, means "not started".
