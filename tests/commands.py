@@ -2,6 +2,7 @@
 
 import os
 import pty
+import signal
 import subprocess
 import sys
 import threading
@@ -19,6 +20,11 @@ COMMAND = Path(sys.executable).with_name("gne-mj")
 def environment():
     """A user's, who has no display."""
     return {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "PYTHONPATH")}
+
+
+def hear_hangups():
+    """In a new process: SIGHUP ends it, also where the tests run under nohup and ignore it."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def gne(*arguments):
@@ -39,6 +45,7 @@ def running(*arguments, until):
     process = subprocess.Popen(
         [COMMAND, *map(str, arguments)], stdout=subprocess.PIPE, stderr=terminal, text=True,
         env={**environment(), "TERM": "xterm", "COLUMNS": "200"}, start_new_session=True,
+        preexec_fn=hear_hangups,
     )  # fmt: skip
     os.close(terminal)
     shown, ready = bytearray(), threading.Event()

@@ -13,6 +13,7 @@ from urllib.request import urlopen
 
 import psutil
 import pytest
+from commands import hear_hangups
 
 from gne_mj.trajectory import Trajectory
 
@@ -42,7 +43,7 @@ def start():
     def begin(command):
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, start_new_session=True,
+            text=True, start_new_session=True, preexec_fn=hear_hangups,
         )  # fmt: skip
         started.append(process)
         for line in process.stderr:
