@@ -204,7 +204,9 @@ def test_a_lost_scheduler_is_told_in_one_sentence(tmp_path):
             port = int(address.rsplit(":", 1)[1])
             assert probe.connect_ex(("127.0.0.1", port)) == 0
         (scheduler,) = (
-            each for each in psutil.process_iter(["cmdline"]) if str(port) in each.info["cmdline"]
+            each
+            for each in psutil.process_iter(["cmdline"])
+            if str(port) in (each.info["cmdline"] or ())
         )
         scheduler.kill()
         _, told = process.communicate(timeout=120)

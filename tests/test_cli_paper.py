@@ -131,14 +131,15 @@ SLOW = pytest.mark.slow
         ("velocity-sync", signal.SIGTERM),
         pytest.param("velocity-sync", signal.SIGHUP, marks=SLOW),
         pytest.param("velocity-sync", signal.SIGINT, marks=SLOW),
-        pytest.param("osnr", signal.SIGTERM, marks=SLOW),
+        pytest.param("cournot", signal.SIGTERM, marks=SLOW),
         pytest.param("paper", signal.SIGINT, marks=SLOW),
     ],
 )
 @pytest.mark.usefixtures("drawn")  # compiled by now
 def test_a_signal_keeps_what_was_done(scenario, number, tmp_path):
     out = tmp_path / "run"
-    changes = ("--set", "simulation.duration=100000", "--set", "simulation.timestep=0.01")
+    changes = ("simulation.duration=100000", "simulation.timestep=0.001", "recording.period=10")
+    changes = [word for change in changes for word in ("--set", change)]
     with running("run", scenario, *changes, "--out", out, until="of 100000 s") as process:
         time.sleep(1.0)
         assert list(tmp_path.iterdir()) == []
