@@ -129,7 +129,8 @@ def judged(done: dict[str, Any], words: list[str]) -> str:
         return "long refusal"
     if done["code"] == 2 and len(lines) != 1:
         return "not one sentence"
-    if done["code"] != 2 and not done["said"]:
+    failed = done["code"] == 1 and done["err"].startswith("gne-mj: user_code_failed: ")
+    if done["code"] != 2 and not done["said"] and not failed:
         return f"exit status {done['code']} without a result"
     if "--json" in words and done["code"] == 0 and len(done["out"]) < worker.KEPT:
         return "" if _is_json(done["out"]) else "no JSON"
