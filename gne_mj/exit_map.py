@@ -59,6 +59,8 @@ class Grid:
         for key in ("runs", "duration"):
             if not 0 < getattr(self, key) < np.inf:
                 raise InvalidInput(f"--{key}", getattr(self, key), "it must be positive")
+        if self.seed < 0:
+            raise InvalidInput("--seed", self.seed, "it must not be negative")
         check_count("--runs: all together", self.total, MOST_RUNS)
 
     @property

@@ -88,3 +88,8 @@ def test_several_systems_need_a_name(monkeypatch, capsys):
 def test_negative_periods_are_refused():
     with pytest.raises(InvalidInput, match="--periods"):
         Grid(periods=(-1.0,), margins=(0.1,))
+
+
+def test_a_negative_seed_is_refused():
+    with pytest.raises(InvalidInput, match="--seed: got -1"):
+        Grid(periods=(0.1,), margins=(0.1,), seed=-1)
