@@ -68,6 +68,7 @@ class Influence:
         return self.push_gain * disturbance.push + self.noise_gain * disturbance.noise
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite no margin covers
 def influence(
     agents: Agents, timestep: float, integrator: str, period: int, delay: int = 0
 ) -> Influence:

@@ -343,3 +343,17 @@ def test_lines_of_any_length_end(length, own):
     assert 0.0 <= found < np.inf
     if own and length == 1.0:
         assert found == pytest.approx(3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("map", "velocity-sync", "--set", "agents.damping=1e19", "--periods", "0.002:0.01:2",
+         "--margins", "0.1:0.5:2", "--pushes", "0", "--runs", "1", "--duration", "0.02"),
+        ("check", "osnr", "--set", "game.total_power_limit=1e300"),
+    ],
+)  # fmt: skip
+def test_numbers_that_overflow_on_the_way_are_no_warnings(arguments):
+    done = gne_here(*arguments)
+    assert done.returncode == 0
+    assert done.stderr == ""

@@ -105,7 +105,8 @@ def asked_to_be_long(done: dict[str, Any]) -> bool:
     """Whether it ended after Ctrl-C as a run does that was going well."""
     if not done["interrupted"] or done["ended"]:
         return False
-    stopped = "interrupted" in done["out"] or "stopped" in done["out"]
+    told = done["out"] + done["err"]  # `map` tells on stderr how many cells were done
+    stopped = "interrupted" in done["out"] or "stopped" in told
     return done["code"] == 0 or (done["code"] == 1 and stopped)
 
 
