@@ -207,3 +207,25 @@ def test_a_closed_pipe_is_no_traceback():
     )  # fmt: skip
     assert done.stdout.startswith("description")
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_that_strikes_a_finaliser_is_heard(name):
+    code = f"""
+import signal, time
+from gne_mj.cli import signals
+signals.raise_on_signals()
+class Finalised:
+    def __del__(self):
+        signal.raise_signal(signal.{name})
+        sum(range(9))
+try:
+    Finalised()
+    end = time.monotonic() + 30
+    while time.monotonic() < end:
+        time.sleep(0.01)
+except KeyboardInterrupt:
+    print("heard", signals.received() == signal.{name})
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("heard True\n", "")
