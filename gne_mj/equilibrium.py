@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from threading import Lock
 from typing import NoReturn
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
 from gne_mj.interior_point import Free, Iterate, Path, Work
-from gne_mj.plain import check_numbers, forgive_pending, raise_pending
+from gne_mj.plain import forgive_pending, raise_pending
 
 TOLERANCE = 1e-12
 # The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
@@ -155,8 +155,7 @@ class Solver:
     def __init__(self, game: Game) -> None:
         m, p = game.actions, game.constraints_count
         self._data = game.data
-        self._name, self._constraint_names = game.name, game.constraint_names
-        self._written = game.written
+        self._game, self._name = proxy(game), game.name  # which may be forgotten before this is
         self._native = method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
@@ -326,14 +325,14 @@ class Solver:
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
         raise_pending()
         if ended == method.OUTSIDE:
-            module, q = self._written  # as Python can call it
+            module, q = self._game.written  # as Python can call it
             g = np.array([module.constraint(q, k, y) for k in range(len(self._point.slack))])
             g += self._data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(
-                self._name, "start", self._constraint_names[worst], float(g[worst])
+                self._name, "start", self._game.constraint_names[worst], float(g[worst])
             )
-        check_numbers(*self._written, self._data, self._point.y)
+        self._game.check_numbers(self._point.y)
         reason = {
             method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name} game",
             method.NO_WAY_ON: f"Newton's method found no way on in the {self._name} game",

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game_fields import check_kinds, checked_bounds
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
@@ -345,8 +345,15 @@ class Game:
 
         Raises:
             UserCodeError: one raises, or returns what is not a finite number.
+            InvalidInput: one of a tested game does, for which its parameters are too large.
         """
-        check_numbers(*self.written, self.data, self._profile(y).copy())
+        try:
+            check_numbers(*self.written, self.data, self._profile(y).copy())
+        except UserCodeError as error:
+            if not self.tested:
+                raise
+            words = f"its numbers leave those that can be computed with: {error}"
+            raise InvalidInput("game", self.name, words) from error
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:
         """The constraint with the greatest g_l(y) and that value (negative inside)."""

@@ -88,7 +88,7 @@ def not_a_number(function: Callable[..., Any], call: Callable[[], Any], at: str)
         at: for what it was called.
     """
     try:
-        with np.errstate(divide="raise", invalid="raise"):
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
             call()
     except KeyboardInterrupt:
         raise

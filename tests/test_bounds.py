@@ -4,6 +4,7 @@ import datetime
 import json
 import os
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -319,6 +320,16 @@ def test_steps_without_rows(monkeypatch):
     np.testing.assert_array_equal(pieces.present().state, once.present().state)
 
 
+def test_parameters_that_overflow():
+    """They are the user's numbers, not a fault in the shipped game's code."""
+    done = gne_here("run", "velocity-sync", "--set", "game.gap_bound=1e300")
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "invalid_input" not in done.stderr
+    assert "game: got" in done.stderr
+    assert "overflow encountered" in done.stderr
+
+
 @pytest.mark.parametrize("start", [1e200, -1e300, 1.7e308])
 def test_starts_that_overflow(start):
     """They are outside, in one sentence and without a warning, which here is an error."""
@@ -351,9 +362,12 @@ def test_lines_of_any_length_end(length, own):
         ("map", "velocity-sync", "--set", "agents.damping=1e19", "--periods", "0.002:0.01:2",
          "--margins", "0.1:0.5:2", "--pushes", "0", "--runs", "1", "--duration", "0.02"),
         ("check", "osnr", "--set", "game.total_power_limit=1e300"),
+        ("run", "CHARGING", "--set", "game.parameters.capacity=1e308", "--set",
+         "simulation.duration=0.02"),
     ],
 )  # fmt: skip
 def test_numbers_that_overflow_on_the_way_are_no_warnings(arguments):
-    done = gne_here(*arguments)
+    own = Path(__file__).parent.parent / "examples" / "game" / "scenario.toml"
+    done = gne_here(*(str(own) if each == "CHARGING" else each for each in arguments))
     assert done.returncode == 0
     assert done.stderr == ""

@@ -214,18 +214,51 @@ def test_a_signal_that_strikes_a_finaliser_is_heard(name):
     code = f"""
 import signal, time
 from gne_mj.cli import signals
-signals.raise_on_signals()
 class Finalised:
     def __del__(self):
         signal.raise_signal(signal.{name})
         sum(range(9))
 try:
-    Finalised()
-    end = time.monotonic() + 30
-    while time.monotonic() < end:
-        time.sleep(0.01)
+    with signals.unwinding():
+        Finalised()
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            time.sleep(0.01)
 except KeyboardInterrupt:
     print("heard", signals.received() == signal.{name})
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("heard True\n", "")
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    ("module", "path", "raised"),
+    [
+        ("typer.main", "get_command", "KeyboardInterrupt"),  # commands are put together
+        ("typer.core", "TyperGroup.parse_args", "KeyboardInterrupt"),  # the line is read
+        ("gne_mj.scenario", "load_scenario", "KeyboardInterrupt"),
+        ("gne_mj.scenario", "load_scenario", "ImportError"),  # what an extension makes of it
+    ],
+)
+def test_a_signal_ends_a_command_wherever_it_strikes(name, module, path, raised):
+    code = f"""
+import importlib, signal, sys
+def struck(*arguments, **options):
+    try:
+        signal.raise_signal(signal.{name})
+        sum(range(9))
+    except KeyboardInterrupt:
+        raise {raised}
+owner = importlib.import_module("{module}")
+*kinds, name = "{path}".split(".")
+for kind in kinds:
+    owner = getattr(owner, kind)
+setattr(owner, name, struck)
+sys.argv = ["gne-mj", "run", "velocity-sync", "--set", "simulation.duration=0.01"]
+from gne_mj.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    number = getattr(signal, name)
+    assert (done.returncode, done.stderr) == (128 + number, "gne-mj: interrupted\n")

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+import warnings
 from contextlib import nullcontext
 from io import TextIOWrapper
 from typing import Annotated, Any, NoReturn
@@ -11,7 +12,7 @@ import typer
 
 from gne_mj.cli.ending import watched
 from gne_mj.cli.output import emit, give_up, results_only, results_stream, say
-from gne_mj.cli.signals import raise_on_signals, received
+from gne_mj.cli.signals import came, received, unwinding
 
 
 class Interrupted(Exception):
@@ -19,6 +20,12 @@ class Interrupted(Exception):
 
 
 class _Commands(typer.core.TyperGroup):
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        try:
+            return super().make_context(*arguments, **options)
+        except KeyboardInterrupt as error:
+            raise Interrupted from error
+
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
@@ -65,9 +72,17 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # whatever a terminal cannot show, and file names
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    raise_on_signals()
-    with watched(), results_only() if "--json" in sys.argv else nullcontext():
-        _main()
+    # Of what leaves the floats our own checks tell, in sentences
+    warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"gne_mj\.")
+    try:
+        with (
+            unwinding(),
+            watched(),
+            results_only() if "--json" in sys.argv else nullcontext(),
+        ):
+            _main()
+    except KeyboardInterrupt:
+        _interrupted()
 
 
 def _main() -> None:
@@ -94,8 +109,7 @@ def _main() -> None:
             _fail(str(fault), fault.status, 1)
         if isinstance(ended, SystemExit):
             raise
-        say("gne-mj: interrupted")
-        sys.exit(128 + received())
+        _interrupted()
     except BaseException as error:
         from gne_mj.errors import (
             ClusterError,
@@ -114,10 +128,17 @@ def _main() -> None:
             _misused(error)
         if not isinstance(error, GneError):
             if (fault := fault_of_user(error)) is None:
+                if came():  # in an import, say, which made another exception of it
+                    _interrupted()
                 raise
             _fail(str(fault), fault.status, 1)
         code = 1 if isinstance(error, UserCodeError | StorageError | ClusterError) else 2
         _fail(str(error), getattr(error, "status", None), code)
+
+
+def _interrupted() -> NoReturn:
+    say("gne-mj: interrupted")
+    sys.exit(128 + received())
 
 
 def _misused(error: Any) -> NoReturn:

@@ -5,33 +5,43 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
 _OTHERS = (signal.SIGTERM, signal.SIGHUP)  # than Ctrl-C, for which Python has an exception already
 ENDING = (signal.SIGINT, *_OTHERS)
-_received = int(signal.SIGINT)
+_received, _came = int(signal.SIGINT), False
 _SOON = 0.05  # s
 
 
-def raise_on_signals() -> None:
+@contextmanager
+def unwinding() -> Iterator[None]:
     """Let SIGTERM and SIGHUP unwind as Ctrl-C does, so that nothing half-written stays.
 
     What is ignored stays so, as SIGHUP under nohup. A signal that comes while Python finalises an
     object comes again soon after, since what is raised there is only printed.
     """
     if threading.current_thread() is not threading.main_thread():
+        yield
         return
-    sys.unraisablehook = _unraisable
-    for number in _OTHERS:
-        if signal.getsignal(number) is signal.SIG_DFL:
+    before = {number: signal.getsignal(number) for number in ENDING}
+    for number, handler in before.items():
+        if handler in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _end)
+    sys.unraisablehook = _unraisable
+    try:
+        yield
+    finally:
+        sys.unraisablehook = sys.__unraisablehook__
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _unraisable(unraisable: Any) -> None:
     if isinstance(unraisable.exc_value, KeyboardInterrupt):
-        threading.Timer(_SOON, _thread.interrupt_main).start()
+        with suppress(RuntimeError):  # Python is ending anyway
+            threading.Timer(_SOON, _thread.interrupt_main, (_received,)).start()
     else:
         sys.__unraisablehook__(unraisable)
 
@@ -41,9 +51,14 @@ def received() -> int:
     return _received
 
 
+def came() -> bool:
+    """Whether one has come that unwound, or tried to."""
+    return _came
+
+
 def _end(number: int, frame: FrameType | None) -> NoReturn:
-    global _received
-    _received = number
+    global _received, _came
+    _received, _came = number, True
     raise KeyboardInterrupt
 
 

@@ -118,9 +118,9 @@ def _above_chords(game: Game, points: Array) -> Counterexample | None:
             values = game.constraints(middles)
         except UserCodeError:  # a function that fails there is no number there
             return None
-    above = values - 0.5 * (ends[first] + ends[second])
-    size = np.abs(ends[first]) + np.abs(ends[second])
-    excess = np.where(np.isnan(above), np.inf, above - _ROUNDING * size)
+        above = values - 0.5 * (ends[first] + ends[second])
+        size = np.abs(ends[first]) + np.abs(ends[second])
+        excess = np.where(np.isnan(above), np.inf, above - _ROUNDING * size)
     if not len(excess) or not np.max(excess) > 0.0:
         return None
     at, k = np.unravel_index(np.argmax(excess / np.maximum(size, 1e-300)), excess.shape)
