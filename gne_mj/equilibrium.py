@@ -112,7 +112,8 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
 
     Found by the same path, for this agent alone, from y (strictly inside) and from the least costs
     on lines through it: for an action of one entry that is the whole feasible interval around y_i,
-    as finely as :mod:`gne_mj.lines` looks; for others a few directions, so that where J_i is not
+    and where the game does not declare its constraints convex those beyond it, as finely as
+    :mod:`gne_mj.lines` looks; for others a few directions, so that where J_i or the set is not
     convex in y_i a better one may exist. The multipliers are those of the agent's own problem, zero
     for constraints that do not contain its action.
     """
@@ -121,6 +122,9 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
 
 def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     """What each agent could gain by deviating alone from y: J_i(y) - min J_i, shape (N,).
+
+    As far as :func:`best_response` finds that; where J_i or the set is not convex in y_i it may be
+    more.
 
     At the penalised equilibrium it is at most p_i * rho if J_i and the constraints are convex in
     y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
@@ -156,6 +160,7 @@ class Solver:
         m, p = game.actions, game.constraints_count
         self._data = game.data
         self._game, self._name = proxy(game), game.name  # which may be forgotten before this is
+        self._holes = game.constraint_class is None
         self._native = method.build(game.kernels)
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
@@ -269,8 +274,9 @@ class Solver:
             with self._lock:
                 self._direction[first:last] = direction
                 self._native.lowest(
-                    data, agent, own, y, self._direction, self._work.trial.y, self._found
-                )
+                    data, agent, own, self._holes, y, self._direction, self._work.trial.y,
+                    self._found,
+                )  # fmt: skip
                 self._direction[first:last] = 0.0
                 cost, place = self._found.tolist()
             if place != 0.0:

@@ -485,10 +485,10 @@ def build(game: ModuleType) -> SimpleNamespace:
         return game.cost(data.parameters, i, y)
 
     @compiled
-    def lowest(data, i, own, y, direction, trial, found):
+    def lowest(data, i, own, holes, y, direction, trial, found):
         """``lines.lowest``."""
         _ = source
-        lines.lowest(game, data, i, own, y, direction, trial, found)
+        lines.lowest(game, data, i, own, holes, y, direction, trial, found)
 
     @compiled
     def to_middle(data, y, direction, trial):

@@ -1,7 +1,8 @@
 """Lines of an agent's actions through a profile: how far they stay inside, where it costs least.
 
 A best response that is found by Newton's method is a stationary point near where it began. Along
-lines, costs are compared: for an action of one entry, on all of the feasible interval.
+lines, costs are compared: for an action of one entry, on all of the feasible interval, or intervals
+where the set is not known to be convex.
 """
 
 import numpy as np
@@ -10,8 +11,9 @@ from gne_mj import scales
 from gne_mj.native import copy, kernel
 
 # A line is followed from FIRST to FARTHEST lengths of the profile, doubling, and on either side
-# costs are compared at these places and at POINTS equal distances.
-FIRST, FARTHEST, POINTS = 1e-6, 1e6, 32
+# costs are compared at these places and at POINTS equal distances. Beyond where it leaves, the set
+# is looked for again at distances that grow by STRIDE.
+FIRST, FARTHEST, POINTS, STRIDE = 1e-6, 1e6, 32, 1.1
 HALVINGS = 50
 SWEEPS = 10  # over all actions, on the way to the middle
 COST, PLACE, COUNT = range(3)  # entries of what was found on a line
@@ -65,8 +67,11 @@ def compare(game, data, i, y, direction, t, trial, found):
 
 
 @kernel
-def lowest(game, data, i, own, y, direction, trial, found):
-    """Fill ``found`` with agent i's least cost on the line and where it is; y is inside."""
+def lowest(game, data, i, own, holes, y, direction, trial, found):
+    """Fill ``found`` with agent i's least cost on the line and where it is; y is inside.
+
+    Where the set may have ``holes``, the parts of the line beyond them count too.
+    """
     length = scales.largest(y)
     length = length if length > 0.0 else 1.0
     copy(y, trial)
@@ -81,6 +86,13 @@ def lowest(game, data, i, own, y, direction, trial, found):
         for k in range(POINTS):
             t = last * (k + 1) / POINTS
             compare(game, data, i, y, direction, sign * t, trial, found)
+        beyond = FIRST * length
+        while holes and beyond <= FARTHEST * length:
+            t = sign * (last + beyond)
+            place(data, i, y, direction, t, trial)
+            if stays(game, data, own, trial):
+                compare(game, data, i, y, direction, t, trial, found)
+            beyond *= STRIDE
 
 
 @kernel

@@ -28,6 +28,7 @@ from gne_mj.games import ten_channels
 from gne_mj.loops import division
 from gne_mj.loops import monitor as watch
 from gne_mj.simulation import Simulation
+from gne_mj.theory import certify
 
 DELTA, RHO = np.full(5, 3.0), 0.1
 NUMBERS = ("main_mass", "appendage_mass", "stiffness", "atan_coefficient", "damping")
@@ -194,6 +195,24 @@ def test_the_report_counts_divided_steps():
     found = json.loads(done.stdout)["systems"]["robots"]["division"]
     assert found["divided_steps"] > 0
     assert 0.002 / 4096 <= found["smallest_step"] < 0.002
+
+
+@ENGINES
+def test_the_first_steps_finest_piece_is_foretold(engine):
+    """With appendages in motion too, which pull outputs to their bounds within the step."""
+    found = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        state = random_robot_state(rng, DELTA, spread=30.0)
+        system = robot_system(state, UNEQUAL, rho=1e-4, engine=engine)
+        told = certify(system, clock(0.02)).to_dict()["division"]["start"]
+        run = Simulation([system], clock(0.02, 0.02)).run().reports["robots"]
+        if run["status"] == "step_too_small":
+            assert told is None
+        else:
+            assert told == 0.02 / (run["division"]["smallest_step"] or 0.02)
+        found.append(told)
+    assert len(set(found)) > 2, "of different lengths"
 
 
 # --------------------------------------------------------------- pieces of a step, as plain Python

@@ -10,6 +10,7 @@ import pytest
 from builders import FIVE, V0, reference_osnr
 from hypothesis import given
 from hypothesis import strategies as st
+from own_games import ring
 from scipy.optimize import minimize, minimize_scalar
 
 import reference
@@ -304,6 +305,15 @@ def test_threads_may_share_a_game():
         together = list(pool.map(both, starts))
     for start, found in zip(starts, together, strict=True):
         assert np.array_equal(found, both(start))
+
+
+def test_a_hole_in_the_set_hides_no_gain():
+    """The ring's first player would rather be on its other side, as far left as may be."""
+    y = np.array([0.97, -0.02])
+    left = -np.sqrt(1.0 - 0.02**2)
+    gain = 2.5 * ((0.97 + 3.0) ** 2 - (left + 3.0) ** 2)
+    assert measured_epsilon(ring(), y) == pytest.approx([gain, 0.0], rel=1e-6)
+    assert best_response(ring(), 0, y).action == pytest.approx([left, -0.02], abs=1e-6)
 
 
 def test_a_game_that_is_not_used_any_more_is_forgotten():

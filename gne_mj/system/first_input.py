@@ -26,19 +26,14 @@ def law_at_start(system: System) -> Array:
 
     Faults of sensors are left out. Not a number where the law has no action.
     """
-    return law_at(system, system.start)
-
-
-def law_at(system: System, y: Array) -> Array:
-    """The same at other outputs y (m,), strictly inside, at the start's memory."""
     game, problem = system.game, problem_at_start(system)
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now[PENALTY] = rho
-    weights = rho / -(game.constraints(y) + game.margins)
+    weights = rho / -(game.constraints(system.start) + game.margins)
     u = np.full(game.actions, np.nan)
     left = _native(system.law.kernels, game.kernels)(
-        problem, y.copy(), weights, system.loop_memory.copy(), scratch, u
+        problem, system.start.copy(), weights, system.loop_memory.copy(), scratch, u
     )
     raise_pending()
     return u if left < 0 else np.full(game.actions, np.nan)

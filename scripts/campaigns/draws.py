@@ -168,9 +168,10 @@ def towards_bound(
             low = middle
         else:
             high = middle
-    y = inner + low * (1.0 - margin) * direction
-    while not inside(y):  # rounding, within 1e-9 of the bound
-        y = inner + (y - inner) * (1.0 - 1e-12)
+    y, back = inner + low * (1.0 - margin) * direction, 1e-12
+    while not inside(y):  # rounding near the bound, or a hole in the set
+        y = inner + (y - inner) * (1.0 - back)
+        back = min(2.0 * back, 0.5)
     return y
 
 
