@@ -1,7 +1,8 @@
 """What a law is, seen from Python: its kernels, its numbers, and its memory at the start.
 
 The kernels of a law's module, each given the game's module or the loop's ``problem`` (see
-:mod:`gne_mj.loops.feedback`), are
+:mod:`gne_mj.loops.feedback`), are the following. ``work`` has ``profile`` (m,), to be overwritten,
+and ``now`` (:mod:`gne_mj.controllers.settings`).
 
 =====================================================  =======================================
 ``action(game, problem, y, weights, memory, work, u)``  fills u; -1, or agent * p + constraint of

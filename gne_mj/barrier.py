@@ -140,24 +140,6 @@ def rho_at(schedule, time):
 
 
 @kernel
-def evaluate_constraints(game, data, rho, y, g, weights):
-    """Fill g with g(y) and weights with rho / (-g - t); return -1, or the first g + t >= 0.
-
-    A value that is not a number counts as not negative. Where a constraint is not tightened
-    (t = 0) that is g itself.
-    """
-    outside = -1
-    for k in range(len(g)):
-        value = game.constraint(data.parameters, k, y)
-        room = -value - data.tightening[k]
-        g[k] = value
-        weights[k] = rho / room
-        if not room > 0.0 and outside < 0:
-            outside = k
-    return outside
-
-
-@kernel
 def weighted_gradient(game, data, i, a, y, weights):
     """Sum over the constraints l that contain y_i of weights[l] * dg_l/dy_a(y)."""
     total = 0.0

@@ -161,7 +161,7 @@ class Solver:
         self._data = game.data
         self._game, self._name = proxy(game), game.name  # which may be forgotten before this is
         self._holes = game.constraint_class is None
-        self._native = method.build(game.kernels)
+        self._native = method.build()
         self._lock = Lock()
         self._report = np.zeros(method.COUNT)
         position, self._half_band = order(game)

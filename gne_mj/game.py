@@ -28,6 +28,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj import game_functions as functions
 from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game_fields import check_kinds, checked_bounds
@@ -58,6 +59,9 @@ class GameData(NamedTuple):
     own_pointer: np.ndarray  # agent i -> the constraints that contain y_i
     own_index: np.ndarray
     tightening: np.ndarray  # (p,) t >= 0: the barrier guards g + t < 0
+    everyone: np.ndarray  # 0, ..., N - 1
+    all_constraints: np.ndarray  # 0, ..., p - 1
+    functions: np.ndarray  # addresses of the kernels' C functions, see gne_mj.game_functions
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,6 +265,9 @@ class Game:
             *_compress(self.in_constraint),
             *_compress(own),
             self.margins.copy(),
+            np.arange(self.agents),
+            np.arange(self.constraints_count),
+            functions.compiled_functions(self.kernels)[0],
         )
         for array in arrays:
             array.flags.writeable = False
@@ -297,27 +304,27 @@ class Game:
 
     def costs(self, y: ArrayLike) -> NDArray[np.float64]:
         """J_i(y) of each agent; y of shape (..., m), result (..., N)."""
-        return self._rows(y, self.agents, _native(self.kernels).costs)
+        return self._rows(y, self.agents, _native().costs)
 
     def pseudo_gradient(self, y: ArrayLike) -> NDArray[np.float64]:
         """F(y) = col(dJ_i/dy_i); y and the result of shape (..., m)."""
-        return self._rows(y, self.actions, _native(self.kernels).pseudo_gradient)
+        return self._rows(y, self.actions, _native().pseudo_gradient)
 
     def constraints(self, y: ArrayLike) -> NDArray[np.float64]:
         """g(y), negative inside; y of shape (..., m), result (..., p)."""
-        return self._rows(y, self.constraints_count, _native(self.kernels).constraints)
+        return self._rows(y, self.constraints_count, _native().constraints)
 
     def pseudo_gradient_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dF/dy, shape (m, m), at one profile y of shape (m,)."""
         out = self._matrix(self.actions)
-        _native(self.kernels).pseudo_gradient_jacobian(self.data, self._profile(y), out)
+        _native().pseudo_gradient_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
     def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dg/dy, shape (p, m), at one profile y of shape (m,)."""
         out = self._matrix(self.constraints_count)
-        _native(self.kernels).constraint_jacobian(self.data, self._profile(y), out)
+        _native().constraint_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
@@ -327,7 +334,7 @@ class Game:
         weights = np.ascontiguousarray(weights, dtype=np.float64)
         if weights.shape != (self.constraints_count,):
             raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
-        _native(self.kernels).weighted_hessian(self.data, self._profile(y), weights, out)
+        _native().weighted_hessian(self.data, self._profile(y), weights, out)
         raise_pending()
         return out
 
@@ -336,7 +343,7 @@ class Game:
         start, actions = self.actions_in_constraints
         own = actions[start[constraint] : start[constraint + 1]]
         out = np.zeros((len(own), len(own)))
-        _native(self.kernels).constraint_hessian(self.data, self._profile(y), constraint, own, out)
+        _native().constraint_hessian(self.data, self._profile(y), constraint, own, out)
         raise_pending()
         return out
 
@@ -386,32 +393,28 @@ def _compress(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray
 
 
 @cache
-def _native(kernels: ModuleType) -> SimpleNamespace:
-    """The array functions of a game's kernels, compiled at their first call."""
-    source = source_key(kernels)
+def _native() -> SimpleNamespace:
+    """The array functions of all games, compiled at their first call."""
+    source = source_key()
 
     @compiled
     def costs(data, profiles, out):
         _ = source
         for row in range(len(profiles)):
             for i in range(len(data.offsets) - 1):
-                out[row, i] = kernels.cost(data.parameters, i, profiles[row])
+                out[row, i] = functions.cost(data, i, profiles[row])
 
     @compiled
     def pseudo_gradient(data, profiles, out):
         _ = source
-        at = data.offsets
         for row in range(len(profiles)):
-            for i in range(len(at) - 1):
-                for a in range(at[i], at[i + 1]):
-                    out[row, a] = kernels.cost_gradient(data.parameters, i, a, profiles[row])
+            functions.gradients(data, data.everyone, profiles[row], out[row])
 
     @compiled
     def constraints(data, profiles, out):
         _ = source
         for row in range(len(profiles)):
-            for k in range(out.shape[1]):
-                out[row, k] = kernels.constraint(data.parameters, k, profiles[row])
+            functions.values(data, data.all_constraints, profiles[row], out[row])
 
     @compiled
     def pseudo_gradient_jacobian(data, y, out):
@@ -419,7 +422,7 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         at = data.offsets
         for i in range(len(at) - 1):
             for a in range(at[i], at[i + 1]):
-                kernels.add_cost_hessian(data.parameters, i, a, y, 1.0, out[a])
+                functions.add_cost_hessian(data, i, a, y, 1.0, out[a])
 
     @compiled
     def constraint_jacobian(data, y, out):
@@ -429,7 +432,7 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
             for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
                 i = data.member_index[entry]
                 for a in range(at[i], at[i + 1]):
-                    out[k, a] = kernels.constraint_gradient(data.parameters, k, a, y)
+                    out[k, a] = functions.constraint_gradient(data, k, a, y)
 
     @compiled
     def weighted_hessian(data, y, weights, out):
@@ -442,7 +445,7 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
                     i, j = data.member_index[row], data.member_index[column]
                     for a in range(at[i], at[i + 1]):
                         for b in range(at[j], at[j + 1]):
-                            second = kernels.constraint_hessian(data.parameters, k, a, b, y)
+                            second = functions.constraint_hessian(data, k, a, b, y)
                             out[a, b] += weights[k] * second
 
     @compiled
@@ -451,7 +454,7 @@ def _native(kernels: ModuleType) -> SimpleNamespace:
         for row in range(len(own)):
             for column in range(len(own)):
                 a, b = own[row], own[column]
-                out[row, column] = kernels.constraint_hessian(data.parameters, k, a, b, y)
+                out[row, column] = functions.constraint_hessian(data, k, a, b, y)
 
     return SimpleNamespace(
         costs=costs,

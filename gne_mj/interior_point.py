@@ -19,12 +19,13 @@ that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.bande
 """
 
 from functools import cache
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 
 from gne_mj import banded, lines, scales
+from gne_mj import game_functions as games
 from gne_mj.native import compiled, copy, kernel, source_key
 
 # How an iteration ended
@@ -117,32 +118,33 @@ def find_entries(data, free, work):
 
 
 @kernel
-def inside(game, data, free, y, work):
+def inside(data, free, y, work):
     """Fill g; False if y is not strictly inside."""
+    games.values(data, free.constraints, y, work.g)
+    good = True
     for k in range(len(free.constraints)):
-        l = free.constraints[k]
-        work.g[k] = game.constraint(data.parameters, l, y) + data.tightening[l]
-        if not work.g[k] < 0.0:
-            return False
-    return True
+        work.g[k] += data.tightening[free.constraints[k]]
+        good &= work.g[k] < 0.0
+    return good
 
 
 @kernel
-def evaluate(game, data, free, point, work):
+def evaluate(data, free, point, work):
     """Fill the Jacobian and the stationarity residual."""
-    q, at = data.parameters, data.offsets
+    at, gradient = data.offsets, work.hessian_row
+    games.gradients(data, free.agents, point.y, gradient)
     for entry in range(len(free.agents)):
         i = free.agents[entry]
         for a in range(at[i], at[i + 1]):
-            value = game.cost_gradient(q, i, a, point.y)
-            work.stationarity[free.position[a]] = value
-            work.terms[free.position[a]] = abs(value)
+            work.stationarity[free.position[a]] = gradient[a]
+            work.terms[free.position[a]] = abs(gradient[a])
+            gradient[a] = 0.0
+    games.slopes(data, free.constraints, work.row, work.column, point.y, work.jacobian)
     for k in range(len(free.constraints)):
         size = 0.0
         for entry in range(work.row[k], work.row[k + 1]):
             a = work.column[entry]
-            slope = game.constraint_gradient(q, free.constraints[k], a, point.y)
-            work.jacobian[entry] = slope
+            slope = work.jacobian[entry]
             size += abs(slope * point.y[a])
             r = free.position[a]
             work.stationarity[r] += point.multipliers[k] * slope
@@ -211,13 +213,13 @@ def complementarity(constraints, point):
 
 
 @kernel
-def assemble(game, data, free, count, length, shift, point, b, work):
+def assemble(data, free, count, length, shift, point, b, work):
     """Fill the band with Newton's matrix, rows in the order of ``free.position``; the costs' size.
 
     ``shift`` is added to the diagonal, relative to the rows' own slopes.
     """
     position, band = free.position, work.band
-    size = scales.add_costs(game, data, free, length, point.y, b, work)
+    size = scales.add_costs(data, free, length, point.y, b, work)
     if shift > 0.0:
         for r in range(count):
             band[r, b] += shift * work.unit[r] / length
@@ -231,17 +233,17 @@ def assemble(game, data, free, count, length, shift, point, b, work):
             slope = ratio * work.jacobian[entry]
             for other in range(work.row[k], work.row[k + 1]):
                 c = work.column[other]
-                second = weight * game.constraint_hessian(data.parameters, l, a, c, point.y)
+                second = weight * games.constraint_hessian(data, l, a, c, point.y)
                 band[r, position[c] - r + b] += second + slope * work.jacobian[other]
     return size
 
 
 @kernel
-def newton(game, data, free, count, rho, length, point, b, work):
+def newton(data, free, count, rho, length, point, b, work):
     """Fill the steps of y, s and lambda towards their rho; the costs' size, -1 if singular."""
     shift, solved, size = 0.0, False, 0.0
     for _ in range(SHIFTS):
-        size = assemble(game, data, free, count, length, shift, point, b, work)
+        size = assemble(data, free, count, length, shift, point, b, work)
         solved = banded.factorise(work.band, count, b, work.pivots)
         if solved:
             solved = solve(free, count, rho, length, point, b, work)
@@ -332,7 +334,7 @@ def accept(data, free, point, trial):
 
 
 @kernel
-def begin(game, data, free, count, b, path, known, point, work):
+def begin(data, free, count, b, path, known, point, work):
     """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
 
     Unknown multipliers are rho / s, with a rho that suits y. Besides, a rho that leads away from
@@ -343,13 +345,13 @@ def begin(game, data, free, count, b, path, known, point, work):
         work.share[k] = 1.0
         if not known:
             point.multipliers[k] = 0.0
-    if not inside(game, data, free, point.y, work):
+    if not inside(data, free, point.y, work):
         return 0.0, 0.0, 1.0, 1.0
-    evaluate(game, data, free, point, work)
+    evaluate(data, free, point, work)
     for k in range(constraints):
         point.slack[k] = -work.g[k]
     length = scales.length_at(count, constraints, free, point.y, work)
-    size = scales.add_costs(game, data, free, length, point.y, b, work)
+    size = scales.add_costs(data, free, length, point.y, b, work)
     if known:
         return path.rho, path.rho, length, size
     last = path.last_rho * size if path.to_zero else path.last_rho
@@ -365,16 +367,16 @@ def begin(game, data, free, count, b, path, known, point, work):
 
 
 @kernel
-def centre(game, data, free, rho, point, work):
+def centre(data, free, rho, point, work):
     """Set the multipliers to what they are on the path beside y, and evaluate."""
-    inside(game, data, free, point.y, work)
+    inside(data, free, point.y, work)
     for k in range(len(free.constraints)):
         point.multipliers[k] = work.share[k] * rho / point.slack[k]
-    evaluate(game, data, free, point, work)
+    evaluate(data, free, point, work)
 
 
 @kernel
-def follow(game, data, free, half_band, path, known, point, work, report):
+def follow(data, free, half_band, path, known, point, work, report):
     """Follow the path to path.last_rho, from point's y; the point becomes its end."""
     count, constraints = 0, len(free.constraints)
     for entry in range(len(free.agents)):
@@ -382,7 +384,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
         count += data.offsets[i + 1] - data.offsets[i]
     b = min(half_band, max(count - 1, 0))
     find_entries(data, free, work)
-    rho, highest, whole, size = begin(game, data, free, count, b, path, known, point, work)
+    rho, highest, whole, size = begin(data, free, count, b, path, known, point, work)
     if rho == 0.0:
         return OUTSIDE
     least = max(scales.NARROWEST * whole, scales.largest_held(free, point.y))
@@ -423,7 +425,7 @@ def follow(game, data, free, half_band, path, known, point, work, report):
                         return CONVERGED
                     before, stalled = np.inf, 0
         length = max(least, scales.largest_free(data, free, point.y))
-        size = newton(game, data, free, count, rho, length, point, b, work)
+        size = newton(data, free, count, rho, length, point, b, work)
         if size < 0.0:
             return SINGULAR
         now = merit(count, constraints, rho, length, point, work)
@@ -437,10 +439,10 @@ def follow(game, data, free, half_band, path, known, point, work, report):
         found = False
         for _ in range(60):
             move(data, free, share, point, work)
-            if inside(game, data, free, work.trial.y, work) and correct(
+            if inside(data, free, work.trial.y, work) and correct(
                 constraints, rho, keep, factor, point, work.trial, work
             ):
-                evaluate(game, data, free, work.trial, work)
+                evaluate(data, free, work.trial, work)
                 then = merit(count, constraints, rho, length, work.trial, work)
                 found = then <= (1.0 - 2.0 * DECREASE * share) * now or (
                     (careful or max(residual, off) <= NEAR) and then < np.inf
@@ -462,38 +464,38 @@ def follow(game, data, free, half_band, path, known, point, work, report):
             rho = max(rho, highest) if lost else rho
         if lost:
             slow = 0
-            centre(game, data, free, rho, point, work)
+            centre(data, free, rho, point, work)
     return TOO_MANY
 
 
 @cache
-def build(game: ModuleType) -> SimpleNamespace:
-    """The native functions of a game's kernels, compiled at their first call."""
-    source = source_key(game)
+def build() -> SimpleNamespace:
+    """The native functions for all games, compiled at their first call."""
+    source = source_key()
 
     @compiled
     def run(data, free, half_band, path, known, point, work, report):
         """``follow`` from point's y, and its multipliers if those are ``known``."""
         _ = source
         copy(point.y, work.trial.y)
-        return follow(game, data, free, half_band, path, known, point, work, report)
+        return follow(data, free, half_band, path, known, point, work, report)
 
     @compiled
     def cost(data, i, y):
         """J_i(y)."""
         _ = source
-        return game.cost(data.parameters, i, y)
+        return games.cost(data, i, y)
 
     @compiled
     def lowest(data, i, own, holes, y, direction, trial, found):
         """``lines.lowest``."""
         _ = source
-        lines.lowest(game, data, i, own, holes, y, direction, trial, found)
+        lines.lowest(data, i, own, holes, y, direction, trial, found)
 
     @compiled
     def to_middle(data, y, direction, trial):
         """``lines.to_middle``."""
         _ = source
-        lines.to_middle(game, data, y, direction, trial)
+        lines.to_middle(data, y, direction, trial)
 
     return SimpleNamespace(run=run, cost=cost, lowest=lowest, to_middle=to_middle)

@@ -7,6 +7,7 @@ where the set is not known to be convex.
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj import scales
 from gne_mj.native import copy, kernel
 
@@ -20,10 +21,10 @@ COST, PLACE, COUNT = range(3)  # entries of what was found on a line
 
 
 @kernel
-def stays(game, data, own, y):
+def stays(data, own, y):
     """Whether y is strictly inside an agent's own constraints."""
     for k in range(len(own)):
-        value = game.constraint(data.parameters, own[k], y) + data.tightening[own[k]]
+        value = games.constraint(data, own[k], y) + data.tightening[own[k]]
         if not value < 0.0:
             return False
     return True
@@ -37,12 +38,12 @@ def place(data, i, y, direction, t, trial):
 
 
 @kernel
-def end(game, data, i, own, y, direction, sign, length, trial):
+def end(data, i, own, y, direction, sign, length, trial):
     """The greatest t, as far as FARTHEST, up to which y + sign t direction stays inside."""
     low, high, left = 0.0, FIRST * length, False
     while 0.0 < high < np.inf and high <= FARTHEST * length:  # what does not grow ends, too
         place(data, i, y, direction, sign * high, trial)
-        left = not stays(game, data, own, trial)
+        left = not stays(data, own, trial)
         if left:
             break
         low, high = high, 2.0 * high
@@ -50,7 +51,7 @@ def end(game, data, i, own, y, direction, sign, length, trial):
         for _ in range(HALVINGS):
             half = 0.5 * (low + high)
             place(data, i, y, direction, sign * half, trial)
-            if stays(game, data, own, trial):
+            if stays(data, own, trial):
                 low = half
             else:
                 high = half
@@ -58,16 +59,16 @@ def end(game, data, i, own, y, direction, sign, length, trial):
 
 
 @kernel
-def compare(game, data, i, y, direction, t, trial, found):
+def compare(data, i, y, direction, t, trial, found):
     """Keep the place t on the line if the cost is less there."""
     place(data, i, y, direction, t, trial)
-    value = game.cost(data.parameters, i, trial)
+    value = games.cost(data, i, trial)
     if value < found[COST]:
         found[COST], found[PLACE] = value, t
 
 
 @kernel
-def lowest(game, data, i, own, holes, y, direction, trial, found):
+def lowest(data, i, own, holes, y, direction, trial, found):
     """Fill ``found`` with agent i's least cost on the line and where it is; y is inside.
 
     Where the set may have ``holes``, the parts of the line beyond them count too.
@@ -75,28 +76,28 @@ def lowest(game, data, i, own, holes, y, direction, trial, found):
     length = scales.largest(y)
     length = length if length > 0.0 else 1.0
     copy(y, trial)
-    found[COST], found[PLACE] = game.cost(data.parameters, i, y), 0.0
+    found[COST], found[PLACE] = games.cost(data, i, y), 0.0
     for side in range(2):
         sign = 1.0 - 2.0 * side
-        last = end(game, data, i, own, y, direction, sign, length, trial)
+        last = end(data, i, own, y, direction, sign, length, trial)
         t = FIRST * length
         while t < last:
-            compare(game, data, i, y, direction, sign * t, trial, found)
+            compare(data, i, y, direction, sign * t, trial, found)
             t *= 2.0
         for k in range(POINTS):
             t = last * (k + 1) / POINTS
-            compare(game, data, i, y, direction, sign * t, trial, found)
+            compare(data, i, y, direction, sign * t, trial, found)
         beyond = FIRST * length
         while holes and beyond <= FARTHEST * length:
             t = sign * (last + beyond)
             place(data, i, y, direction, t, trial)
-            if stays(game, data, own, trial):
-                compare(game, data, i, y, direction, t, trial, found)
+            if stays(data, own, trial):
+                compare(data, i, y, direction, t, trial, found)
             beyond *= STRIDE
 
 
 @kernel
-def to_middle(game, data, y, direction, trial):
+def to_middle(data, y, direction, trial):
     """Move y (m,) to the middle along each action in turn; where that is far away, a little."""
     copy(y, trial)
     for _ in range(SWEEPS):
@@ -106,8 +107,8 @@ def to_middle(game, data, y, direction, trial):
                 length = scales.largest(y)
                 length = length if length > 0.0 else 1.0
                 direction[a] = 1.0
-                above = end(game, data, i, own, y, direction, 1.0, length, trial)
-                below = end(game, data, i, own, y, direction, -1.0, length, trial)
+                above = end(data, i, own, y, direction, 1.0, length, trial)
+                below = end(data, i, own, y, direction, -1.0, length, trial)
                 direction[a] = 0.0
                 if max(above, below) > 0.25 * FARTHEST * length:  # no bound on this side
                     most = max(length, min(above, below))

@@ -11,8 +11,10 @@ With numba switched off (``NUMBA_DISABLE_JIT=1``) kernels and the loops of ODE a
 plain Python that they are written in, slowly, for whoever debugs a kernel.
 """
 
+import ctypes
 import hashlib
 import inspect
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -23,7 +25,7 @@ import numba
 import numpy as np
 from numba import njit, types
 from numba.core import cgutils
-from numba.extending import intrinsic, register_jitable
+from numba.extending import intrinsic, overload, register_jitable
 from numba.np.arrayobj import make_array, populate_array
 
 from gne_mj.machine_code import kept
@@ -33,7 +35,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 # Compiled division must give inf or nan, as NumPy does: numba's default raises, and a callback
 # that raises can only print. Without numba's run time ("_nrt") nothing can be allocated, which
 # the compiler then checks, and array views cost no reference counting (a factor of 20 here).
-_KERNEL: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "forceinline": True}
+_KERNEL: dict[str, Any] = {
+    "error_model": "numpy",
+    "_nrt": False,
+    "forceinline": True,
+    "no_cfunc_wrapper": True,
+}
 _LOOP: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
 INTERPRETED = bool(numba.config.DISABLE_JIT)  # numba is switched off
@@ -69,14 +76,19 @@ def callback(signature: types.Type, function: Callable[..., Any]) -> Any:
 
 
 class _Interpreted:
-    """Stands for a compiled callback where numba is switched off: only Python calls it."""
+    """Stands for a compiled callback where numba is switched off; its address is only a number."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         def called(*arguments: Any) -> Any:
             with np.errstate(all="ignore"):  # division as in compiled code
                 return function(*arguments)
 
-        self.ctypes = self.address = called
+        self.ctypes = called
+        self.address = 8 * (len(_interpreted) + 1)  # where no C function is
+        _interpreted[self.address] = called
+
+
+_interpreted: dict[int, Callable[..., Any]] = {}
 
 
 def intrinsic_or(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
@@ -135,14 +147,96 @@ def array_at(context: Any, builder: Any, kind: types.Array, address: Any, length
     return array._getvalue()
 
 
-@intrinsic_or(lambda function, table, room, steps: function(table, room, steps))
-def call_loop(typingctx: Any, function: Any, table: Any, room: Any, steps: Any) -> Any:
-    """Call a native loop, a C function of three integers, at an address; returns an integer."""
+@intrinsic
+def _address(typingctx: Any, array: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        found = cgutils.create_struct_proxy(array)(context, builder, value=arguments[0])
+        return builder.ptrtoint(found.data, cgutils.intp_t)
+
+    return types.int64(array), codegen
+
+
+def address_in(array):
+    """The address of an array's first entry."""
+    return array.ctypes.data
+
+
+@overload(address_in, jit_options=_KERNEL)
+def _address_in(array):
+    return lambda array: _address(array)
+
+
+@intrinsic_or(lambda array, shape: array[: math.prod(shape)].reshape(shape))
+def shaped(typingctx: Any, array: Any, shape: Any) -> Any:
+    """A contiguous array's first entries with other dimensions; their number is not looked at."""
+    kind = types.Array(array.dtype, len(shape), "C")
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        from llvmlite import ir
+        old = make_array(array)(context, builder, arguments[0])
+        new = make_array(kind)(context, builder)
+        sizes = cgutils.unpack_tuple(builder, arguments[1])
+        strides = [old.itemsize]
+        for size in reversed(sizes[1:]):
+            strides.insert(0, builder.mul(strides[0], size))
+        populate_array(
+            new, data=old.data, shape=sizes, strides=strides, itemsize=old.itemsize, meminfo=None
+        )
+        return new._getvalue()
 
-        kind = ir.FunctionType(cgutils.intp_t, [cgutils.intp_t] * 3)
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+    return kind(array, shape), codegen
 
-    return types.int64(types.int64, types.int64, types.int64, types.int64), codegen
+
+def call(result: Any, function: int, arguments: tuple[Any, ...]) -> Any:
+    """Call the C function at an address from Python: whole numbers are int64_t, others double.
+
+    Args:
+        result: the ctypes type of what it returns.
+        function: its address.
+        arguments: what it is given.
+    """
+    if int(function) in _interpreted:
+        return _interpreted[int(function)](*arguments)
+    real = [isinstance(value, float) for value in arguments]
+    kinds = (ctypes.c_double if each else ctypes.c_int64 for each in real)
+    given = (v if each else int(v) for v, each in zip(arguments, real, strict=True))
+    return ctypes.CFUNCTYPE(result, *kinds)(int(function))(*given)
+
+
+def _calling(result: types.Type) -> Any:
+    """The intrinsic that calls the C function at an address with a tuple of int64_t and double."""
+
+    @intrinsic
+    def called(typingctx: Any, function: Any, arguments: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            from llvmlite import ir
+
+            values = cgutils.unpack_tuple(builder, given[1])
+            kind = ir.FunctionType(context.get_value_type(result), [v.type for v in values])
+            return builder.call(builder.inttoptr(given[0], kind.as_pointer()), values)
+
+        return result(types.int64, arguments), codegen
+
+    return called
+
+
+_integer, _number = _calling(types.int64), _calling(types.float64)
+
+
+def call_integer(function, arguments):
+    """Call the C function at an address with a tuple of int64_t and double; it returns int64_t."""
+    return call(ctypes.c_int64, function, arguments)
+
+
+def call_number(function, arguments):
+    """The same for a function that returns a double."""
+    return call(ctypes.c_double, function, arguments)
+
+
+@overload(call_integer, jit_options=_KERNEL)
+def _call_integer(function, arguments):
+    return lambda function, arguments: _integer(function, arguments)
+
+
+@overload(call_number, jit_options=_KERNEL)
+def _call_number(function, arguments):
+    return lambda function, arguments: _number(function, arguments)

@@ -11,6 +11,7 @@ unit-free by itself (lambda_l s_l, steps relative to slacks). For the rest there
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.native import kernel
 
 WIDEST = 1e6  # profiles; a bound farther than that says nothing of the length
@@ -110,9 +111,9 @@ def balance(count, constraints, free, highest, work):
 
 
 @kernel
-def add_costs(game, data, free, length, y, b, work):
+def add_costs(data, free, length, y, b, work):
     """Fill the band with the costs' second derivatives and the rows' sizes; the costs' size."""
-    q, at, position, band = data.parameters, data.offsets, free.position, work.band
+    at, position, band = data.offsets, free.position, work.band
     greatest = 0.0
     for entry in range(len(free.agents)):
         i = free.agents[entry]
@@ -120,7 +121,7 @@ def add_costs(game, data, free, length, y, b, work):
             r, slopes = position[a], 0.0
             for c in range(3 * b + 1):
                 band[r, c] = 0.0
-            game.add_cost_hessian(q, i, a, y, 1.0, work.hessian_row)
+            games.add_cost_hessian(data, i, a, y, 1.0, work.hessian_row)
             for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
                 j = data.cost_index[member]
                 for c in range(at[j], at[j + 1]):

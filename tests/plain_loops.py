@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gne_mj.loops import functions, implicit
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import inside, work
+from gne_mj.loops.layout import in_table
 from gne_mj.loops.newton import solver_in
 from gne_mj.plants import held_map
+from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
 
 
@@ -19,6 +22,7 @@ class Parts(NamedTuple):
     """What the kernels of a system are given."""
 
     problem: Any
+    table: Any  # which the problem knows by its address
     channels: Any
     clock: Any
     work: Any
@@ -42,34 +46,35 @@ def parts_of(system, timing):
     m, p, states = game.actions, game.constraints_count, system.agents.states
     scratch = work(m, p, game.agents, system._sizes)
     solver = solver_in(scratch.solver, m, p, states, int(setup.problem.order.band[0]))
-    channels = Channels(system.agents.parameters, setup.rest)
+    kind = system.agents.kind
+    channels = Channels(system.agents.parameters, setup.rest, compiled_functions(kind), kind.OUTPUT)
+    problem, table = in_table(setup, system.agents, len(system.loop_memory))
     return Parts(
-        setup.problem, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
+        problem, table, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
     )
 
 
 def run_plain(system, timing, periods, plant=held_map):
     """So many control periods in mode implicit, from the start on, ``plant`` predicting."""
-    parts, agent, faults = parts_of(system, timing), system.agents.kind, system.fault_kernels
-    problem, channels, clock, scratch, monitor, _ = parts
-    law, game, acting = system.law.kernels, system.game.kernels, system.acting
+    parts, faults = parts_of(system, timing), system.fault_kernels
+    problem, _table, channels, clock, scratch, monitor, _ = parts
     state, memory = system.state.ravel().copy(), system.loop_memory.copy()
     rows = []
     for k in range(periods):
         step = k * clock.period
         time = step * clock.h
-        scratch.y[:] = state.reshape(channels.rest.shape)[:, agent.OUTPUT]
-        assert inside(game, problem, time, 0, scratch.y, scratch, monitor)
+        scratch.y[:] = state.reshape(channels.rest.shape)[:, channels.output]
+        assert inside(problem, time, 0, scratch.y, scratch, monitor)
         if k:
-            law.propagate(problem, scratch.held, memory, scratch.scratch)
-        faults.begin(agent, problem, clock, step, 0, state, memory, scratch)
+            functions.propagate(problem, scratch.held, memory, scratch.scratch)
+        faults.begin(channels, problem, clock, step, 0, state, memory, scratch)
         before = memory.copy()
-        assert acting.act(
-            acting, faults, plant, (), agent, law, game, problem, channels, clock, time, step,
-            0, state, memory, scratch, monitor,
+        assert implicit.act(
+            faults, plant, (), problem, channels, clock, time, step, 0, state, memory, scratch,
+            monitor,
         )  # fmt: skip
         faults.deliver(problem, clock, step, 0, scratch)
         row = (scratch.y, scratch.u, before, scratch.seen)
         rows.append([array.copy() for array in row])
-        plant.roll(agent, channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))
+        plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))
     return Instants(*map(np.array, zip(*rows, strict=True)), monitor)

@@ -348,9 +348,7 @@ def test_lines_of_any_length_end(length, own):
     game = velocity_game(3, 3.0, 3.0)
     y, direction = np.full(3, 3.0), np.array([1.0, 0.0, 0.0])
     with np.errstate(over="ignore", invalid="ignore"):
-        found = lines.end(
-            game.kernels, game.data, 0, np.array(own), y, direction, 1.0, length, y.copy()
-        )
+        found = lines.end(game.data, 0, np.array(own), y, direction, 1.0, length, y.copy())
     assert 0.0 <= found < np.inf
     if own and length == 1.0:
         assert found == pytest.approx(3.0, rel=1e-12)

@@ -142,36 +142,35 @@ def equation_of(equation, system, seed, gain=1.0):
     parts = parts_of(system, clock(0.05))
     problem, work, solver = parts.problem, parts.work, parts.solver
     problem.settings[GAIN] = gain
-    rng, m, law, game = np.random.default_rng(seed), system.game.actions, system.law, system.game
+    rng, m = np.random.default_rng(seed), system.game.actions
     solver.anchor[:], solver.base[:] = system.start, system.start + rng.normal(size=m)
     solver.own[:], solver.mixed[:] = system.start, system.start
     solver.stiff[:] = rng.uniform(5, 30, m)
     solver.numbers[RHO], solver.numbers[MOVES] = 0.2, 1.0
-    common = law.kernels, game.kernels, problem
     work.profile[:] = system.start
 
     def residual(first, last, trial):
         solver.trial[:] = trial
         solver.mixed[:] = solver.anchor
         solver.residual[:] = np.nan
-        good = equation.residual(*common, first, last, np.zeros(0), work, solver)
+        good = equation.residual(problem, first, last, np.zeros(0), work, solver)
         at = problem.data.offsets
         return good, solver.residual[at[first] : at[last]].copy()
 
-    return residual, parts, common
+    return residual, parts
 
 
 @pytest.mark.parametrize("decentralised", [False, True])
 @pytest.mark.parametrize("gain", [1.0, 0.6])
 def test_an_agents_own_matrix_is_the_derivative_of_its_equation(decentralised, gain):
     system = coupled_system(decentralised=True)
-    residual, parts, common = equation_of(local, system, 3, gain)
+    residual, parts = equation_of(local, system, 3, gain)
     parts.problem.order.band[1] = int(decentralised)
     at, b = parts.problem.data.offsets, int(parts.problem.order.band[0])
     y = system.start + np.array([0.02, -0.01, 0.03, 0.02])
     for i in range(3):
         assert residual(i, i + 1, y)[0]
-        local.assemble(*common, i, i + 1, b, np.zeros(0), parts.work, parts.solver)
+        local.assemble(parts.problem, i, i + 1, b, np.zeros(0), parts.work, parts.solver)
         for a in range(at[i], at[i + 1]):
             h = np.where(np.arange(4) == a, 1e-6, 0.0)
             slope = (residual(i, i + 1, y + h)[1] - residual(i, i + 1, y - h)[1]) / 2e-6
@@ -184,11 +183,11 @@ def test_an_agents_own_matrix_is_the_derivative_of_its_equation(decentralised, g
 @pytest.mark.parametrize("gain", [1.0, 0.6])
 def test_all_agents_matrix_is_the_derivative_of_their_equation(gain):
     system = coupled_system()
-    residual, parts, common = equation_of(joint, system, 3, gain)
+    residual, parts = equation_of(joint, system, 3, gain)
     position, b = parts.problem.order.position, int(parts.problem.order.band[0])
     y = system.start + np.array([0.02, -0.01, 0.03, 0.02])
     assert residual(0, 3, y)[0]
-    joint.assemble(*common, 0, 3, b, np.zeros(0), parts.work, parts.solver)
+    joint.assemble(parts.problem, 0, 3, b, np.zeros(0), parts.work, parts.solver)
     matrix = np.zeros((4, 4))
     for a in range(4):
         for c in range(4):
@@ -204,7 +203,7 @@ def test_all_agents_matrix_is_the_derivative_of_their_equation(gain):
 
 def test_an_agent_without_an_action_says_at_which_constraint():
     system = coupled_system(decentralised=True)
-    residual, parts, _ = equation_of(local, system, 3)
+    residual, parts = equation_of(local, system, 3)
     good, _ = residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
     assert not good
     assert parts.work.now[SHELL] == 0.0
@@ -220,25 +219,25 @@ def test_an_agent_without_an_action_says_at_which_constraint():
 def test_a_steps_length_is_measured_where_the_agent_looks():
     """The greatest relative change of a slack, n_l times the own move, curvature included."""
     system = coupled_system(decentralised=True)
-    residual, parts, common = equation_of(local, system, 3)
+    residual, parts = equation_of(local, system, 3)
     assert residual(1, 2, system.start)[0]
     step = np.array([0.01])
-    got = local.local_length(common[1], parts.problem, 1, 2, step, parts.solver)
+    got = local.local_length(parts.problem, 1, 2, step, parts.solver)
     ball, product = 4.0 - system.start @ system.start, 1.0 - system.start[1] * system.start[2]
     of_ball = (2 * 0.5 * 0.03 / ball) ** 2 + 2 * 0.03**2 / ball
     of_product = (-0.4 * 0.02 / product) ** 2
     assert got == pytest.approx(np.sqrt(max(of_ball, of_product)))
     parts.problem.order.band[1] = 0
     residual(1, 2, system.start)
-    alone = local.local_length(common[1], parts.problem, 1, 2, step, parts.solver)
+    alone = local.local_length(parts.problem, 1, 2, step, parts.solver)
     assert alone == pytest.approx(np.sqrt((0.01 / ball) ** 2 + 2 * 0.01**2 / ball))
 
 
 def test_both_entries_of_an_action_count_in_its_length():
     system = coupled_system(decentralised=True)
-    residual, parts, common = equation_of(local, system, 3)
+    residual, parts = equation_of(local, system, 3)
     assert residual(0, 1, system.start)[0]
-    got = local.local_length(common[1], parts.problem, 0, 1, np.array([0.001, -0.02]), parts.solver)
+    got = local.local_length(parts.problem, 0, 1, np.array([0.001, -0.02]), parts.solver)
     ball, product = 4.0 - system.start @ system.start, 1.0 - system.start[1] * system.start[2]
     of_ball = (2 * 0.4 * 0.06 / ball) ** 2 + 2 * 0.06**2 / ball
     of_product = (0.5 * 0.04 / product) ** 2
@@ -288,7 +287,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
     ):
         parts = parts_of(system, clock(0.05, 0.05 * steps, 0.05 * steps))
         state, agent = system.state.ravel(), system.agents.kind
-        implicit.find_slopes(held_map, (), agent, parts.channels, parts.clock, state, parts.solver)
+        implicit.find_slopes(held_map, (), parts.channels, parts.clock, state, parts.solver)
         assert np.all(parts.solver.slope * parts.solver.stiff == pytest.approx(1.0))
         if agent is integrator:
             assert parts.solver.slope == pytest.approx(0.05 * steps)
@@ -296,7 +295,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
         for row, size in zip(reached, (0.0, 1.0), strict=True):
             moved = state.copy()
             u = np.full(len(row), size)
-            held_map.roll(agent, parts.channels, parts.clock, moved, u, np.zeros(20))
+            held_map.roll(parts.channels, parts.clock, moved, u, np.zeros(20))
             row[:] = moved.reshape(parts.channels.rest.shape)[:, agent.OUTPUT]
         assert parts.solver.slope == pytest.approx(reached[1] - reached[0])
 
@@ -308,7 +307,7 @@ def test_a_prediction_agrees_if_no_distance_to_a_bound_differs():
     for change, agree in ((0.0, True), (1e-15, True), (1e-11, False), (-1e-11, False)):
         parts.solver.y[:] = near
         parts.solver.reached[:] = near + change
-        assert implicit.agrees(coupled_game, parts.problem, parts.solver) == agree
+        assert implicit.agrees(parts.problem, parts.solver) == agree
 
 
 class Bent:
@@ -317,13 +316,13 @@ class Bent:
     def __init__(self, bend):
         self.bend, self.count = bend, 0
 
-    def is_affine(self, agent, clock):
+    def is_affine(self, clock):
         return False
 
-    def roll(self, agent, channels, clock, state, u, scratch):
+    def roll(self, channels, clock, state, u, scratch):
         state[: len(u)] += self.bend(u)
 
-    def predict(self, context, agent, channels, clock, state, u, out, trial, scratch):
+    def predict(self, context, channels, clock, state, u, out, trial, scratch):
         self.count += 1
         out[:] = state[: len(u)] + self.bend(u)
 
@@ -354,8 +353,7 @@ def test_the_worst_way_in_which_an_agent_ended_is_told(monkeypatch):
     for codes, worst, asked in (((1, 2, 0), 2, 3), ((0, 0, 0), 0, 3), ((1, OUTSIDE, 0), 3, 2)):
         ways = list(codes)
         monkeypatch.setattr(local, "newton", lambda *_, ways=ways: ways.pop(0))
-        problem, game = parts.problem, system.game.kernels
-        given = system.law.kernels, game, problem, 1, np.zeros(0), parts.work, parts.solver
+        given = parts.problem, 1, np.zeros(0), parts.work, parts.solver
         assert local.solve(*given) == worst
         assert len(codes) - len(ways) == asked, "nobody is asked once one has no action"
 

@@ -1,6 +1,5 @@
 """The compiled laws against their formulas, and what each agent may and may not see."""
 
-from functools import cache
 from types import SimpleNamespace
 
 import block_reference
@@ -20,7 +19,6 @@ from builders import (
     robots,
     run_loop,
 )
-from numba import njit
 
 import reference
 from gne_mj import graph as graphs
@@ -30,12 +28,13 @@ from gne_mj.controllers.settings import PENALTY
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
+from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.layout import Clock, Setup, in_table
+from gne_mj.loops.link import link
 from gne_mj.loops.ode import CONTINUOUS, OdeLoop
-from gne_mj.native import compiled, source_key
-from gne_mj.plants.ode import EULER
+from gne_mj.plants.functions import EULER
 
 RHO, EPSILON, GAIN = 0.1, 0.05, 0.7
 COUPLING, TAU = 1.7, 0.3
@@ -71,7 +70,16 @@ NETWORKS = [
 def problem_of(game, law, limit=np.inf):
     bounds = np.full(game.actions, limit)
     settings, y = law.settings(RHO), np.zeros(game.actions)
-    return Problem(game.data, law.graph_data, settings, bounds, y, no_propagator())
+    addresses = link(law.kernels, game.kernels, memory=law.graph is not None, equation=None)
+    return Problem(
+        game.data, law.graph_data, settings, bounds, y, no_propagator(), functions=addresses
+    )
+
+
+def tabled(problem, memory):
+    """The problem with its table, which has to be kept."""
+    rest, clock = np.zeros((len(problem.limit), 1)), Clock(1.0, 1, CONTINUOUS, EULER)
+    return in_table(Setup(problem, rest, clock), integrators(len(problem.limit)), len(memory))
 
 
 def loop_at(game, law, y, memory, h=2.0**-30):
@@ -79,18 +87,7 @@ def loop_at(game, law, y, memory, h=2.0**-30):
     agents = integrators(game.actions)
     rest, clock = np.zeros((game.actions, 1)), Clock(h, 1, CONTINUOUS, EULER)
     setup = Setup(problem_of(game, law), rest, clock)
-    return OdeLoop(agents, law.kernels, game.kernels, setup, y.reshape(-1, 1), memory)
-
-
-@cache
-def compiled_rate(kernels):
-    """The product's rate of a law's memory, compiled."""
-
-    @njit(error_model="numpy")
-    def rate(problem, y, memory, out):
-        kernels.rate(problem, y, memory, out)
-
-    return rate
+    return OdeLoop(agents, setup, y.reshape(-1, 1), memory)
 
 
 def step(game, law, y, memory):
@@ -103,7 +100,8 @@ def step(game, law, y, memory):
     assert np.array_equal(first.memory[0], memory)
     u, rate = first.input[0], np.zeros(len(memory))
     assert np.array_equal(loop.finish().state[0, :, 0], y + 2.0**-30 * u)
-    compiled_rate(law.kernels)(problem_of(game, law), y, memory, rate)
+    problem, _table = tabled(problem_of(game, law), memory)
+    functions.rate(problem, y, memory, rate)
     return u, rate
 
 
@@ -231,33 +229,14 @@ def test_the_five_robots_first_forces():
 # What the laws see is asked of the law itself, so that nothing else need be inside.
 
 
-@cache
-def native(law, game):
-    """The law's kernels, compiled as a loop compiles them."""
-    source = source_key(law, game)
-
-    @compiled
-    def action(problem, y, weights, memory, work, u):
-        _ = source
-        return law.action(game, problem, y, weights, memory, work, u)
-
-    @compiled
-    def rate(problem, y, memory, out):
-        _ = source
-        law.rate(problem, y, memory, out)
-
-    return action, rate
-
-
 def ask(game, law, y, weights, memory):
     """Code, u and the memory's rates by the law's kernels."""
-    action, rate = native(law.kernels, game.kernels)
     u, rates = np.full(len(y), np.nan), np.full(len(memory), np.nan)
-    problem = problem_of(game, law)
+    problem, _table = tabled(problem_of(game, law), memory)
     scratch = work(len(y), len(weights), game.agents)
     scratch.now[PENALTY] = RHO
-    code = action(problem, y, weights, memory, scratch, u)
-    rate(problem, y, memory, rates)
+    code = functions.action(problem, y, weights, memory, scratch, u)
+    functions.rate(problem, y, memory, rates)
     return code, u, rates
 
 

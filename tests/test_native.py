@@ -11,9 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gne_mj import native
+import gne_mj
+from gne_mj import game_functions as functions
+from gne_mj import interior_point, native
 from gne_mj.controllers import full_information
-from gne_mj.games import velocity_synchronization
+from gne_mj.games import velocity_game, velocity_synchronization
+from gne_mj.loops import ode
 from gne_mj.plants import flexible_robot
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -132,15 +135,10 @@ def test_the_key_follows_this_packages_sources(tmp_path):
 
 RUN = """
 import json, sys
-from gne_mj.controllers import full_information
-from gne_mj.games import velocity_synchronization
-from gne_mj.loops import explicit, faultless, ode
-from gne_mj.plants import flexible_robot
+from gne_mj.loops import faultless, ode
 from gne_mj.scenario import run
 trajectory = run("velocity-sync", {"plant.engine": "ode", "simulation.duration": 0.1})
-advance = ode.build(
-    flexible_robot, full_information, velocity_synchronization, explicit, faultless
-)
+advance = ode.build(faultless)
 print(json.dumps([advance.cache_hits, trajectory["robots"]["action"].values.tolist()]))
 """
 
@@ -160,6 +158,55 @@ def test_loops_are_cached_between_processes(tmp_path):
     assert (first, second) == (0, 1)
     assert first_bits == second_bits
     assert any(tmp_path.rglob("*.nbi"))
+
+
+@pytest.mark.skipif(native.INTERPRETED, reason="loops are not compiled")
+def test_loops_are_compiled_once_for_all_games_laws_and_agents(tmp_path):
+    """Each of these has another game, law, agent type or mode; two have no loop of a fixed step."""
+    for name, changes in (
+        ("velocity-sync", {"plant.engine": "ode"}),
+        ("velocity-sync", {"plant.engine": "ode", "controller.information": "partial"}),
+        ("velocity-sync", {"plant.engine": "ode", "controller.mode": "implicit"}),
+        ("cournot", {}),
+        ("osnr", {"plant.integrator": "rk4", "simulation.timestep": 1e-3}),
+    ):
+        gne_mj.run(name, {"simulation.duration": 0.01, **changes})
+    assert ode.build.cache_info().currsize <= 2, "with faults and without"
+    assert interior_point.build.cache_info().currsize == 1
+
+
+def test_functions_by_their_addresses_are_those_of_the_module():
+    """In compiled code and from Python, each against the kernel as it stands."""
+    game, y = velocity_game(4, 3.0, 2.0, [1.0, 2.0, 3.0, 4.0], 0.5), np.array([3.5, 2.0, 1.5, 0.3])
+    data, kernels, q = game.data, game.kernels, game.data.parameters
+    row, expected = np.zeros(4), np.zeros(4)
+    for i in range(4):
+        assert functions.cost(data, i, y) == kernels.cost(q, i, y)
+        assert functions.cost_gradient(data, i, i, y) == kernels.cost_gradient(q, i, i, y)
+        functions.add_cost_hessian(data, i, i, y, 0.5, row)
+        kernels.add_cost_hessian(q, i, i, y, 0.5, expected)
+        assert functions.constraint(data, i, y) == kernels.constraint(q, i, y)
+        slope = functions.constraint_gradient(data, i, max(i - 1, 0), y)
+        assert slope == kernels.constraint_gradient(q, i, max(i - 1, 0), y)
+        second = functions.constraint_hessian(data, i, i, max(i - 1, 0), y)
+        assert second == kernels.constraint_hessian(q, i, i, max(i - 1, 0), y)
+    assert row.tolist() == expected.tolist()
+    g, weights, some = np.zeros(4), np.zeros(4), np.zeros(2)
+    assert functions.evaluate(data, 0.1, y, g, weights) == -1
+    assert g.tolist() == [kernels.constraint(q, k, y) for k in range(4)]
+    assert weights.tolist() == (0.1 / -g).tolist()
+    assert functions.evaluate(data, 0.1, y + np.eye(4)[1] * 9.0, g, weights) == 1
+    functions.values(data, np.array([3, 1]), y, some)
+    assert some.tolist() == [kernels.constraint(q, k, y) for k in (3, 1)]
+    gradient = np.full(4, 7.0)
+    functions.gradients(data, np.array([2, 0]), y, gradient)
+    own = [kernels.cost_gradient(q, i, i, y) for i in range(4)]
+    assert gradient.tolist() == [own[0], 7.0, own[2], 7.0]
+    entries = np.zeros(3)
+    functions.slopes(data, np.array([2, 0]), np.array([0, 2, 3]), np.array([1, 2, 0]), y, entries)
+    assert entries.tolist() == [
+        kernels.constraint_gradient(q, k, a, y) for k, a in ((2, 1), (2, 2), (0, 0))
+    ]
 
 
 GAME = '''

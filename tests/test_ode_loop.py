@@ -29,8 +29,9 @@ from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.layout import Clock, Setup
-from gne_mj.loops.ode import HELD, OdeLoop
-from gne_mj.plants.ode import RK4
+from gne_mj.loops.link import link
+from gne_mj.loops.ode import SAMPLED, OdeLoop
+from gne_mj.plants.functions import RK4
 from gne_mj.system import System
 
 DELTA = np.full(5, 3.0)
@@ -134,10 +135,11 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
         np.full(10, np.inf),
         np.zeros(10),
         law.propagator(period),
+        functions=link(law.kernels, game.kernels, memory=True, equation=None),
     )
-    loop_clock = Clock(period / substeps, substeps, HELD, RK4)
+    loop_clock = Clock(period / substeps, substeps, SAMPLED, RK4)
     setup = Setup(problem, np.zeros((10, 1)), loop_clock)
-    loop = OdeLoop(integrators(10), law.kernels, game.kernels, setup, y[:, None], memory)
+    loop = OdeLoop(integrators(10), setup, y[:, None], memory)
     laplacian = reference.laplacian(10, law.graph.edges)
     recorded = loop.advance(substeps, 1)
     assert len(recorded.input) == substeps, "left the set"

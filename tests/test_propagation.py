@@ -48,7 +48,7 @@ def random_graph(rng, count, extra):
 def data_of(sizes):
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    return GameData(np.zeros(0), offsets, owner, *[NOTHING] * 6, np.zeros(0))
+    return GameData(np.zeros(0), offsets, owner, *[NOTHING] * 6, np.zeros(0), *[NOTHING] * 3)
 
 
 def series(graph, duration):

@@ -8,8 +8,7 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from gne_mj.loops.batch import BatchLoop, EachLoop
-from gne_mj.loops.layout import Setup
-from gne_mj.loops.ode import ode_table
+from gne_mj.loops.layout import Setup, ode_table
 from gne_mj.loops.ode_batch import OdeBatch
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
@@ -35,12 +34,11 @@ class Structure:
         self._plant: MujocoPlant | MjcfPlant | None = None
         self._native = system.integrator != "rosenbrock"
         self.loop: BatchLoop
-        kernels = (system.law.kernels, system.game.kernels, system.acting, system.fault_kernels)
         faulty = bool(system.faults)
         if not self._native:
             self.loop = EachLoop(threads)
         elif system.engine == "ode":
-            self.loop = OdeBatch(system.agents, *kernels, faulty, threads)
+            self.loop = OdeBatch(system.fault_kernels, faulty, threads)
         else:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco_batch import MujocoBatch
@@ -48,7 +46,9 @@ class Structure:
             self._plant = system.mujoco_plant(clock, decorated=False)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
             alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
-            self.loop = MujocoBatch(self._plant, *kernels, faulty, 1 if alone else threads)
+            self.loop = MujocoBatch(
+                self._plant, system.fault_kernels, faulty, 1 if alone else threads
+            )
 
     def table(self, system: System, setup: Setup) -> Table | None:
         """The table of a run; None where each run has a loop of its own."""
@@ -68,7 +68,7 @@ def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:
     return (
         system.engine, system.integrator, clock.timestep, agents.kind, agents.dimension,
         agents.robots if isinstance(agents, MjcfRobots) else None,
-        system.law.kernels, game.kernels, system.acting, system.fault_kernels,
+        system.equation, system.fault_kernels,
         game.actions, game.constraints_count, game.agents, agents.states,
         len(system.loop_memory), setup.clock.mode, setup.history, setup.solver,
     )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from dm_control.rl import control
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj import game_functions as games
 from gne_mj.game import Game
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import raise_pending
@@ -62,16 +63,15 @@ class Exit:
 
 
 @cache
-def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
+def build(at: Offsets, fleet: ModuleType) -> Any:
     """The native loop of mj_step that ends where the set is left.
 
     Args:
         at: where MuJoCo keeps what.
         fleet: the module that reads the robots, as :mod:`gne_mj.plants.mujoco` does.
-        game: module of kernels.
     """
     states, output = len(fleet.AGENT.STATES), fleet.AGENT.OUTPUT
-    source = source_key(fleet, fleet.AGENT, game)
+    source = source_key(fleet, fleet.AGENT)
 
     @compiled
     def advance(mj_step, functions, model, data, data_of_game, steps, before, state, y, g):
@@ -98,7 +98,7 @@ def build(at: Offsets, fleet: ModuleType, game: ModuleType) -> Any:
                 y[r] = state[r * states + output]
             found = INSIDE
             for k in range(len(g)):
-                g[k] = game.constraint(data_of_game.parameters, k, y)
+                g[k] = games.constraint(data_of_game, k, y)
                 if found == INSIDE and not g[k] < 0.0:
                     found = k
             for array in (qpos, qvel, act):
@@ -134,7 +134,7 @@ class FleetPhysics(control.Physics):
         self.plant, self.game, self._start = plant, game, start
         self.exit: Exit | None = None
         at, kernels = offsets(), plant.kernels
-        self._advance = build(at, kernels, game.kernels)
+        self._advance = build(at, kernels)
         self._table = Table(plant.table_arrays)
         m, model = game.actions, plant.model
         places = plant.places.ravel()

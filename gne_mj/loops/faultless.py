@@ -17,7 +17,7 @@ def measured(problem):
 
 
 @kernel
-def begin(agent, problem, clock, step, stage, state, memory, work):
+def begin(channels, problem, clock, step, stage, state, memory, work):
     """Nothing happens but that the outputs are what the law's memory is held at."""
     if clock.mode != 0:
         copy(work.y, work.held)
@@ -30,13 +30,13 @@ def choose(y, seen):
 
 
 @kernel
-def sense(game, problem, clock, step, stage, work, y, seen):
+def sense(problem, clock, step, stage, work, y, seen):
     """The outputs (m,) that the law sees: y, or ``seen``, filled."""
     return y
 
 
 @kernel
-def sense_state(plant, agent, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, problem, channels, clock, step, work, state, known, scratch):
     """The flat state as the law has it: the state, or ``known``, filled."""
     return state
 
@@ -55,5 +55,5 @@ def push(problem, clock, step, u, acts):
 
 
 @kernel
-def record(agent, states, problem, clock, step, state, u, work, seen, acts):
+def record(channels, problem, clock, step, state, u, work, seen, acts):
     """Nothing to record: outputs and inputs are what they are."""

@@ -10,6 +10,7 @@ memory has what came last over every link, and behind it a ring of the rows that
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.controllers.settings import DEALT, LINKS, PENALTY, SHELL, SHELL_VALUE
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS
 from gne_mj.native import compiled, copy, kernel
@@ -76,13 +77,13 @@ def measured(problem):
 
 
 @kernel
-def begin(agent, problem, clock, step, stage, state, memory, work):
+def begin(channels, problem, clock, step, stage, state, memory, work):
     """What happens before the law acts: sensors read, estimates corrupted, messages exchanged."""
     m, count = len(work.y), count_of(clock, step)
     fresh = stage == 0 and work.now[DEALT] <= step
     if stage == 0:
         work.now[DEALT] = step + 1.0
-    read_sensors(agent, problem, clock, count, step, state, work)
+    read_sensors(channels, problem, clock, count, step, state, work)
     if clock.mode != 0:
         copy(work.seen, work.held)
     if len(memory) > 0:
@@ -99,7 +100,7 @@ def choose(y, seen):
 
 
 @kernel
-def read_sensors(agent, problem, clock, count, step, state, work):
+def read_sensors(channels, problem, clock, count, step, state, work):
     """Fill work.seen (m,) with the outputs as they are read, which may be of some periods ago."""
     faults, m, time = problem.faults, len(work.y), step * clock.h
     delay = int(faults.numbers[SENSOR_DELAY])
@@ -111,7 +112,7 @@ def read_sensors(agent, problem, clock, count, step, state, work):
         copy(state[:size], work.history[at : at + size])
         at = (max(count - delay, 0) % slots) * size
         for r in range(m):
-            work.seen[r] = work.history[at + r * states + agent.OUTPUT]
+            work.seen[r] = work.history[at + r * states + channels.output]
     else:
         copy(work.y, work.seen)
     for f in range(faults.pointer[NOISE], faults.pointer[NOISE + 1]):
@@ -193,12 +194,12 @@ def exchange(problem, clock, count, step, memory, work):
 
 
 @kernel
-def sense(game, problem, clock, step, stage, work, y, seen):
+def sense(problem, clock, step, stage, work, y, seen):
     """The outputs (m,) that the law sees: ``seen``. Fills the barrier's weights there."""
     rho, data = work.now[PENALTY], problem.data
     work.now[SHELL] = -1.0
     for k in range(len(work.weights)):
-        room = -game.constraint(data.parameters, k, seen) - data.tightening[k]
+        room = -games.constraint(data, k, seen) - data.tightening[k]
         work.weights[k] = rho / room
         if not room > 0.0 and work.now[SHELL] < 0.0:
             work.now[SHELL], work.now[SHELL_VALUE] = float(k), -room
@@ -206,7 +207,7 @@ def sense(game, problem, clock, step, stage, work, y, seen):
 
 
 @kernel
-def sense_state(plant, agent, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, problem, channels, clock, step, work, state, known, scratch):
     """The flat state as the law has it: ``known``, filled.
 
     A state of some periods ago is moved on by the plant's map under the inputs asked for since.
@@ -221,10 +222,10 @@ def sense_state(plant, agent, problem, channels, clock, step, work, state, known
     else:
         copy(state[: m * states], known)
     for r in range(m):
-        known[r * states + agent.OUTPUT] = work.seen[r]
+        known[r * states + channels.output] = work.seen[r]
     for ago in range(late):
         at = slots * size + ((count - late + ago) % slots) * m
-        plant.roll(agent, channels, clock, known, work.history[at : at + m], scratch)
+        plant.roll(channels, clock, known, work.history[at : at + m], scratch)
     return known
 
 
@@ -270,10 +271,11 @@ def push(problem, clock, step, u, acts):
 
 
 @kernel
-def record(agent, states, problem, clock, step, state, u, work, seen, acts):
+def record(channels, problem, clock, step, state, u, work, seen, acts):
     """Fill rows (m,) with what the law has seen for the input u of this step, and what acts."""
     copy(work.seen, seen)
+    states = channels.rest.shape[1]
     if clock.mode == 0:  # the look may have been at a later stage, with the step's own errors
         for r in range(len(u)):
-            seen[r] += state[r * states + agent.OUTPUT] - work.y[r]
+            seen[r] += state[r * states + channels.output] - work.y[r]
     push(problem, clock, step, u, acts)

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gne_mj.barrier import KIND, START, evaluate_constraints, rho_at
+from gne_mj import game_functions as games
+from gne_mj.barrier import KIND, START, rho_at
 from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import NOW, PENALTY, RHO, SHELL, SHELL_VALUE
 from gne_mj.game import GameData
 from gne_mj.graph import GraphData
-from gne_mj.loops import division
+from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.native import kernel
 
@@ -54,9 +55,11 @@ class Problem(NamedTuple):
     schedule: np.ndarray = np.zeros(4)  # of the penalty; all zero: settings[RHO] for all time
     order: Order = NO_ORDER
     faults: Faults = NO_FAULTS
-    size: np.ndarray = np.zeros(
-        1
-    )  # (1 + p,) at y*: division.sizes_at; read in mode continuous only
+    # (1 + p,) at y*: division.sizes_at; read in mode continuous only
+    size: np.ndarray = np.zeros(1)
+    # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
+    functions: np.ndarray = np.zeros(functions.COUNT, dtype=np.int64)
+    table: int = 0
 
 
 class Work(NamedTuple):
@@ -103,7 +106,7 @@ def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -
 
 
 @kernel
-def inside(game, problem, time, stage, y, work, monitor):
+def inside(problem, time, stage, y, work, monitor):
     """Fill work.g, work.weights and work.now; latch an exit, and return False, if g(y) is not < 0.
 
     Outputs that are inside, but closer to the boundary than the barrier's tightening, are no exit;
@@ -113,7 +116,7 @@ def inside(game, problem, time, stage, y, work, monitor):
     if schedule[KIND] > 0.0 or schedule[START] > 0.0:
         rho = rho_at(schedule, time)
     work.now[PENALTY] = rho
-    outside = evaluate_constraints(game, problem.data, rho, y, work.g, work.weights)
+    outside = games.evaluate(problem.data, rho, y, work.g, work.weights)
     work.now[SHELL] = outside
     if outside < 0:
         return True
@@ -128,16 +131,16 @@ def inside(game, problem, time, stage, y, work, monitor):
 
 
 @kernel
-def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
+def feedback(problem, time, stage, y, memory, work, monitor, u):
     """Fill u (m,) with the input that actuators deliver at outputs y (m,), all seen as they are.
 
     work.g, work.weights and work.demand are filled on the way. Returns True if there is an input.
     If not (y or an estimate is not strictly inside, or the demand is not finite), the exit is
     latched in the monitor with the given time and stage, and u is left unfinished.
     """
-    if not inside(game, problem, time, stage, y, work, monitor):
+    if not inside(problem, time, stage, y, work, monitor):
         return False
-    if not explicit_law(law, game, problem, time, stage, y, memory, work, monitor):
+    if not explicit_law(problem, time, stage, y, memory, work, monitor):
         return False
     for r in range(len(u)):
         u[r] = min(max(work.demand[r], -problem.limit[r]), problem.limit[r])
@@ -145,16 +148,16 @@ def feedback(law, game, problem, time, stage, y, memory, work, monitor, u):
 
 
 @kernel
-def explicit_law(law, game, problem, time, stage, y, memory, work, monitor):
+def explicit_law(problem, time, stage, y, memory, work, monitor):
     """Fill work.demand by the law at y (m,), whose weights are given; False if it has no action."""
     shell = int(work.now[SHELL])
     if shell >= 0:
         watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now[SHELL_VALUE], stage)
         return False
-    left = law.action(game, problem, y, work.weights, memory, work, work.demand)
+    left = functions.action(problem, y, work.weights, memory, work, work.demand)
     if left >= 0:
         agent, constraint = left // len(work.g), left % len(work.g)
-        value = game.constraint(problem.data.parameters, constraint, work.profile)
+        value = games.constraint(problem.data, constraint, work.profile)
         value += problem.data.tightening[constraint]
         code = watch.ESTIMATE_LEFT if np.isfinite(value) else watch.DIVERGED
         watch.leave(monitor, code, time, agent, constraint, value, stage)

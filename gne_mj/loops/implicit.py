@@ -2,16 +2,18 @@
 
 At a control instant the plant's own discrete map over the coming period, substeps included, is
 evaluated under a trial input and taken as base + slope u, channel by channel; the barrier's
-equation is solved exactly for that map (``acting.solve``); the map is evaluated again under the
-result, its slope corrected by the secant, and so on until prediction and solution agree. For one
-Euler step the map is affine in u and one evaluation is enough. Since every solution is strictly
-inside, so are the outputs at the next control instant, as long as the plant does what its map says
-and the input that is delivered is the one asked for.
+equation is solved exactly for that map (:mod:`gne_mj.loops.joint`, :mod:`gne_mj.loops.local`); the
+map is evaluated again under the result, its slope corrected by the secant, and so on until
+prediction and solution agree. For one Euler step the map is affine in u and one evaluation is
+enough. Since every solution is strictly inside, so are the outputs at the next control instant, as
+long as the plant does what its map says and the input that is delivered is the one asked for.
 """
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.controllers.settings import SHELL, SHELL_VALUE
+from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import usable
 from gne_mj.loops.newton import FOUND, OUTSIDE, STANDS, STEPS, UNSOLVED, solver_in
@@ -28,8 +30,8 @@ FAR = 1e-2
 
 @kernel
 def act(
-    acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
-    state, memory, work, monitor,
+    faults, plant, context, problem, channels, clock, time, step, stage, state, memory, work,
+    monitor,
 ):  # fmt: skip
     """Fill work.demand; False, with the exit latched, if there is no input."""
     m, states = channels.rest.shape
@@ -42,16 +44,16 @@ def act(
     solver.numbers[STANDS] = step + 1.0
     if found > 0.0:
         watch.compare(monitor, time, work.y, solver.ahead)
-    faults.sense(game, problem, clock, step, stage, work, work.y, work.seen)
+    faults.sense(problem, clock, step, stage, work, work.y, work.seen)
     known = faults.sense_state(
-        plant, agent, problem, channels, clock, step, work, state, solver.state, solver.scratch
+        plant, problem, channels, clock, step, work, state, solver.state, solver.scratch
     )
     if found == 0.0:
-        find_slopes(plant, context, agent, channels, clock, known, solver)
+        find_slopes(plant, context, channels, clock, known, solver)
     # where the inputs so far lead to
     smooth = found >= 3.0
     for r in range(m):
-        solver.anchor[r] = known[r * states + agent.OUTPUT]
+        solver.anchor[r] = known[r * states + channels.output]
         last, before, earlier = solver.held[r], solver.before[r], solver.earlier[r]
         solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
         solver.before[r], solver.earlier[r] = last, before
@@ -59,36 +61,36 @@ def act(
         copy(problem.equilibrium, solver.ahead)  # inside for certain, as y(0) that is seen is not
     solver.numbers[FOUND] += 1.0
     solver.numbers[STEPS] = 0.0
-    map_ahead(plant, context, agent, channels, clock, known, solver)
+    map_ahead(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     ended, agreed, least = OUTSIDE, False, np.inf
     for _ in range(MOST_MAPS):
         for r in range(m):
             solver.base[r] = solver.reached[r] - solver.slope[r] * solver.u[r]
-        ended = acting.solve(law, game, problem, b, memory, work, solver)
+        ended = functions.solve(problem, b, memory, work)
         if ended == OUTSIDE:
             break
         farthest = 0.0
         for r in range(m):
             solver.held[r] = (solver.y[r] - solver.base[r]) * solver.stiff[r]
             farthest = max(farthest, abs(solver.y[r] - solver.reached[r]))
-        if farthest < FAR and plant.is_affine(agent, clock):
+        if farthest < FAR and plant.is_affine(clock):
             agreed = True
             break
         for r in range(m):
             solver.u[r], solver.held[r] = solver.held[r], solver.u[r]
             solver.ahead[r] = solver.reached[r]
-        map_ahead(plant, context, agent, channels, clock, known, solver)
+        map_ahead(plant, context, channels, clock, known, solver)
         least = correct_slopes(solver)
         copy(solver.u, solver.held)
-        agreed = agrees(game, problem, solver)
+        agreed = agrees(problem, solver)
         if agreed:
             copy(solver.reached, solver.y)
             break
-    law.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
+    functions.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
     for r in range(m):
         solver.ahead[r], work.demand[r] = solver.y[r], solver.held[r]
-    law.settle(solver.ahead, work.held)
+    functions.settle(problem, solver.ahead, work.held)
     watch.count_solution(monitor, time, solver.numbers[STEPS], agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
         constraint = int(work.now[SHELL])
@@ -100,24 +102,24 @@ def act(
 
 
 @kernel
-def map_ahead(plant, context, agent, channels, clock, known, solver):
+def map_ahead(plant, context, channels, clock, known, solver):
     """Fill solver.reached with the outputs that the plant's map reaches under solver.u."""
     plant.predict(
-        context, agent, channels, clock, known, solver.u, solver.reached, solver.rolled,
+        context, channels, clock, known, solver.u, solver.reached, solver.rolled,
         solver.scratch,
     )  # fmt: skip
 
 
 @kernel
-def find_slopes(plant, context, agent, channels, clock, known, solver):
+def find_slopes(plant, context, channels, clock, known, solver):
     """Fill the slopes from the map under two inputs: exact where it is affine."""
     for r in range(len(solver.u)):
         solver.u[r] = 0.0
-    map_ahead(plant, context, agent, channels, clock, known, solver)
+    map_ahead(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     for r in range(len(solver.u)):
         solver.u[r] = 1.0
-    map_ahead(plant, context, agent, channels, clock, known, solver)
+    map_ahead(plant, context, channels, clock, known, solver)
     for r in range(len(solver.u)):
         solver.slope[r] = solver.reached[r] - solver.y[r]
         solver.stiff[r] = 1.0 / solver.slope[r]
@@ -144,12 +146,12 @@ def correct_slopes(solver):
 
 
 @kernel
-def agrees(game, problem, solver):
+def agrees(problem, solver):
     """Whether the outputs reached have nearly the distances to all bounds of those solved for."""
     data = problem.data
     for k in range(len(solver.inverse)):
-        room = -game.constraint(data.parameters, k, solver.reached) - data.tightening[k]
-        meant = -game.constraint(data.parameters, k, solver.y) - data.tightening[k]
+        room = -games.constraint(data, k, solver.reached) - data.tightening[k]
+        meant = -games.constraint(data, k, solver.y) - data.tightening[k]
         if not abs(room - meant) <= AGREES * abs(meant):
             return False
     return True

@@ -8,21 +8,20 @@ import sys
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
-from gne_mj.loops.implicit import act
-from gne_mj.loops.newton import RHO, newton, solver_length
+from gne_mj.loops import functions
+from gne_mj.loops.newton import RHO, newton
 from gne_mj.native import kernel
-
-__all__ = ["act", "solver_length"]
 
 _EQUATION = sys.modules[__name__]
 
 
 @kernel
-def solve(law, game, problem, b, memory, work, solver):
+def solve(problem, b, memory, work, solver):
     """Fill solver.y from solver.base and solver.slope; returns how that ended."""
     agents = len(problem.data.offsets) - 1
-    return newton(_EQUATION, law, game, problem, 0, agents, b, True, memory, work, solver)
+    return newton(_EQUATION, problem, 0, agents, b, True, memory, work, solver)
 
 
 @kernel
@@ -32,31 +31,31 @@ def row_of(problem, first, r):
 
 
 @kernel
-def residual(law, game, problem, first, last, memory, work, solver):
+def residual(problem, first, last, memory, work, solver):
     """Fill solver.residual at solver.trial; False if that is not strictly inside."""
     data, y, column, within = problem.data, solver.trial, problem.order.column, problem.order.within
     weight = problem.settings[GAIN] * solver.numbers[RHO]
+    games.values(data, data.all_constraints, y, solver.inverse)
     for k in range(len(solver.inverse)):
-        room = -game.constraint(data.parameters, k, y) - data.tightening[k]
+        room = -solver.inverse[k] - data.tightening[k]
         if not room > 0.0:
             work.now[SHELL] = k
             work.now[SHELL_VALUE] = -room
             return False
         solver.inverse[k] = 1.0 / room
-    law.prepare(problem, first, last, y, memory)
+    functions.pulls(problem, first, last, y, memory, solver.residual)
     for a in range(len(y)):
-        pull = law.pull(game, problem, data.owner[a], a, y, memory)
+        pull = solver.residual[a]
         solver.residual[a] = (y[a] - solver.base[a]) * solver.stiff[a] + pull
+    games.slopes(data, data.all_constraints, problem.order.start, column, y, solver.jacobian)
     for entry in range(len(column)):  # one loop without others inside is twice as fast
         k, a = within[entry], column[entry]
-        slope = game.constraint_gradient(data.parameters, k, a, y)
-        solver.jacobian[entry] = slope
-        solver.residual[a] += weight * solver.inverse[k] * slope
+        solver.residual[a] += weight * solver.inverse[k] * solver.jacobian[entry]
     return True
 
 
 @kernel
-def assemble(law, game, problem, first, last, b, memory, work, solver):
+def assemble(problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
     data, y, start, column = problem.data, solver.trial, problem.order.start, problem.order.column
     at, position, band = data.offsets, problem.order.position, solver.band
@@ -66,7 +65,7 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
         for c in range(2 * b + 1):
             band[r, c] = 0.0
         band[r, b] = solver.stiff[a]
-        law.add_pull_slope(game, problem, i, a, y, memory, solver.row)
+        functions.add_pull_slope(problem, i, a, y, memory, solver.row)
         for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
             j = data.cost_index[member]
             for c in range(at[j], at[j + 1]):
@@ -80,13 +79,13 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
             r, slope = position[a], solver.jacobian[entry] * inverse
             for other in range(start[k], start[k + 1]):
                 c = column[other]
-                second = game.constraint_hessian(data.parameters, k, a, c, y)
+                second = games.constraint_hessian(data, k, a, c, y)
                 second += slope * solver.jacobian[other]
                 band[r, position[c] - r + b] += weight * second
 
 
 @kernel
-def local_length(game, problem, first, last, step, solver):
+def local_length(problem, first, last, step, solver):
     """The step's length in the barrier's own norm, that of the worst action and constraint.
 
     With s = -g - t its square is (dg step / s)^2 + d2g step^2 / s: where a gap vanishes, dg does.
@@ -96,7 +95,7 @@ def local_length(game, problem, first, last, step, solver):
         k, a = order.within[entry], order.column[entry]
         moved = step[order.position[a]]
         change = solver.jacobian[entry] * moved * solver.inverse[k]
-        second = abs(game.constraint_hessian(data.parameters, k, a, a, solver.trial))
+        second = abs(games.constraint_hessian(data, k, a, a, solver.trial))
         change = change * change + second * moved * moved * solver.inverse[k]
         if not change <= greatest:
             greatest = change

@@ -17,9 +17,11 @@ from gne_mj.game import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import FAULT_COLUMNS, Faults, Order, Problem, Work, work_sizes
-from gne_mj.native import kernel
+from gne_mj.native import kernel, shaped
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
-from gne_mj.table import floats, integers
+from gne_mj.table import Table, floats, integers
 
 # Behind the plant's arrays: the game's (as in GameData), the graph's, the propagator's, the rest
 PLANT_TABLE = 3
@@ -29,12 +31,14 @@ PROPAGATOR = GRAPH + len(GraphData._fields)
 SCHEDULE = PROPAGATOR + 3
 ORDER = SCHEDULE + 1
 FAULTS = ORDER + len(Order._fields)
-SETTINGS, LIMIT, EQUILIBRIUM, SIZE, PARAMETERS, REST, STEP, CLOCK = range(FAULTS + 3, FAULTS + 11)
+(
+    SETTINGS, LIMIT, EQUILIBRIUM, SIZE, FUNCTIONS, AGENT_FUNCTIONS, PARAMETERS, REST, STEP, CLOCK,
+) = range(FAULTS + 3, FAULTS + 13)  # fmt: skip
 # Entries of STEP: what a loop is made of
 (
     ACTIONS, CONSTRAINTS, AGENTS, STATES, MEMORY, EVALUATIONS, PERIOD, MODE, HISTORY, SOLVER,
-    METHOD,
-) = range(11)  # fmt: skip
+    METHOD, OUTPUT,
+) = range(12)  # fmt: skip
 
 # A room's first entries
 STEP_NOW, STAGE_NOW, RECORDER, MONITOR = range(4)
@@ -62,7 +66,7 @@ class Setup(NamedTuple):
 def table_arrays(
     plant: Sequence[NDArray[Any]],
     setup: Setup,
-    parameters: NDArray[np.float64],
+    agents: Agents,
     memory: int,
     stages: int,
 ) -> list[NDArray[Any]]:
@@ -71,15 +75,15 @@ def table_arrays(
     Args:
         plant: the plant's own, PLANT_TABLE of them.
         setup: of the run.
-        parameters: (m, numbers of the agents' type).
+        agents: the agents.
         memory: entries of the law's memory.
         stages: evaluations of the dynamics in one step.
     """
     problem, clock = setup.problem, setup.clock
-    p, agents = len(problem.data.member_pointer) - 1, len(problem.data.offsets) - 1
+    p = len(problem.data.member_pointer) - 1
     steps = (
-        *(len(parameters), p, agents, setup.rest.shape[1], memory, stages),
-        *(clock.period, clock.mode, setup.history, setup.solver, clock.method),
+        *(agents.channels, p, len(problem.data.offsets) - 1, setup.rest.shape[1], memory, stages),
+        *(clock.period, clock.mode, setup.history, setup.solver, clock.method, agents.kind.OUTPUT),
     )
     return [
         *plant,
@@ -93,11 +97,25 @@ def table_arrays(
         problem.limit,
         problem.equilibrium,
         problem.size,
-        np.ascontiguousarray(parameters),
+        problem.functions,
+        compiled_functions(agents.kind),
+        np.ascontiguousarray(agents.parameters),
         np.ascontiguousarray(setup.rest),
         np.array(steps, dtype=np.int64),
         np.array([clock.h]),
     ]
+
+
+def ode_table(setup: Setup, agents: Agents, memory: int) -> Table:
+    """The table of a run of ODE agents; ``memory`` is the length of the law's."""
+    nothing = [np.zeros(0)] * PLANT_TABLE
+    return Table(table_arrays(nothing, setup, agents, memory, 1))
+
+
+def in_table(setup: Setup, agents: Agents, memory: int) -> tuple[Problem, Table]:
+    """A run's problem as Python calls its law's functions with; keep the table meanwhile."""
+    table = ode_table(setup, agents, memory)
+    return setup.problem._replace(table=table.address), table
 
 
 @kernel
@@ -123,12 +141,15 @@ def problem_in(table):
         integers(table, GAME + 7),
         integers(table, GAME + 8),
         floats(table, GAME + 9),
+        integers(table, GAME + 10),
+        integers(table, GAME + 11),
+        integers(table, GAME + 12),
     )
     graph = GraphData(integers(table, GRAPH), integers(table, GRAPH + 1))
     agents = len(data.offsets) - 1
     maps = floats(table, PROPAGATOR)
     propagator = Propagator(
-        maps.reshape((len(maps) // (agents * agents), agents, agents)),
+        shaped(maps, (len(maps) // (agents * agents), agents, agents)),
         floats(table, PROPAGATOR + 1),
         floats(table, PROPAGATOR + 2),
     )
@@ -149,6 +170,8 @@ def problem_in(table):
         ),
         faults_in(table),
         floats(table, SIZE),
+        integers(table, FUNCTIONS),
+        table,
     )
 
 
@@ -157,7 +180,7 @@ def faults_in(table):
     """The run's faults, from its table."""
     rows = floats(table, FAULTS)
     return Faults(
-        rows.reshape((len(rows) // FAULT_COLUMNS, FAULT_COLUMNS)),
+        shaped(rows, (len(rows) // FAULT_COLUMNS, FAULT_COLUMNS)),
         integers(table, FAULTS + 1),
         floats(table, FAULTS + 2),
     )
@@ -171,11 +194,16 @@ def clock_in(table):
 
 
 @kernel
-def channels_in(table, m, states):
+def channels_in(table):
     """The agents' channels, from a run's table."""
-    parameters = floats(table, PARAMETERS)
-    rest = floats(table, REST)
-    return Channels(parameters.reshape((m, len(parameters) // m)), rest.reshape((m, states)))
+    steps, parameters = integers(table, STEP), floats(table, PARAMETERS)
+    m, states = steps[ACTIONS], steps[STATES]
+    return Channels(
+        shaped(parameters, (m, len(parameters) // m)),
+        shaped(floats(table, REST), (m, states)),
+        integers(table, AGENT_FUNCTIONS),
+        steps[OUTPUT],
+    )
 
 
 @kernel

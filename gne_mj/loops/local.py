@@ -16,18 +16,17 @@ import sys
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
-from gne_mj.loops.implicit import act
-from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton, solver_length
+from gne_mj.loops import functions
+from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton
 from gne_mj.native import copy, kernel
-
-__all__ = ["act", "solver_length"]
 
 _EQUATION = sys.modules[__name__]
 
 
 @kernel
-def solve(law, game, problem, b, memory, work, solver):
+def solve(problem, b, memory, work, solver):
     """Fill solver.y agent by agent; returns the worst way in which one ended.
 
     If an agent has no action at all, work.now says at which constraint.
@@ -35,10 +34,10 @@ def solve(law, game, problem, b, memory, work, solver):
     at, worst = problem.data.offsets, SOLVED
     copy(solver.anchor, solver.mixed)
     for i in range(len(at) - 1):
-        moves = law.own_profile(problem, i, solver.anchor, memory, work.profile)
+        moves = functions.own_profile(problem, i, solver.anchor, memory, work.profile)
         solver.numbers[MOVES] = moves
         copy(work.profile[at[i] : at[i + 1]], solver.own[at[i] : at[i + 1]])
-        ended = newton(_EQUATION, law, game, problem, i, i + 1, b, False, memory, work, solver)
+        ended = newton(_EQUATION, problem, i, i + 1, b, False, memory, work, solver)
         copy(solver.anchor[at[i] : at[i + 1]], solver.mixed[at[i] : at[i + 1]])
         worst = max(worst, ended)
         if ended == OUTSIDE:
@@ -70,28 +69,27 @@ def look_along(problem, k, first, work, solver):
 
 
 @kernel
-def residual(law, game, problem, first, last, memory, work, solver):
+def residual(problem, first, last, memory, work, solver):
     """Fill the agent's entries of solver.residual at solver.trial; False if it has no action."""
     data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
     low, high = data.offsets[first], data.offsets[first + 1]
     for a in range(low, high):
         solver.mixed[a] = solver.trial[a]
-    law.prepare(problem, first, last, solver.mixed, memory)
+    functions.pulls(problem, first, last, solver.mixed, memory, solver.residual)
     for a in range(low, high):
-        total = (solver.mixed[a] - solver.base[a]) * solver.stiff[a]
-        solver.residual[a] = total + law.pull(game, problem, first, a, solver.mixed, memory)
+        solver.residual[a] += (solver.mixed[a] - solver.base[a]) * solver.stiff[a]
     slot = 0
     for entry in range(data.own_pointer[first], data.own_pointer[first + 1]):
         k = data.own_index[entry]
         look_along(problem, k, first, work, solver)
-        room = -game.constraint(data.parameters, k, work.profile) - data.tightening[k]
+        room = -games.constraint(data, k, work.profile) - data.tightening[k]
         if not room > 0.0:
             work.now[SHELL] = k
             work.now[SHELL_VALUE] = -room
             return False
         solver.inverse[k] = 1.0 / room
         for a in range(low, high):
-            slope = game.constraint_gradient(data.parameters, k, a, work.profile)
+            slope = games.constraint_gradient(data, k, a, work.profile)
             solver.jacobian[slot] = slope
             solver.residual[a] += gain * rho * solver.inverse[k] * slope
             slot += 1
@@ -99,7 +97,7 @@ def residual(law, game, problem, first, last, memory, work, solver):
 
 
 @kernel
-def assemble(law, game, problem, first, last, b, memory, work, solver):
+def assemble(problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
     data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
     at, band = data.offsets, solver.band
@@ -107,7 +105,7 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
     for a in range(low, high):
         for c in range(2 * b + 1):
             band[a - low, c] = 0.0
-        law.add_pull_slope(game, problem, first, a, solver.mixed, memory, solver.row)
+        functions.add_pull_slope(problem, first, a, solver.mixed, memory, solver.row)
         for member in range(data.cost_pointer[first], data.cost_pointer[first + 1]):
             j = data.cost_index[member]
             for c in range(at[j], at[j + 1]):
@@ -120,16 +118,16 @@ def assemble(law, game, problem, first, last, b, memory, work, solver):
         scale = look_along(problem, k, first, work, solver)
         weight = gain * rho * solver.inverse[k] * scale
         for a in range(low, high):
-            slope = game.constraint_gradient(data.parameters, k, a, work.profile)
+            slope = games.constraint_gradient(data, k, a, work.profile)
             slope *= solver.inverse[k]
             for c in range(low, high):
-                second = game.constraint_hessian(data.parameters, k, a, c, work.profile)
-                second += slope * game.constraint_gradient(data.parameters, k, c, work.profile)
+                second = games.constraint_hessian(data, k, a, c, work.profile)
+                second += slope * games.constraint_gradient(data, k, c, work.profile)
                 band[a - low, c - a + b] += weight * second
 
 
 @kernel
-def local_length(game, problem, first, last, step, solver):
+def local_length(problem, first, last, step, solver):
     """The step's length in the barrier's own norm, as :func:`gne_mj.loops.joint.local_length`."""
     data, greatest, slot = problem.data, 0.0, 0
     low, high = data.offsets[first], data.offsets[first + 1]
@@ -138,7 +136,7 @@ def local_length(game, problem, first, last, step, solver):
         for a in range(low, high):
             moved = pace(problem, k, solver) * step[a - low]
             change = solver.jacobian[slot] * moved * solver.inverse[k]
-            second = abs(game.constraint_hessian(data.parameters, k, a, a, solver.mixed))
+            second = abs(games.constraint_hessian(data, k, a, a, solver.mixed))
             change = change * change + second * moved * moved * solver.inverse[k]
             if not change <= greatest:
                 greatest = change

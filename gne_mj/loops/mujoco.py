@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
 from gne_mj.game import Game
-from gne_mj.loops import division, explicit, faultless
+from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import NO_SIZES, Sizes
@@ -97,9 +97,6 @@ def restore(functions, model, data, row):
 def build(
     at: Offsets,
     fleet: ModuleType,
-    law: ModuleType,
-    game: ModuleType,
-    acting: ModuleType,
     faults: ModuleType,
 ) -> tuple[Any, ...]:
     """The callbacks for control and memory, and the native loop.
@@ -107,11 +104,9 @@ def build(
     Args:
         at: where MuJoCo keeps what.
         fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
-        law, game, acting, faults: modules of kernels, as :func:`gne_mj.loops.ode.look` has them.
+        faults: module of kernels, as :func:`gne_mj.loops.ode.look` has it.
     """
-    agent, plant = fleet.AGENT, fleet.AHEAD
-    states = len(agent.STATES)
-    source = source_key(fleet, agent, law, game)
+    plant, source = fleet.AHEAD, source_key(fleet)
 
     def control(model, data):
         _ = source
@@ -141,17 +136,17 @@ def build(
             state = later
         if stage > 0 or divided[division.KNOWN] == division.NOTHING:
             fleet.gather(at, struct, table, state)
-        channels = channels_in(table, m, states)
+        channels = channels_in(table)
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
         context = (at, address_of(model), struct, table)
         good = monitor[watch.EXIT] == watch.INSIDE and look(
-            acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
-            stage, storage, state, memory, u, monitor, work,
+            faults, plant, context, problem, channels, clock, time, step, stage, storage, state,
+            memory, u, monitor, work,
         )  # fmt: skip
         block = np.int64(userdata[start + RECORDER])
         if good and stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
             qpos = field(struct, at.qpos, sizes[NQ])
-            record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos)
+            record(block, faults, channels, problem, clock, step, state, u, memory, work, qpos)
         if good and mode == CONTINUOUS:
             division.note(stage, problem, work)
         places = integers(table, PLACES)
@@ -171,7 +166,7 @@ def build(
         work = parts_of(userdata, sizes[ROOM], steps)[2]
         memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
         seen = faults.choose(work.y, work.seen)
-        law.rate(problem_in(table), seen, memory, rates)
+        functions.rate(problem_in(table), seen, memory, rates)
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
     def advance(mj_step, functions, model, data, saved, count):
@@ -189,7 +184,7 @@ def build(
         userdata = field(data, at.userdata, sizes[NUSERDATA])
         start, moving = sizes[ROOM], steps[MODE] == CONTINUOUS
         monitor, u, work, rest = parts_of(userdata, start, steps)
-        state, channels = split(rest, steps)[0], channels_in(table, steps[ACTIONS], states)
+        state, channels = split(rest, steps)[0], channels_in(table)
         memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
         problem, clock, divided = problem_in(table), clock_in(table), work.division
         step, done, h = np.int64(userdata[start + STEP_NOW]), 0, clock.h
@@ -217,9 +212,9 @@ def build(
                 fleet.refresh(model, data, table)
                 fleet.gather(at, data, table, state)
                 good = look(
-                    explicit, faults, plant, (at, model, data, table), agent, law, game, problem,
-                    channels, clock, division.ends(divided, step, h), step, division.END, 0.0,
-                    state, memory, u, monitor, work,
+                    faults, plant, (at, model, data, table), problem, channels, clock,
+                    division.ends(divided, step, h), step, division.END, 0.0, state, memory, u,
+                    monitor, work,
                 )  # fmt: skip
             which = division.judge(steps[EVALUATIONS], length, problem, work) if good else 0
             if good and which < 0:
@@ -254,7 +249,7 @@ def room(
     Args:
         game, agents: of the loop.
         memory: length of the law's memory.
-        mode: CONTINUOUS or HELD of :mod:`gne_mj.loops.ode`.
+        mode: one of MODES of :mod:`gne_mj.loops.ode`.
         sizes: of the scratch arrays that depend on the kind of loop.
     """
     needed = room_needed(game.actions, game.constraints_count, game.agents, *sizes)
@@ -266,9 +261,7 @@ def mujoco_table(
     plant: "MujocoPlant | MjcfPlant", setup: Setup, agents: Agents, memory: int
 ) -> Table:
     """The table of a run: the plant's places and sizes, the robots' numbers, and the rest."""
-    arrays = table_arrays(
-        plant.arrays_for(agents), setup, agents.parameters, memory, STAGES[plant.integrator]
-    )
+    arrays = table_arrays(plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator])
     return Table(arrays)
 
 
@@ -277,26 +270,20 @@ class MujocoLoop(ClosedLoop):
 
     Args:
         plant: the fleet, reset to its start, with :func:`room` in its userdata and for the memory.
-        law, game: modules of kernels.
         setup: what the run is made of.
         memory: the law's, at the start.
-        acting, faults: modules of kernels, see :func:`gne_mj.loops.ode.look`.
+        faults: module of kernels, see :func:`gne_mj.loops.ode.look`.
     """
 
     def __init__(
         self,
         plant: "MujocoPlant | MjcfPlant",
-        law: ModuleType,
-        game: ModuleType,
         setup: Setup,
         memory: NDArray[np.float64],
-        acting: ModuleType = explicit,
         faults: ModuleType = faultless,
     ) -> None:
         self.plant = plant
-        self._control, self._remember, self._advance = build(
-            offsets(), plant.kernels, law, game, acting, faults
-        )
+        self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
         self._table = mujoco_table(plant, setup, plant.agents, len(memory))
         self._faulty = faults is not faultless
         data, sizes = plant.data, self._table.arrays[STEP]

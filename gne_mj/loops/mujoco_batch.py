@@ -41,7 +41,7 @@ class MujocoBatch(BatchLoop):
 
     Args:
         plant: such a fleet, with room for the runs' loop.
-        law, game, acting, faults: modules of kernels, see :func:`gne_mj.loops.mujoco.build`.
+        faults: module of kernels, see :func:`gne_mj.loops.mujoco.build`.
         faulty: whether runs record what was seen and what acted.
         threads: how many.
     """
@@ -49,17 +49,12 @@ class MujocoBatch(BatchLoop):
     def __init__(
         self,
         plant: "MujocoPlant | MjcfPlant",
-        law: ModuleType,
-        game: ModuleType,
-        acting: ModuleType,
         faults: ModuleType,
         faulty: bool,
         threads: int,
     ) -> None:
         self._passive, self._faulty, self._threads = plant.passive, faulty, threads
-        self._control, self._remember, self._advance = build(
-            offsets(), plant.kernels, law, game, acting, faults
-        )
+        self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
         self._start = int(plant.table_arrays[SIZES][ROOM])
         self._fleets: SimpleQueue[_Fleet] = SimpleQueue()
         for number in range(threads):

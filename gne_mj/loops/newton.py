@@ -121,7 +121,7 @@ def solver_in(flat, m, p, states, b):
 
 
 @kernel
-def newton(equation, law, game, problem, first, last, b, reuse, memory, work, solver):
+def newton(equation, problem, first, last, b, reuse, memory, work, solver):
     """Solve for the outputs solver.y of agents ``first`` to ``last`` - 1, from solver.y.
 
     If that is not in the domain, the outputs seen now or those that the last solution expected are
@@ -148,7 +148,7 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
             numbers[RHO] *= RAISE
             length, patience = 0.0, PATIENCE
             copy(y[low:high], trial[low:high])
-        good = equation.residual(law, game, problem, first, last, memory, work, solver)
+        good = equation.residual(problem, first, last, memory, work, solver)
         if length == 0.0 and not good:
             patience = PATIENCE
             if starts == 2:
@@ -174,15 +174,13 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         if usable:
             banded.solve_definite(solver.band, n, b, solver.old_step)
             if numbers[USES] < MOST_USES:
-                remaining = equation.local_length(
-                    game, problem, first, last, solver.old_step, solver
-                )
+                remaining = equation.local_length(problem, first, last, solver.old_step, solver)
                 if remaining * max(numbers[LEAVES], remaining) <= ACCURATE:
                     numbers[USES] += 1.0
                     for r in range(low, high):
                         y[r] += solver.old_step[equation.row_of(problem, first, r)]
                     return SOLVED
-        equation.assemble(law, game, problem, first, last, b, memory, work, solver)
+        equation.assemble(problem, first, last, b, memory, work, solver)
         numbers[USES] = 0.0
         if not banded.factorise_definite(solver.band, n, b):
             return UNSOLVED
@@ -198,7 +196,7 @@ def newton(equation, law, game, problem, first, last, b, reuse, memory, work, so
         else:
             numbers[LEAVES] = 1.0
         numbers[USES] = 1.0
-        remaining = equation.local_length(game, problem, first, last, step, solver)
+        remaining = equation.local_length(problem, first, last, step, solver)
         if not remaining < np.inf:
             return UNSOLVED
         length = 1.0

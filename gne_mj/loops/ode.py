@@ -14,17 +14,16 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gne_mj.loops import division, explicit, faultless
+from gne_mj.loops import division, faultless, functions, implicit
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
-from gne_mj.loops.feedback import inside
+from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
     ACTIONS,
     AGENTS,
     CONSTRAINTS,
     HISTORY,
     MEMORY,
-    PLANT_TABLE,
     RECORDER,
     SOLVER,
     STATES,
@@ -33,62 +32,40 @@ from gne_mj.loops.layout import (
     Setup,
     channels_in,
     clock_in,
+    ode_table,
     parts_of,
     problem_in,
     room_needed,
-    table_arrays,
 )
 from gne_mj.loops.recorder import Recorder, record
-from gne_mj.native import callback, copy, kernel, source_key
+from gne_mj.native import callback, copy, kernel, shaped, source_key
+from gne_mj.plants import functions as agents_functions
 from gne_mj.plants import held_map
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.ode import RK4, held_step
-from gne_mj.table import Table, floats_at, integers
+from gne_mj.plants.functions import EULER, RK4
+from gne_mj.table import floats_at, integers
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
 # Rates at four stages, a trial state, the state at the start of a divided step, and scratch
 SCRATCH_ROWS = 7
 
-# Mode implicit is held like sampled; what differs is how the input is found, a module of its own
-CONTINUOUS, HELD = 0, 1
-MODES = {"continuous": CONTINUOUS, "sampled": HELD, "implicit": HELD}
+CONTINUOUS, SAMPLED, IMPLICIT = range(3)
+MODES = {"continuous": CONTINUOUS, "sampled": SAMPLED, "implicit": IMPLICIT}
 
 
 @kernel
-def measure(agent, state, states, y):
+def measure(channels, state, y):
     """Fill y (m,) with the outputs of a flat state: the channels' states, then the memory."""
+    states = channels.rest.shape[1]
     for r in range(len(y)):
-        y[r] = state[r * states + agent.OUTPUT]
-
-
-@kernel
-def stored(agent, channels, state):
-    """V^{x*} of all channels."""
-    states = channels.rest.shape[1]
-    total = 0.0
-    for r in range(len(channels.rest)):
-        x = state[r * states : (r + 1) * states]
-        total += agent.storage(channels.parameters[r], x, channels.rest[r])
-    return total
-
-
-@kernel
-def stored_keeping(agent, channels, state, known):
-    """The same; known (m,) is filled with what the rates at this state need again."""
-    states = channels.rest.shape[1]
-    total = 0.0
-    for r in range(len(channels.rest)):
-        q, x = channels.parameters[r], state[r * states : (r + 1) * states]
-        known[r] = agent.shared(q, x)
-        total += agent.storage_given(q, x, channels.rest[r], known[r])
-    return total
+        y[r] = state[r * states + channels.output]
 
 
 @kernel
 def look(
-    acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step, stage,
-    storage, state, memory, u, monitor, work,
+    faults, plant, context, problem, channels, clock, time, step, stage, storage, state, memory, u,
+    monitor, work,
 ):  # fmt: skip
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
@@ -99,16 +76,14 @@ def look(
     and of the time to compile them.
 
     Args:
-        acting: module that finds the law's input, :mod:`gne_mj.loops.explicit` and its like.
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
         plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
         context: what that module needs of the engine.
-        agent, law, game: modules of kernels.
         problem, channels, clock: as the loop has them.
         time: at the stage, in s.
         step: which step this is.
         stage: 0 at its start; later ones, and division.END, in mode continuous only.
-        storage: V^{x*} of the agents now (see :func:`stored`); read at stage 0.
+        storage: V^{x*} of the agents now; read at stage 0.
         state: flat, channel after channel, at the stage.
         memory: the law's at the stage; own actions are written into it, and in the held modes it
             moves on when a control period has passed.
@@ -123,8 +98,8 @@ def look(
     work.division[division.KNOWN] = division.NOTHING
     instant = clock.mode == CONTINUOUS or step % clock.period == 0
     if known == division.NOTHING:
-        measure(agent, state, channels.rest.shape[1], y)
-        if not inside(game, problem, time, max(stage, 0), y, work, monitor):
+        measure(channels, state, y)
+        if not inside(problem, time, max(stage, 0), y, work, monitor):
             if not instant:
                 monitor[watch.EXIT_BETWEEN] = 1.0
             return False
@@ -135,13 +110,18 @@ def look(
         faults.deliver(problem, clock, step, stage, work)
     elif instant:
         if clock.mode != CONTINUOUS and work.stands[0] < step:  # a control period has passed
-            law.propagate(problem, work.held, memory, work.scratch)
+            functions.propagate(problem, work.held, memory, work.scratch)
             work.stands[0] = step
-        faults.begin(agent, problem, clock, step, stage, state, memory, work)
-        if not acting.act(
-            acting, faults, plant, context, agent, law, game, problem, channels, clock, time, step,
-            max(stage, 0), state, memory, work, monitor,
-        ):  # fmt: skip
+        faults.begin(channels, problem, clock, step, stage, state, memory, work)
+        if clock.mode == IMPLICIT:
+            good = implicit.act(
+                faults, plant, context, problem, channels, clock, time, step, stage, state, memory,
+                work, monitor,
+            )  # fmt: skip
+        else:
+            seen = faults.sense(problem, clock, step, stage, work, y, work.seen)
+            good = explicit_law(problem, time, max(stage, 0), seen, memory, work, monitor)
+        if not good:
             return False
         if stage == division.END:
             work.division[division.KNOWN] = division.LAW
@@ -151,25 +131,10 @@ def look(
         copy(u, work.u)
     if stage == 0:
         before = work.u if clock.mode == CONTINUOUS else u
-        storage += law.storage(problem, memory)
+        storage += functions.storage(problem, memory)
         watch.observe(monitor, time, y, work.g, work.demand, before, work.u, storage)
         copy(work.u, u)
     return True
-
-
-@kernel
-def rates(agent, law, problem, channels, stage, state, known, u, y, out):
-    """Fill out with the rate of the flat state under u (m,), the law having acted at y (m,).
-
-    ``known`` (m,) is at stage 0 what :func:`stored_keeping` has found for this state; else changed.
-    """
-    m, states = channels.rest.shape
-    for r in range(m):
-        x, rate = state[r * states : (r + 1) * states], out[r * states : (r + 1) * states]
-        if stage > 0:
-            known[r] = agent.shared(channels.parameters[r], x)
-        agent.rate_given(channels.parameters[r], x, u[r], known[r], rate)
-    law.rate(problem, y, state[m * states :], out[m * states :])
 
 
 @kernel
@@ -182,7 +147,7 @@ def stage_state(stage, h, state, k, trial):
 
 @kernel
 def piece_end(
-    agent, faults, problem, channels, clock, step, length, u, state, k, trial, work
+    faults, problem, channels, clock, step, length, u, state, k, trial, scratch, work
 ):  # fmt: skip
     """Fill trial with the flat state at the end of a piece, mode continuous.
 
@@ -191,36 +156,30 @@ def piece_end(
         u: (m,) inputs at its start.
         state: flat, at its start.
         k: (4, ...) rates at its stages.
+        scratch: overwritten.
     """
-    m, states = channels.rest.shape
     if clock.method == RK4:
         for r in range(len(state)):
             rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
             trial[r] = state[r] + length / 6.0 * rise
         return
     acts = faults.push(problem, clock, step, u, work.acts)
-    for r in range(m):
-        at, end = r * states, (r + 1) * states
-        agent.euler_step(channels.parameters[r], state[at:end], acts[r], length, trial[at:end])
-    for r in range(m * states, len(state)):  # Euler's method for the memory
+    size = channels.rest.size
+    copy(state[:size], trial[:size])
+    agents_functions.roll(channels, EULER, length, 1, trial, acts, scratch)
+    for r in range(size, len(state)):  # Euler's method for the memory
         trial[r] = state[r] + length * k[0, r]
 
 
 @cache
-def build(
-    agent: ModuleType,
-    law: ModuleType,
-    game: ModuleType,
-    acting: ModuleType = explicit,
-    faults: ModuleType = faultless,
-) -> Any:
-    """The native loop for an agent type, a law and a game: a C function.
+def build(faults: ModuleType = faultless) -> Any:
+    """The native loop of all agents, laws and games: a C function.
 
     It takes the addresses of a run's table and room, and moves the run on by so many steps, or,
     if that is 0, observes the present state without moving on. It returns 0 once the run has left,
     else 1. Behind the room's other parts are [flat state, memory, scratch].
     """
-    source = source_key(agent, law, game)
+    source = source_key()
 
     def advance(table, address, count):
         _ = source
@@ -228,14 +187,14 @@ def build(
         m, states = sizes[ACTIONS], sizes[STATES]
         size, n = m * states, m * states + sizes[MEMORY]
         room = floats_at(address, room_length(sizes))
-        problem, clock, channels = problem_in(table), clock_in(table), channels_in(table, m, states)
+        problem, clock, channels = problem_in(table), clock_in(table), channels_in(table)
         monitor, u, work, rest = parts_of(room, 0, sizes)
         if monitor[watch.EXIT] != watch.INSIDE:
             return 0
         state, scratch, h = rest[:n], rest[n:], clock.h
         width = len(scratch) // SCRATCH_ROWS
         # of the state's own length, so that the memory behind the channels has its own too
-        k, trial = scratch[: 4 * width].reshape((4, width)), scratch[4 * width : 4 * width + n]
+        k, trial = shaped(scratch, (4, width)), scratch[4 * width : 4 * width + n]
         begun, spare = scratch[5 * width : 5 * width + n], scratch[6 * width :]
         step, block = np.int64(room[STEP_NOW]), np.int64(room[RECORDER])
         moving = clock.mode == CONTINUOUS and count > 0
@@ -246,12 +205,12 @@ def build(
             if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
                 copy(state, begun)
             time, length, stage = division.begins(divided, step, h), division.piece(divided, h), 0
-            storage = stored_keeping(agent, channels, state, spare)
+            storage = agents_functions.stored(channels, state, spare)
             for point in range(stages + 1 if moving else 1):
                 now, stage, at = state, point, time
                 if point == stages:
                     piece_end(
-                        agent, faults, problem, channels, clock, step, length, u, state, k, trial,
+                        faults, problem, channels, clock, step, length, u, state, k, trial, spare,
                         work,
                     )  # fmt: skip
                     now, stage, at = trial, division.END, division.ends(divided, step, h)
@@ -259,28 +218,28 @@ def build(
                     stage_state(point, length, state, k, trial)
                     now, at = trial, time + (0.5 * length, 0.5 * length, length)[point - 1]
                 good = look(
-                    acting, faults, held_map, (), agent, law, game, problem, channels, clock, at,
-                    step, stage, storage, now, now[size:], u, monitor, work,
+                    faults, held_map, (), problem, channels, clock, at, step, stage, storage,
+                    now, now[size:], u, monitor, work,
                 )  # fmt: skip
                 if not good:
                     break
                 if stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
                     record(
-                        block, faults, agent, states, problem, clock, step, state[:size], u,
+                        block, faults, channels, problem, clock, step, state[:size], u,
                         state[size:], work, state[:0],
                     )  # fmt: skip
                 if moving and point < stages:
                     division.note(stage, problem, work)
                     acts = faults.push(problem, clock, step, work.u, work.acts)
                     seen = faults.choose(work.y, work.seen)
-                    rates(
-                        agent, law, problem, channels, stage, now, spare, acts, seen, k[point, :n]
-                    )  # fmt: skip
+                    if clock.method == RK4:
+                        agents_functions.rates(channels, stage, now, acts, spare, k[point])
+                    functions.rate(problem, seen, now[size:n], k[point, size:n])
             if count == 0 or (not good and stage == 0):
                 break
             if not moving:
                 acts = faults.push(problem, clock, step, u, work.acts)
-                held_step(agent, channels.parameters, states, clock.method, h, state, acts, spare)
+                agents_functions.roll(channels, clock.method, h, 1, state, acts, spare)
                 step, done = step + 1, done + 1
                 if done == count:
                     break
@@ -328,36 +287,26 @@ def room_length(sizes):
     )
 
 
-def ode_table(setup: Setup, agents: Agents, memory: int) -> Table:
-    """The table of a run of ODE agents; ``memory`` is the length of the law's."""
-    nothing = [np.zeros(0)] * PLANT_TABLE
-    return Table(table_arrays(nothing, setup, agents.parameters, memory, 1))
-
-
 class OdeLoop(ClosedLoop):
     """The closed loop of ODE agents with a fixed step.
 
     Args:
         agents: the agents.
-        law, game: modules of kernels.
         setup: what the run is made of.
         state: (m, states) at the start.
         memory: the law's, at the start.
-        acting, faults: modules of kernels, see :func:`look`.
+        faults: module of kernels, see :func:`look`.
     """
 
     def __init__(
         self,
         agents: Agents,
-        law: ModuleType,
-        game: ModuleType,
         setup: Setup,
         state: NDArray[np.float64],
         memory: NDArray[np.float64],
-        acting: ModuleType = explicit,
         faults: ModuleType = faultless,
     ) -> None:
-        self._advance = build(agents.kind, law, game, acting, faults).ctypes
+        self._advance = build(faults).ctypes
         self._agents = agents
         self._table = ode_table(setup, agents, len(memory))
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)

@@ -9,8 +9,7 @@ from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
 from gne_mj.loops.layout import MONITOR, RECORDER
 from gne_mj.loops.ode import SCRATCH_ROWS, build, room_length, scratch_width
 from gne_mj.loops.recorder import FIRST
-from gne_mj.native import call_loop, compiled
-from gne_mj.plants.agents import Agents
+from gne_mj.native import call_integer, compiled
 
 PIECE = 8  # runs that a thread takes at a time
 STRIDE = 20_000  # steps of each of them between looks at the user's wishes
@@ -20,30 +19,25 @@ STRIDE = 20_000  # steps of each of them between looks at the user's wishes
 def _advance_each(advance, tables, rooms, steps):
     """Move every run on, one after the other; addresses of tables and rooms."""
     for run in range(len(tables)):
-        call_loop(advance, tables[run], rooms[run], steps)
+        call_integer(advance, (tables[run], rooms[run], steps))
 
 
 class OdeBatch(BatchLoop):
     """Runs of ODE agents with a fixed step.
 
     Args:
-        agents: of the runs' type.
-        law, game, acting, faults: modules of kernels, see :func:`gne_mj.loops.ode.build`.
+        faults: module of kernels, see :func:`gne_mj.loops.ode.build`.
         faulty: whether runs record what was seen and what acted.
         threads: how many.
     """
 
     def __init__(
         self,
-        agents: Agents,
-        law: ModuleType,
-        game: ModuleType,
-        acting: ModuleType,
         faults: ModuleType,
         faulty: bool,
         threads: int,
     ) -> None:
-        self._advance = build(agents.kind, law, game, acting, faults)
+        self._advance = build(faults)
         self._faulty, self._threads = faulty, threads
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:

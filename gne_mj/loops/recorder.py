@@ -27,7 +27,7 @@ def write(block, index, rows, row, source):
 
 
 @kernel
-def record(block, faults, agent, states, problem, clock, step, state, u, memory, work, qpos):
+def record(block, faults, channels, problem, clock, step, state, u, memory, work, qpos):
     """Write this step's row, if one is due; state, u and qpos are flat, as at its start."""
     head = integers_at(block, HEADER)
     behind, rows = step - head[FIRST], head[ROWS]
@@ -41,9 +41,7 @@ def record(block, faults, agent, states, problem, clock, step, state, u, memory,
     seen, acts = floats(block, SEEN), floats(block, ACTS)
     width = len(seen) // rows
     at, end = row * width, (row + 1) * width
-    faults.record(
-        agent, states, problem, clock, step, state, u, work, seen[at:end], acts[at:end]
-    )  # fmt: skip
+    faults.record(channels, problem, clock, step, state, u, work, seen[at:end], acts[at:end])
     head[DONE] = row + 1
 
 

@@ -9,8 +9,8 @@ modes. The modes are integrated beside the estimates that the law reads; since t
 with linear maps, both are the same solution.
 """
 
+import math
 from functools import cache
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,13 +22,15 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import add_from_modes, modes_of, to_modes
 from gne_mj.loops.feedback import Problem, feedback, work
-from gne_mj.loops.layout import Setup
+from gne_mj.loops.layout import Setup, in_table
 from gne_mj.loops.linear import add_multiple
-from gne_mj.loops.ode import measure, stored
+from gne_mj.loops.ode import measure
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
 from gne_mj.loops.stage_system import StageSystem, linearise, prepare, solve_stage, stage_system
 from gne_mj.native import compiled, copy, kernel, source_key
-from gne_mj.plants.agents import input_columns
+from gne_mj.plants import functions as agents_functions
+from gne_mj.plants.agents import Agents, input_columns
+from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
 
 # How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
@@ -54,22 +56,20 @@ class Solver(NamedTuple):
 
 @kernel
 def look(
-    agent, law, game, problem, channels, states, time, state, monitor, latch, work, u
+    problem, channels, time, state, monitor, latch, work, known, u
 ):  # fmt: skip
     """Measure, act and observe; fill u. False, with the exit in ``latch``, if there is no input."""
     y = work.y
-    measure(agent, state, states, y)
-    if not feedback(
-        law, game, problem, time, 0, y, state[len(y) * states :], work, latch, u
-    ):  # fmt: skip
+    measure(channels, state, y)
+    if not feedback(problem, time, 0, y, state[channels.rest.size :], work, latch, u):
         return False
-    storage = stored(agent, channels, state)
+    storage = agents_functions.stored(channels, state, known)
     watch.observe(monitor, time, y, work.g, work.demand, u, u, storage)
     return True
 
 
 @kernel
-def error_of(agent, agents, method, states, state, solver):
+def error_of(output, agents, method, states, state, solver):
     """Weighted estimate of the step's error, 1 being what is allowed: the worst of all states.
 
     A state is compared with its greatest magnitude so far in any channel, z and the estimates
@@ -84,7 +84,7 @@ def error_of(agent, agents, method, states, state, solver):
         allowed = method.atol + method.rtol * magnitude(states, state, solver, a)
         for r in range(m):
             error = abs(k[r * states + a])
-            if a == agent.OUTPUT:
+            if a == output:
                 total = 0.0
                 for mode in range(at_z + m + r, len(k), m):
                     total += k[mode] ** 2
@@ -108,7 +108,7 @@ def magnitude(states, state, solver, a):
 
 @kernel
 def try_step(
-    law, agent, game, problem, channels, modes, method, states, time, h, state, u, work, solver
+    problem, channels, modes, method, states, time, h, state, u, work, solver
 ):  # fmt: skip
     """Fill trial with the flat vector after a step of length h; return its weighted error.
 
@@ -117,7 +117,7 @@ def try_step(
     size, agents = len(u) * states, len(problem.data.offsets) - 1
     trial, k = solver.trial, solver.k
     solver.exit[watch.EXIT] = watch.INSIDE
-    if not prepare(agent, problem, modes, states, h, solver.system):
+    if not prepare(problem, channels, modes, states, h, solver.system):
         watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, np.inf, 1)
         return np.inf
     copy(u, solver.u)
@@ -129,40 +129,40 @@ def try_step(
         else:
             add_multiple(1.0, k[stage - 1], trial)
         if stage > 0:
-            measure(agent, trial, states, work.y)
+            measure(channels, trial, work.y)
             if not feedback(
-                law, game, problem, time, stage, work.y, trial[size:], work, solver.exit,
+                problem, time, stage, work.y, trial[size:], work, solver.exit,
                 solver.u,
             ):  # fmt: skip
                 return np.inf
         if stage < STAGES:
             solve_stage(
-                agent, problem, channels, modes, method, states, h, stage, trial, solver.u, k,
+                problem, channels, modes, method, states, h, stage, trial, solver.u, k,
                 solver.system,
             )  # fmt: skip
-    error = error_of(agent, agents, method, states, trial, solver)
+    error = error_of(channels.output, agents, method, states, trial, solver)
     if not error <= 1.0:  # latched only if the run ends here
         watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, error, STAGES)
     return error
 
 
 @kernel
-def look_ahead(law, agent, game, problem, states, time, state, work, solver):
+def look_ahead(problem, channels, time, state, work, solver):
     """Tell in solver.exit if the boundary is why even the smallest step has failed.
 
     Next to the boundary the demand grows so fast that no step is accurate. The trial vector is
     moved on along the step, until it is outside or a microsecond away.
     """
     y, trial = work.y, solver.trial
-    size = len(y) * states
+    size = channels.rest.size
     for _ in range(20):
         for r in range(len(trial)):
             trial[r] += trial[r] - state[r]
-        measure(agent, trial, states, y)
+        measure(channels, trial, y)
         why = solver.exit[watch.EXIT]
         solver.exit[watch.EXIT] = watch.INSIDE
         if not feedback(
-            law, game, problem, time, STAGES, y, trial[size:], work, solver.exit, solver.u
+            problem, time, STAGES, y, trial[size:], work, solver.exit, solver.u
         ) and solver.exit[watch.EXIT] != watch.DIVERGED:  # fmt: skip
             return
         solver.exit[watch.EXIT] = why
@@ -201,32 +201,30 @@ def accept(problem, modes, method, states, h, progress, state, solver):
 
 @kernel
 def step_on(
-    law, agent, game, problem, channels, modes, method, states, progress, state, u, monitor, work,
-    solver,
+    problem, channels, modes, method, states, progress, state, u, monitor, work, solver,
 ):  # fmt: skip
     """Take one accepted step from END; False, with the exit latched, if there is none."""
     time = progress[END]
     if not look(
-        agent, law, game, problem, channels, states, time, state, monitor, monitor, work, u
+        problem, channels, time, state, monitor, monitor, work, solver.system.known, u
     ):  # fmt: skip
         return False
     monitor[watch.STEPS] = progress[ACCEPTED]
-    linearise(agent, game, problem, channels, states, state, u, work, solver.system)
+    linearise(problem, channels, states, state, u, work, solver.system)
     h, retried = progress[NEXT], False
     while True:
         smallest = SMALLEST * max(1.0, time)
         if not h > smallest:
             h = smallest
         error = try_step(
-            law, agent, game, problem, channels, modes, method, states, time, h, state, u, work,
-            solver,
+            problem, channels, modes, method, states, time, h, state, u, work, solver,
         )  # fmt: skip
         if error <= 1.0:
             break
         if h == smallest:
             why = solver.exit
             if why[watch.EXIT] == watch.DIVERGED:
-                look_ahead(law, agent, game, problem, states, time, state, work, solver)
+                look_ahead(problem, channels, time, state, work, solver)
             watch.leave(
                 monitor, int(why[watch.EXIT]), time, why[watch.EXIT_AGENT],
                 why[watch.EXIT_CONSTRAINT], why[watch.EXIT_VALUE], why[watch.EXIT_STAGE],
@@ -260,10 +258,9 @@ def interpolate(progress, time, dense, out):
 
 
 @cache
-def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, Any]:
-    """The native loop and its last observation, for an agent type, a law and a game."""
-    source = source_key(agent, law, game)
-    states = len(agent.STATES)  # constant for the compiler, which unrolls the channels' loops
+def build() -> tuple[Any, Any]:
+    """The native loop and its last observation, for all agents and games."""
+    source = source_key()
 
     @compiled
     def advance(
@@ -271,14 +268,14 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
         work, solver, samples_state, samples_u,
     ):  # fmt: skip
         _ = source
+        states, known = channels.rest.shape[1], solver.system.known
         for sample in range(len(samples_u)):
             row, time = samples_state[sample], step * clock_step
             interpolate(progress, time, solver.dense, row)
             # Outside between two states inside is the interpolation's doing and ends no run.
             latch = solver.exit if progress[END] > 0.0 else monitor
             if not look(
-                agent, law, game, problem, channels, states, time, row, monitor, latch, work,
-                samples_u[sample],
+                problem, channels, time, row, monitor, latch, work, known, samples_u[sample],
             ):  # fmt: skip
                 if progress[END] == 0.0:
                     return sample, step
@@ -288,8 +285,8 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
             time = (step + every) * clock_step
             while progress[END] < time:
                 if not step_on(
-                    law, agent, game, problem, channels, modes, method, states, progress, state,
-                    u, monitor, work, solver,
+                    problem, channels, modes, method, states, progress, state, u, monitor, work,
+                    solver,
                 ):  # fmt: skip
                     return sample + 1, step
             step += every
@@ -300,9 +297,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> tuple[Any, An
         _ = source
         interpolate(progress, time, solver.dense, row)
         latch = solver.exit if progress[END] > 0.0 else monitor
-        if not look(
-            agent, law, game, problem, channels, states, time, row, monitor, latch, work, row_u
-        ):
+        if not look(problem, channels, time, row, monitor, latch, work, solver.system.known, row_u):
             for r in range(len(row_u)):
                 row_u[r] = np.nan
         monitor[watch.STEPS] = progress[ACCEPTED]
@@ -317,11 +312,9 @@ class RosenbrockLoop(ClosedLoop):
     how a run is divided into calls. The monitor sees every accepted step's start and every sample.
 
     Args:
-        agent, law, game: the three modules of kernels; the law is the fully distributed one.
-        problem: what the law reads.
-        channels: the agents' channels.
-        graph: who hears whom, the same as in ``problem``.
-        h: the shared clock's step in s; a run's k-th step begins at k * h.
+        agents: the agents.
+        setup: what the run is made of; its law is the fully distributed one.
+        graph: who hears whom, the same as in ``setup``.
         state: (m, states) at the start.
         memory: the law's, at the start.
         rtol: error allowed per step, relative to each state's greatest magnitude so far.
@@ -330,31 +323,27 @@ class RosenbrockLoop(ClosedLoop):
 
     def __init__(
         self,
-        agent: ModuleType,
-        law: ModuleType,
-        game: ModuleType,
-        problem: Problem,
-        channels: Channels,
+        agents: Agents,
+        setup: Setup,
         graph: Graph,
-        h: float,
         state: NDArray[np.float64],
         memory: NDArray[np.float64],
         rtol: float = 1e-6,
         atol: float = 1e-9,
     ) -> None:
-        self._advance, self._finish = build(agent, law, game)
-        self._shape = state.shape
-        m, agents = len(state), graph.agents
-        constraints = len(problem.data.member_pointer) - 1
-        modes = modes_of(graph, np.repeat(np.arange(agents), np.diff(problem.data.offsets)))
-        self._fixed = (problem, channels, modes, method(rtol, atol))
-        self._h = h
+        self._advance, self._finish = build()
+        self._agents, self._shape = agents, state.shape
+        data, m = setup.problem.data, len(state)
+        constraints = len(data.member_pointer) - 1
+        modes = modes_of(graph, np.repeat(np.arange(graph.agents), np.diff(data.offsets)))
+        self._length, self._estimates = state.size + len(memory), graph.agents * m
+        self._fixed = (*self._parts(setup), modes, method(rtol, atol))
+        self._h = setup.clock.h
         self._step = 0
-        self._length, self._estimates = state.size + len(memory), agents * m
         self._state = self._flat(state, memory)
         self._progress = np.zeros(COUNT)
         self._u = np.zeros(m)
-        self._work = work(m, constraints, agents)
+        self._work = work(m, constraints, graph.agents)
         self._solver = Solver(
             trial=np.zeros_like(self._state),
             k=np.zeros((STAGES, len(self._state))),
@@ -362,10 +351,19 @@ class RosenbrockLoop(ClosedLoop):
             greatest=np.abs(state).max(axis=0),
             exit=np.zeros(watch.HEADER),
             u=np.zeros(m),
-            system=stage_system(input_columns(agent, channels.parameters), agents),
+            system=stage_system(input_columns(agents.kind, agents.parameters), graph.agents),
         )
         self.monitor = np.zeros(watch.length(m, constraints))
         self._begin()
+
+    def _parts(self, setup: Setup) -> tuple[Problem, Channels]:
+        """What the loop reads, and as a table what the law's functions do."""
+        kind = self._agents.kind
+        memory = self._length - math.prod(self._shape)
+        problem, self._table = in_table(setup, self._agents, memory)
+        addresses = compiled_functions(kind)
+        channels = Channels(self._agents.parameters, setup.rest, addresses, kind.OUTPUT)
+        return problem, channels
 
     def _flat(self, state: NDArray[np.float64], memory: NDArray[np.float64]) -> NDArray[np.float64]:
         modes = self._fixed[2]
@@ -418,8 +416,7 @@ class RosenbrockLoop(ClosedLoop):
 
     def _adopt(self, setup: Setup) -> None:
         state, memory, _ = self.present()
-        _, channels, modes, how = self._fixed
-        self._fixed = (setup.problem, Channels(channels.parameters, setup.rest), modes, how)
+        self._fixed = (*self._parts(setup), *self._fixed[2:])
         self._state[:] = self._flat(state, memory)  # the last step's end lies beyond, by the old
         self._begin()
 

@@ -17,11 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gne_mj import game_functions as games
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.loops.estimate_modes import add_from_modes
 from gne_mj.loops.linear import add_multiple, factorise, substitute
 from gne_mj.loops.rodas import GAMMA
 from gne_mj.native import copy, kernel
+from gne_mj.plants import functions
 
 
 class StageSystem(NamedTuple):
@@ -44,6 +46,7 @@ class StageSystem(NamedTuple):
     k_x: np.ndarray  # (states,) one channel's
     k_y: np.ndarray  # (m,)
     k_u: np.ndarray  # (m,)
+    known: np.ndarray  # (m,) what V and the rates share, see gne_mj.plants.functions
 
 
 def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
@@ -67,15 +70,16 @@ def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
         k_x=np.zeros(states),
         k_y=np.zeros(m),
         k_u=np.zeros(m),
+        known=np.zeros(m),
     )
 
 
 @kernel
-def linearise(agent, game, problem, channels, states, state, u, work, system):
+def linearise(problem, channels, states, state, u, work, system):
     """Fill the law's and the channels' derivatives at a state.
 
     Args:
-        agent, game, problem, channels: as the loop has them.
+        problem, channels: as the loop has them.
         states: states of a channel.
         state: the loop's flat vector.
         u: (m,) input there; work.y and work.demand as the law has just left them.
@@ -83,15 +87,14 @@ def linearise(agent, game, problem, channels, states, state, u, work, system):
         system: its local, own and filtered are filled.
     """
     data = problem.data
-    at, q = data.offsets, data.parameters
+    at = data.offsets
     m, agents = len(u), len(at) - 1
     gain, rho = problem.settings[GAIN], problem.settings[RHO]
     memory = state[m * states :]
     z, profile = memory[agents * m :], work.profile
     own, filtered = system.own, system.filtered
+    functions.jacobians(channels, state, system.local)
     for r in range(m):
-        x = state[r * states : (r + 1) * states]
-        agent.jacobian(channels.parameters[r], x, system.local[r])
         for c in range(m):
             own[r, c] = 0.0
             filtered[r, c] = 0.0
@@ -100,20 +103,20 @@ def linearise(agent, game, problem, channels, states, state, u, work, system):
         copy(memory[i * m : (i + 1) * m], profile)
         copy(work.y[first:last], profile[first:last])
         for a in range(first, last):
-            game.add_cost_hessian(q, i, a, profile, -gain, own[a])
+            games.add_cost_hessian(data, i, a, profile, -gain, own[a])
         copy(z[first:last], profile[first:last])
         for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
             k = data.own_index[entry]
-            room = -game.constraint(q, k, profile) - data.tightening[k]
+            room = -games.constraint(data, k, profile) - data.tightening[k]
             weight = -gain * rho / room
             for a in range(first, last):
-                mine = game.constraint_gradient(q, k, a, profile) / room
+                mine = games.constraint_gradient(data, k, a, profile) / room
                 for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
                     j = data.member_index[member]
                     target = filtered[a] if j == i else own[a]
                     for b in range(at[j], at[j + 1]):
-                        other = game.constraint_gradient(q, k, b, profile)
-                        second = game.constraint_hessian(q, k, a, b, profile)
+                        other = games.constraint_gradient(data, k, b, profile)
+                        second = games.constraint_hessian(data, k, a, b, profile)
                         target[b] += weight * (second + mine * other)
     for r in range(m):
         if u[r] != work.demand[r]:  # an input at its limit does not answer
@@ -123,7 +126,7 @@ def linearise(agent, game, problem, channels, states, state, u, work, system):
 
 
 @kernel
-def prepare(agent, problem, modes, states, h, system):
+def prepare(problem, channels, modes, states, h, system):
     """Factorise for steps of length h from where the loop was linearised; False if singular."""
     agents, m = system.spread.shape
     epsilon = problem.settings[EPSILON]
@@ -149,7 +152,7 @@ def prepare(agent, problem, modes, states, h, system):
             else:
                 slope *= system.spread[i, c]
             system.slope[r, c] = slope
-            system.matrix[r, c] = -slope * system.response[c, agent.OUTPUT]
+            system.matrix[r, c] = -slope * system.response[c, channels.output]
         system.matrix[r, r] += 1.0
     return factorise(system.matrix, system.pivot)
 
@@ -177,11 +180,11 @@ def respond(system, r, states, s):
 
 
 @kernel
-def solve_stage(agent, problem, channels, modes, method, states, h, stage, trial, u, k, system):
+def solve_stage(problem, channels, modes, method, states, h, stage, trial, u, k, system):
     """Fill k[stage], given the stages before it.
 
     Args:
-        agent, problem, channels, modes, method: as the loop has them.
+        problem, channels, modes, method: as the loop has them.
         states: states of a channel.
         h: the step.
         stage: which, from 0.
@@ -207,9 +210,9 @@ def solve_stage(agent, problem, channels, modes, method, states, h, stage, trial
     z = trial[at_z : at_z + m]
     w = trial[at_z + m :].reshape((agents - 1, m))
     # right-hand sides, those of z and the modes times epsilon
+    functions.rates(channels, 1, trial, u, system.known, one)
     for r in range(m):
-        agent.rate(channels.parameters[r], x[r], u[r], k_x[r])
-        k_y[r] = x[r, agent.OUTPUT]
+        k_y[r] = x[r, channels.output]
         k_z[r] = k_y[r] - z[r]
     for a in range(agents - 1):
         for r in range(m):
@@ -226,7 +229,7 @@ def solve_stage(agent, problem, channels, modes, method, states, h, stage, trial
                 total += system.resolvent[r, b, a] * k_x[r, b]
             system.k_x[a] = total
         copy(system.k_x, k_x[r])
-        k_y[r] = k_x[r, agent.OUTPUT]
+        k_y[r] = k_x[r, channels.output]
         k_z[r] *= filter_gain
     for a in range(agents - 1):
         for r in range(m):
@@ -249,7 +252,7 @@ def solve_stage(agent, problem, channels, modes, method, states, h, stage, trial
     for r in range(m):
         for a in range(states):
             k_x[r, a] += k_u[r] * system.response[r, a]
-        k_y[r] = k_x[r, agent.OUTPUT]
+        k_y[r] = k_x[r, channels.output]
         k_z[r] += filter_gain * k_y[r]
     for i in range(agents):
         for r in range(m):

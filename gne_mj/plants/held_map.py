@@ -4,35 +4,33 @@ It serves the ODE engine and the fleets that MuJoCo moves in the same way.
 """
 
 from gne_mj.native import copy, kernel
-from gne_mj.plants.ode import held_step
+from gne_mj.plants import functions
 
 
 @kernel
-def roll(agent, channels, clock, state, u, scratch):
+def roll(channels, clock, state, u, scratch):
     """Move the flat state by one control period under the held input u (m,)."""
-    states = channels.rest.shape[1]
-    for _ in range(clock.period):
-        held_step(agent, channels.parameters, states, clock.method, clock.h, state, u, scratch)
+    functions.roll(channels, clock.method, clock.h, clock.period, state, u, scratch)
 
 
 @kernel
-def predict(context, agent, channels, clock, state, u, out, trial, scratch):
+def predict(context, channels, clock, state, u, out, trial, scratch):
     """Fill out (m,) with the outputs after a control period from a flat state under u (m,).
 
     Args:
         context: where the plant is; not needed here.
-        agent, channels, clock, state: as the loop has them.
+        channels, clock, state: as the loop has them.
         u: held input.
         out: filled.
         trial, scratch: as long as the state, and 5 times a channel's; overwritten.
     """
     copy(state[: len(trial)], trial)  # a law's memory may follow
-    roll(agent, channels, clock, trial, u, scratch)
+    roll(channels, clock, trial, u, scratch)
     for r in range(len(u)):
-        out[r] = trial[r * channels.rest.shape[1] + agent.OUTPUT]
+        out[r] = trial[r * channels.rest.shape[1] + channels.output]
 
 
 @kernel
-def is_affine(agent, clock):
+def is_affine(clock):
     """Whether the map is affine in u beyond doubt: one Euler step, since x' is affine in u."""
     return clock.period == 1 and clock.method == 0

@@ -52,12 +52,12 @@ def actuator_of(places, r):
 
 
 @kernel
-def roll(agent, channels, clock, state, u, scratch):
+def roll(channels, clock, state, u, scratch):
     """Not known without MuJoCo: late sensors of such robots are refused in mode implicit."""
 
 
 @kernel
-def predict(context, agent, channels, clock, state, u, out, trial, scratch):
+def predict(context, channels, clock, state, u, out, trial, scratch):
     """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
 
     The arguments are as :func:`gne_mj.plants.held_map.predict` has them, but that it starts from
@@ -80,6 +80,6 @@ def predict(context, agent, channels, clock, state, u, out, trial, scratch):
 
 
 @kernel
-def is_affine(agent, clock):
+def is_affine(clock):
     """Never taken for granted: actuators have dynamics, joints limits, bodies contacts."""
     return False

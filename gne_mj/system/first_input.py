@@ -1,9 +1,5 @@
 """What a system's law asks of the actuators at the start, and what they deliver at a time."""
 
-from functools import cache
-from types import ModuleType
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,9 +7,11 @@ from gne_mj.controllers.propagation import no_propagator
 from gne_mj.controllers.settings import LINKS, PENALTY, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Saturation, strikes_messages
+from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.native import compiled, source_key
+from gne_mj.loops.layout import Clock as Steps
+from gne_mj.loops.layout import Setup, in_table
 from gne_mj.plain import raise_pending
 from gne_mj.system.clock import Clock
 from gne_mj.system.system import System
@@ -26,15 +24,16 @@ def law_at_start(system: System) -> Array:
 
     Faults of sensors are left out. Not a number where the law has no action.
     """
-    game, problem = system.game, problem_at_start(system)
+    game, problem, memory = system.game, problem_at_start(system), system.loop_memory.copy()
+    setup = Setup(problem, system.agents.equilibrium(system.start), Steps(1.0, 1, 0, 0))
+    problem, _table = in_table(setup, system.agents, len(memory))
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now[PENALTY] = rho
     weights = rho / -(game.constraints(system.start) + game.margins)
     u = np.full(game.actions, np.nan)
-    left = _native(system.law.kernels, game.kernels)(
-        problem, system.start.copy(), weights, system.loop_memory.copy(), scratch, u
-    )
+    y = system.start.copy()
+    left = functions.action(problem, y, weights, memory, scratch, u)
     raise_pending()
     return u if left < 0 else np.full(game.actions, np.nan)
 
@@ -49,9 +48,10 @@ def problem_at_start(system: System) -> Problem:
         graph=system.law.graph_data,
         settings=settings,
         limit=system.agents.input_limit,
-        equilibrium=system.start,  # nothing is measured from it here
+        equilibrium=np.ascontiguousarray(system.start),  # nothing is measured from it here
         propagator=no_propagator(),
         size=system.typical_sizes,
+        functions=system.functions,
     )
 
 
@@ -82,15 +82,3 @@ def limits_at(system: System, time: float) -> Array:
             struck = fault.targets(system.game, system.law.graph)
             limits[struck] = np.minimum(limits[struck], fault.limit)
     return limits
-
-
-@cache
-def _native(law: ModuleType, game: ModuleType) -> Any:
-    source = source_key(law, game)
-
-    @compiled
-    def action(problem, y, weights, memory, scratch, u):
-        _ = source
-        return law.action(game, problem, y, weights, memory, scratch, u)
-
-    return action

@@ -24,18 +24,20 @@ from gne_mj.faults import (
 )
 from gne_mj.game import Game
 from gne_mj.game_check import refuse
-from gne_mj.loops import explicit, faultless, joint, local
+from gne_mj.loops import faultless, joint, local
 from gne_mj.loops import faults as native_faults
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
 from gne_mj.loops.layout import Clock as LoopClock
 from gne_mj.loops.layout import Setup
+from gne_mj.loops.link import link
+from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.margins import Disturbance
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.functions import METHODS
 from gne_mj.plants.mjcf_robot import MjcfRobots
-from gne_mj.plants.ode import METHODS, Channels
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
 
@@ -110,19 +112,19 @@ class System:
         checks.check_faults(self)
 
     @property
-    def acting(self) -> ModuleType:
-        """The module that finds the law's input."""
+    def equation(self) -> ModuleType | None:
+        """In mode implicit the module that says who solves together."""
         if self.mode != "implicit":
-            return explicit
+            return None
         # Agents that know others by estimates only cannot but act by themselves.
         return local if self.decentralised or self.law.information == "distributed" else joint
 
     @cached_property
     def rows(self) -> Order:
         """Rows of the matrices of mode implicit; one agent's at a time if agents act alone."""
-        if self.acting is explicit:
+        if self.equation is None:
             return NO_ORDER
-        if self.acting is local:
+        if self.equation is local:
             position, half_band = np.arange(self.game.actions), max(self.game.sizes) - 1
         else:
             position, half_band = order(self.game)
@@ -187,7 +189,7 @@ class System:
 
     def _closed_loop(self, clock: Clock, plant: "MujocoPlant | None") -> ClosedLoop:
         setup = self.setup(clock)
-        laws, game, memory = self.law.kernels, self.game.kernels, self.loop_memory
+        memory = self.loop_memory
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco import MujocoLoop
@@ -202,23 +204,25 @@ class System:
                 fleet = plant
                 plant.model.opt.timestep = plant.timestep = clock.timestep
                 plant.reset(self.state)
-            return MujocoLoop(fleet, laws, game, setup, memory, self.acting, self.fault_kernels)
+            return MujocoLoop(fleet, setup, memory, self.fault_kernels)
         if self.integrator == "rosenbrock" and self.law.graph is not None:
             from gne_mj.loops.rosenbrock import RosenbrockLoop
 
-            return RosenbrockLoop(
-                self.agents.kind, laws, game, setup.problem,
-                Channels(self.agents.parameters, setup.rest), self.law.graph, clock.timestep,
-                self.state, self.memory,
-            )  # fmt: skip
-        return OdeLoop(
-            self.agents, laws, game, setup, self.state, memory, self.acting, self.fault_kernels
-        )
+            return RosenbrockLoop(self.agents, setup, self.law.graph, self.state, self.memory)
+        return OdeLoop(self.agents, setup, self.state, memory, self.fault_kernels)
 
     @property
     def fault_kernels(self) -> ModuleType:
         """The module of what goes wrong in this system's loops."""
         return native_faults if self.faults else faultless
+
+    @property
+    def functions(self) -> NDArray[np.int64]:
+        """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
+        return link(
+            self.law.kernels, self.game.kernels,
+            memory=bool(len(self.loop_memory)), equation=self.equation,
+        )  # fmt: skip
 
     @property
     def recorded(self) -> int:
@@ -265,6 +269,7 @@ class System:
             ),
             schedule=np.zeros(4) if self.schedule is None else self.schedule.numbers,
             order=self.rows,
+            functions=self.functions,
             faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
         checks.check_lists(self, problem)
@@ -290,7 +295,7 @@ class System:
         m, late = self.game.actions, sensor_delay(self.faults)
         return Sizes(
             history=(late + 1) * m * (self.agents.states + 1) if late else 0,
-            solver=self.acting.solver_length(
+            solver=0 if self.equation is None else solver_length(
                 m, self.game.constraints_count,
                 len(self.game.actions_in_constraints[1]), self.agents.states,
                 int(self.rows.band[0]),

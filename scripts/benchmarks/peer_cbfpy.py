@@ -34,6 +34,10 @@ from turns import in_turns, row
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, feedback, work
+from gne_mj.loops.layout import Clock as Steps
+from gne_mj.loops.layout import Setup, in_table
+from gne_mj.loops.ode import CONTINUOUS
+from gne_mj.plants.functions import EULER
 from gne_mj.system import Clock
 
 # What they are to cbfpy, and the tolerance: qpax's default, and what it advises for elastiqp
@@ -105,23 +109,24 @@ def filter_calls(solver: str) -> tuple[Callable[[], float], Callable[[], float]]
 def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
     """The same of our law, by the kernels that all our loops call."""
     one = common.system("ode", "rk4", "sampled")
-    kernels, game = one.law.kernels, one.game.kernels
     n = common.N
     problem = Problem(
         one.game.data, one.law.graph_data, one.law.settings(common.RHO), np.full(n, np.inf),
-        one.equilibrium.action, no_propagator(),
+        one.equilibrium.action, no_propagator(), functions=one.functions,
     )  # fmt: skip
+    setup = Setup(problem, one.state, Steps(1.0, 1, CONTINUOUS, EULER))
+    problem, table = in_table(setup, one.agents, 0)
     scratch, monitor, memory = work(n, n, n), np.zeros(watch.length(n, n)), np.zeros(0)
     start, u = np.ascontiguousarray(_some_state()[1::3]), np.zeros(n)
 
     @njit(error_model="numpy")
     def control(problem, y, memory, scratch, monitor, u):
-        return feedback(kernels, game, problem, 0.0, 0, y, memory, scratch, monitor, u)
+        return feedback(problem, 0.0, 0, y, memory, scratch, monitor, u)
 
     @njit(error_model="numpy")
     def loop(problem, y, memory, scratch, monitor, u, count):
         for _ in range(count):
-            feedback(kernels, game, problem, 0.0, 0, y, memory, scratch, monitor, u)
+            feedback(problem, 0.0, 0, y, memory, scratch, monitor, u)
             for r in range(len(y)):
                 y[r] += NUDGE * u[r]
 
@@ -132,12 +137,14 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         raise ArithmeticError("our law is not what is meant to be measured")
 
     def from_python() -> float:
+        assert table.arrays
         began = time.perf_counter()
         for _ in range(CALLS):
             control(problem, start, memory, scratch, monitor, u)
         return (time.perf_counter() - began) / CALLS
 
     def in_loop() -> float:
+        assert table.arrays  # which the problem knows by address
         y, count = start.copy(), 50 * EVALUATIONS
         began = time.perf_counter()
         loop(problem, y, memory, scratch, monitor, u, count)

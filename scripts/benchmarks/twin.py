@@ -25,9 +25,13 @@ from gne_mj.controllers import FullyDistributed
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops.feedback import Problem
+from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.link import link
+from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.rosenbrock import RosenbrockLoop
 from gne_mj.plants import integrator, pi_cascade
-from gne_mj.plants.ode import Channels
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.functions import RK4
 
 N, RHO, START, END, ACCURACY = 10, 0.1, 0.2, 30.0, 1e-6
 TIMES = np.linspace(0.0, END, 601)
@@ -47,10 +51,11 @@ class Twin:
         self.game = osnr_game(**ten_channels())
         numbers = np.tile([1.0, 0.5], (N, 1)) if kind is pi_cascade else np.zeros((N, 0))
         self.start = np.tile([START, 2 * START], (N, 1))[:, : self.states].copy()
-        self.channels = Channels(numbers, np.zeros((N, self.states)))
+        self.agents = Agents(kind, numbers, np.full(N, np.inf))
         self.problem = Problem(
             self.game.data, self.graph.data, self.law.settings(RHO), np.full(N, np.inf),
             np.zeros(N), no_propagator(),
+            functions=link(self.law.kernels, self.game.kernels, memory=True, equation=None),
         )  # fmt: skip
         self.memory = self.law.initial_memory(np.full(N, START))
         flat = np.concatenate([self.start.ravel(), self.memory])
@@ -63,10 +68,11 @@ class Twin:
 
     def loop(self, rtol: float) -> RosenbrockLoop:
         """Our loop, at its start."""
+        clock = Clock(0.05, 1, CONTINUOUS, RK4)
+        setup = Setup(self.problem, np.zeros((N, self.states)), clock)
         return RosenbrockLoop(
-            self.kind, self.law.kernels, self.game.kernels, self.problem, self.channels,
-            self.graph, 0.05, self.start, self.memory, rtol, 1e-3 * rtol,
-        )  # fmt: skip
+            self.agents, setup, self.graph, self.start, self.memory, rtol, 1e-3 * rtol
+        )
 
     def ours(self, rtol: float) -> tuple[float, np.ndarray]:
         """Time in s and all samples, (601, states that SciPy has)."""
@@ -102,7 +108,7 @@ class Twin:
             self.law.kernels.rate(self.problem, y, memory, matrix[size:, c])
             for r in range(N):
                 out = np.zeros(self.states)
-                self.kind.rate(self.channels.parameters[r], x[r], 0.0, out)
+                self.kind.rate(self.agents.parameters[r], x[r], 0.0, out)
                 matrix[r * self.states : (r + 1) * self.states, c] = out
         return np.ascontiguousarray(matrix[np.ix_(self.kept, self.kept)])
 

@@ -116,7 +116,7 @@ KINDS = {
     "own, partial": Kind(own, integrators, "partial", share=2.0, most=3),
 }
 MODES = {"continuous": 0.45, "implicit": 0.3, "decentralised": 0.15, "sampled": 0.1}
-# Each combination of kind, way of acting and faults compiles a loop: not all are drawn
+# Not all combinations are drawn
 FAULTY = {
     ("lane robots", "continuous"), ("lane robots", "implicit"), ("lane robots", "decentralised"),
     ("lane robots, MuJoCo", "implicit"), ("lane robots, partial", "implicit"),

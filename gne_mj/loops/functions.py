@@ -1,0 +1,110 @@
+"""The functions of a run's law, which loops call by their addresses.
+
+A law is a module of kernels (:mod:`gne_mj.controllers.law`) that :mod:`gne_mj.loops.link` compiles
+by itself. A loop finds the addresses in ``problem.functions`` and calls them with the kernels here.
+One call does its work for all agents, so that calling costs next to nothing.
+"""
+
+from gne_mj.native import address_in, call_integer, call_number, kernel
+
+# Entries of ``problem.functions``, the latter for mode implicit
+ACTION, RATE, PROPAGATE, STORAGE = range(4)
+PREPARE, PULLS, ADD_PULL_SLOPE, OWN_PROFILE, SETTLE, SOLVE = range(4, 10)
+COUNT = 10
+
+
+@kernel
+def action(problem, y, weights, memory, work, u):
+    """Fill u (m,); -1, or agent * p + constraint of the first estimate that is not inside."""
+    return call_integer(
+        problem.functions[ACTION],
+        (
+            problem.table, address_in(y), address_in(weights), address_in(memory),
+            address_in(work.profile), address_in(work.now), address_in(u),
+        ),
+    )  # fmt: skip
+
+
+@kernel
+def rate(problem, y, memory, out):
+    """Fill out with the rate of the law's memory."""
+    if len(memory) > 0:
+        call_integer(
+            problem.functions[RATE],
+            (problem.table, address_in(y), address_in(memory), address_in(out)),
+        )
+
+
+@kernel
+def propagate(problem, y, memory, scratch):
+    """Move the law's memory over a control period with the outputs held at y (m,)."""
+    if len(memory) > 0:
+        call_integer(
+            problem.functions[PROPAGATE],
+            (
+                problem.table, address_in(y), address_in(memory), address_in(scratch),
+                len(scratch),
+            ),
+        )  # fmt: skip
+
+
+@kernel
+def storage(problem, memory):
+    """The memory's part of the Lyapunov function."""
+    if len(memory) == 0:
+        return 0.0
+    return call_number(problem.functions[STORAGE], (problem.table, address_in(memory)))
+
+
+@kernel
+def prepare(problem, first, last, y, memory):
+    """Put the actions of agents ``first`` to ``last`` - 1 where the law's pull reads them."""
+    call_integer(
+        problem.functions[PREPARE],
+        (problem.table, first, last, address_in(y), address_in(memory)),
+    )
+
+
+@kernel
+def pulls(problem, first, last, y, memory, out):
+    """Prepare, and fill these agents' entries of out (m,) with what drives them but the barrier."""
+    call_integer(
+        problem.functions[PULLS],
+        (problem.table, first, last, address_in(y), address_in(memory), address_in(out)),
+    )
+
+
+@kernel
+def add_pull_slope(problem, i, a, y, memory, out):
+    """Add the derivative of entry a of that, of agent i, to out (m,)."""
+    call_integer(
+        problem.functions[ADD_PULL_SLOPE],
+        (problem.table, i, a, address_in(y), address_in(memory), address_in(out)),
+    )
+
+
+@kernel
+def own_profile(problem, i, y, memory, profile):
+    """Fill profile (m,) with what agent i's barrier reads; how its own block moves."""
+    return call_number(
+        problem.functions[OWN_PROFILE],
+        (problem.table, i, address_in(y), address_in(memory), address_in(profile)),
+    )
+
+
+@kernel
+def settle(problem, ahead, held):
+    """The outputs (m,) that the memory moves with, those of the period's end being ``ahead``."""
+    call_integer(problem.functions[SETTLE], (problem.table, address_in(ahead), address_in(held)))
+
+
+@kernel
+def solve(problem, b, memory, work):
+    """Solve for the outputs of the period's end, in work.solver; how that ended."""
+    return call_integer(
+        problem.functions[SOLVE],
+        (
+            problem.table, b, address_in(memory), address_in(work.profile), address_in(work.now),
+            address_in(work.solver), len(work.solver),
+        ),
+    )  # fmt: skip

@@ -1,0 +1,177 @@
+"""Laws as C functions, compiled by themselves; :mod:`gne_mj.loops.functions` calls them."""
+
+from functools import cache
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from gne_mj.controllers.settings import NOW
+from gne_mj.loops import functions
+from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, STATES, STEP, problem_in
+from gne_mj.loops.newton import solver_in
+from gne_mj.native import callback, source_key
+from gne_mj.table import floats_at, integers
+
+_whole, _real = types.int64, types.float64
+
+
+class LawWork(NamedTuple):
+    """What a law works on."""
+
+    profile: np.ndarray  # (m,) overwritten
+    now: np.ndarray  # see gne_mj.controllers.settings
+
+
+def link(
+    law: ModuleType, game: ModuleType, *, memory: bool, equation: ModuleType | None
+) -> NDArray[np.int64]:
+    """The addresses for ``problem.functions``: those that a run calls, the others 0.
+
+    Args:
+        law, game: modules of kernels.
+        memory: whether the law has one.
+        equation: in mode implicit, :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
+    """
+    addresses = np.zeros(functions.COUNT, dtype=np.int64)
+    addresses[functions.ACTION] = action(law, game).address
+    owners: dict[int, Any] = {}
+    if memory:
+        owners |= of_memory(law)
+    if equation is not None:
+        owners |= of_implicit(law, game) | {functions.SOLVE: solve(equation)}
+    for entry, owner in owners.items():
+        addresses[entry] = owner.address
+    return addresses
+
+
+@cache
+def action(law: ModuleType, game: ModuleType) -> Any:
+    """The law's action in a game."""
+    source = source_key(law, game)
+
+    def action(table, y, weights, memory, profile, now, u):
+        _ = source
+        steps = integers(table, STEP)
+        m = steps[ACTIONS]
+        return law.action(
+            game, problem_in(table), floats_at(y, m), floats_at(weights, steps[CONSTRAINTS]),
+            floats_at(memory, steps[MEMORY]), LawWork(floats_at(profile, m), floats_at(now, NOW)),
+            floats_at(u, m),
+        )  # fmt: skip
+
+    return callback(_whole(*[_whole] * 7), action)
+
+
+@cache
+def of_memory(law: ModuleType) -> dict[int, Any]:
+    """What moves a law's memory, and its storage."""
+    source = source_key(law)
+
+    def rate(table, y, memory, out):
+        _ = source
+        steps = integers(table, STEP)
+        size = steps[MEMORY]
+        law.rate(
+            problem_in(table), floats_at(y, steps[ACTIONS]), floats_at(memory, size),
+            floats_at(out, size),
+        )  # fmt: skip
+        return 0
+
+    def propagate(table, y, memory, scratch, length):
+        _ = source
+        steps = integers(table, STEP)
+        law.propagate(
+            problem_in(table), floats_at(y, steps[ACTIONS]), floats_at(memory, steps[MEMORY]),
+            floats_at(scratch, length),
+        )  # fmt: skip
+        return 0
+
+    def storage(table, memory):
+        _ = source
+        return law.storage(problem_in(table), floats_at(memory, integers(table, STEP)[MEMORY]))
+
+    return {
+        functions.RATE: callback(_whole(*[_whole] * 4), rate),
+        functions.PROPAGATE: callback(_whole(*[_whole] * 5), propagate),
+        functions.STORAGE: callback(_real(_whole, _whole), storage),
+    }
+
+
+@cache
+def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
+    """What mode implicit solves a law for."""
+    source = source_key(law, game)
+
+    def prepare(table, first, last, y, memory):
+        _ = source
+        steps = integers(table, STEP)
+        law.prepare(
+            problem_in(table), first, last, floats_at(y, steps[ACTIONS]),
+            floats_at(memory, steps[MEMORY]),
+        )  # fmt: skip
+        return 0
+
+    def pulls(table, first, last, at_y, at_memory, at_out):
+        _ = source
+        problem, steps = problem_in(table), integers(table, STEP)
+        y, memory = floats_at(at_y, steps[ACTIONS]), floats_at(at_memory, steps[MEMORY])
+        out, data = floats_at(at_out, steps[ACTIONS]), problem.data
+        law.prepare(problem, first, last, y, memory)
+        for i in range(first, last):
+            for a in range(data.offsets[i], data.offsets[i + 1]):
+                out[a] = law.pull(game, problem, i, a, y, memory)
+        return 0
+
+    def add_pull_slope(table, i, a, y, memory, out):
+        _ = source
+        steps = integers(table, STEP)
+        m = steps[ACTIONS]
+        law.add_pull_slope(
+            game, problem_in(table), i, a, floats_at(y, m), floats_at(memory, steps[MEMORY]),
+            floats_at(out, m),
+        )  # fmt: skip
+        return 0
+
+    def own_profile(table, i, y, memory, profile):
+        _ = source
+        steps = integers(table, STEP)
+        m = steps[ACTIONS]
+        return law.own_profile(
+            problem_in(table), i, floats_at(y, m), floats_at(memory, steps[MEMORY]),
+            floats_at(profile, m),
+        )  # fmt: skip
+
+    def settle(table, ahead, held):
+        _ = source
+        m = integers(table, STEP)[ACTIONS]
+        law.settle(floats_at(ahead, m), floats_at(held, m))
+        return 0
+
+    return {
+        functions.PREPARE: callback(_whole(*[_whole] * 5), prepare),
+        functions.PULLS: callback(_whole(*[_whole] * 6), pulls),
+        functions.ADD_PULL_SLOPE: callback(_whole(*[_whole] * 6), add_pull_slope),
+        functions.OWN_PROFILE: callback(_real(*[_whole] * 5), own_profile),
+        functions.SETTLE: callback(_whole(*[_whole] * 3), settle),
+    }
+
+
+@cache
+def solve(equation: ModuleType) -> Any:
+    """The solver of mode implicit, for all laws and games."""
+    source = source_key()
+
+    def solve(table, b, memory, profile, now, solver, length):
+        _ = source
+        steps = integers(table, STEP)
+        m = steps[ACTIONS]
+        views = solver_in(floats_at(solver, length), m, steps[CONSTRAINTS], steps[STATES], b)
+        return equation.solve(
+            problem_in(table), b, floats_at(memory, steps[MEMORY]),
+            LawWork(floats_at(profile, m), floats_at(now, NOW)), views,
+        )  # fmt: skip
+
+    return callback(_whole(*[_whole] * 7), solve)
