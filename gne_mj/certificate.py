@@ -205,6 +205,10 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     code = int(monitor[watch.EXIT])
     if code == watch.DIVERGED:
         return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
+    if code == watch.FORCES_LOST:
+        from gne_mj.plants.native_mujoco import lost_words  # late: MuJoCo is slow to import
+
+        return EXITS[code], f"{at} {lost_words(int(value))}"
     constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
     if code == watch.STEP_TOO_SMALL:
         return (

@@ -34,6 +34,7 @@ ESTIMATING = ("partial", "distributed")  # information structures whose laws hol
 # From bad to good: a run's status is the worst of its systems'.
 _ORDER = (
     "diverged",
+    "forces_left_out",
     "left_feasible_set",
     "estimate_left_feasible_set",
     "step_too_small",

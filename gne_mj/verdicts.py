@@ -18,6 +18,7 @@ EXITS = {
     watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
     watch.DIVERGED: "diverged",
     watch.STEP_TOO_SMALL: "step_too_small",
+    watch.FORCES_LOST: "forces_left_out",
 }
 STATUS = "<U28"  # dtype that holds every status, infeasible_start too
 SETTLED = 0.02  # of the initial distance

@@ -7,10 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
+import gne_mj
 from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
-from gne_mj.plants.native_mujoco import check_warnings
+from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.plants.native_mujoco import LOST, check_warnings, lost_words
+from gne_mj.scenario import load_scenario
 
 # A boat that swings a mast against a stop, over a floor of its own
 BOAT = """
@@ -255,3 +258,42 @@ def test_robots_that_overlap_at_the_start_are_refused(tmp_path):
         with pytest.raises(InvalidInput, match="2 m beside it") as caught:
             two.reset(np.zeros((2, 2)))
         assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("mode", ["continuous", "sampled"])
+@pytest.mark.parametrize("kind", sorted(LOST))
+def test_a_run_ends_where_forces_are_left_out_and_keeps_what_it_had(mode, kind):
+    changes = {"simulation.duration": 1.0, "controller.mode": mode}
+    whole = gne_mj.run("velocity-sync", changes)["robots"]
+    simulation = load_scenario("velocity-sync", changes).simulation_object()
+    simulation.advance(200)
+    simulation.runs["robots"].loop.plant.data.warning[kind].number = 1
+    simulation.advance(300)
+    kept = simulation.trajectory()
+    report = kept.reports["robots"]
+    assert kept.status == report["status"] == "forces_left_out"
+    assert report["end_time"] == pytest.approx(0.4)
+    assert report["message"] == f"at 0.4 s {lost_words(kind)}"
+    times = kept["robots"]["time"].to_numpy()
+    assert times[-1] == pytest.approx(0.4)
+    assert np.all(np.diff(times) > 0.0)
+    same = whole.sel(time=times)
+    for name in ("action", "position"):
+        assert np.array_equal(kept["robots"][name].to_numpy(), same[name].to_numpy())
+
+
+def test_a_batch_keeps_its_runs_where_forces_were_left_out(tmp_path, monkeypatch):
+    """One run of a batch, and the next one of the same thread begins without the warning."""
+    reset, count = MujocoPlant.reset, []
+
+    def warned(self, state):
+        reset(self, state)
+        count.append(state)
+        self.data.warning[min(LOST)].number = int(len(count) == 3)
+
+    monkeypatch.setattr(MujocoPlant, "reset", warned)
+    found = gne_mj.run_batch(
+        "velocity-sync", out=tmp_path / "b", changes={"simulation.duration": 0.1}, runs=4, threads=1
+    )
+    status = found["status"].to_numpy().tolist()
+    assert sorted(status) == ["completed"] * 3 + ["forces_left_out"]

@@ -43,7 +43,8 @@ SMALLEST_STEP = 28  # length in s of the shortest piece of one; 0 if none was di
 HEADER = 29
 
 # STEP_TOO_SMALL: the boundary is so near that even the finest pieces of a step do not do
-INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL = 0, 1, 2, 3, 4
+# FORCES_LOST: MuJoCo has left out forces; EXIT_VALUE says which of its warnings told so
+INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST = range(6)
 
 
 @kernel

@@ -58,8 +58,8 @@ from gne_mj.plants.native_mujoco import (
     call,
     call_state,
     callbacks,
-    check_warnings,
     field,
+    forces_lost,
     offsets,
     set_number,
     state_functions,
@@ -193,10 +193,13 @@ def build(
             save(functions, model, data, saved[0])
             if not moving:
                 timed_step(at, mj_step, model, data)
+                lost = forces_lost(at, data)
+                if lost >= 0:
+                    watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
                 if monitor[watch.EXIT] != watch.INSIDE:
                     restore(functions, model, data, saved[0])
                     break
-                done += 1
+                step, done = step + 1, done + 1
                 continue
             if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
                 copy(saved[0], saved[1])
@@ -204,6 +207,14 @@ def build(
             set_number(model, at.timestep, length)
             set_number(data, at.time, division.begins(divided, step, h))
             call(mj_step, model, data)
+            lost = forces_lost(at, data)
+            if lost >= 0:
+                watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
+                if divided[division.POSITION] == 0.0:
+                    copy(saved[0], saved[1])
+                restore(functions, model, data, saved[1])
+                divided[division.POSITION] = 0.0
+                break
             good = monitor[watch.EXIT] == watch.INSIDE
             if not good and monitor[watch.EXIT_STAGE] == 0.0:
                 restore(functions, model, data, saved[0])
@@ -305,11 +316,7 @@ class MujocoLoop(ClosedLoop):
         return self._step * self.plant.timestep
 
     def advance(self, samples: int, every: int) -> Samples:
-        """See the base class.
-
-        Raises:
-            EngineError: MuJoCo has left out contacts or constraints.
-        """
+        """See the base class."""
         if self.monitor[watch.EXIT] != watch.INSIDE:
             samples = 0
         data, first = self.plant.data, self._step
@@ -325,8 +332,6 @@ class MujocoLoop(ClosedLoop):
         data.userdata[self._start + STEP_NOW] = first + steps
         data.userdata[self._start + RECORDER] = 0.0
         data.time = self.time
-        if self.monitor[watch.EXIT] == watch.INSIDE:
-            check_warnings(data)
         return recorder.samples(0)
 
     def finish(self) -> Samples:

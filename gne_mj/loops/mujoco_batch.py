@@ -21,7 +21,6 @@ from gne_mj.loops.recorder import FIRST
 from gne_mj.plants.mujoco import ROOM, SIZES
 from gne_mj.plants.native_mujoco import (
     callbacks,
-    check_warnings,
     offsets,
     state_functions,
     step_address,
@@ -77,7 +76,6 @@ class MujocoBatch(BatchLoop):
                     fleet.advance(self._advance, min(STRIDE, span.steps - done))
                     if userdata[first + watch.EXIT] != watch.INSIDE:
                         break
-                    check_warnings(fleet.plant.data)
                 recorder.blocks[run, FIRST] = span.last
                 observe(fleet.plant, self._control, self._start)
                 monitors[run] = userdata[first : first + monitors.shape[1]]

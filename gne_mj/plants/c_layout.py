@@ -75,6 +75,19 @@ def word_of(struct: str, *path: str) -> int:
     return offset // 8
 
 
+def block_of(struct: str, name: str) -> int:
+    """An array's place within a struct, in 8-byte words from the start.
+
+    Raises:
+        EngineError: there is no such field, or it is no array of items of 8 bytes.
+    """
+    kind = structure(struct)
+    place, item = getattr(kind, name, None), getattr(dict(kind._fields_).get(name), "_type_", None)
+    if place is None or item is None or ctypes.sizeof(item) != 8 or place.offset % 8:
+        raise unknown_layout(f"{struct}.{name}")
+    return int(place.offset) // 8
+
+
 def arrays(struct: str) -> list[str]:
     """Names of the fields that point to arrays of numbers (mjtNum)."""
     return [

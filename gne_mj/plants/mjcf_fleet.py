@@ -32,6 +32,7 @@ from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     USERDATA_HEADER,
     callbacks,
+    check_warnings,
     quiet,
     step_address,
 )
@@ -241,6 +242,7 @@ class MjcfPlant(Plant):
         self.data.ctrl[self.places[:, ACTUATOR]] = u
         with callbacks():
             run_steps()(step_address(), self.model._address, self.data._address, steps)
+        check_warnings(self.data)
 
 
 def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:

@@ -24,7 +24,7 @@ from numba.extending import intrinsic
 
 from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word
-from gne_mj.plants.c_layout import arrays, unknown_layout, word_of
+from gne_mj.plants.c_layout import arrays, block_of, unknown_layout, word_of
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
 ACTIVATION = types.float64(types.voidptr, types.voidptr, types.int32)
@@ -65,6 +65,7 @@ class Offsets(NamedTuple):
     sensordata: int
     userdata: int
     time: int
+    warning: int
     nuserdata: int
     timestep: int
 
@@ -93,13 +94,19 @@ def offsets() -> Offsets:
         EngineError: a field is not where it is declared, so this MuJoCo cannot be driven.
     """
     result = Offsets(
-        **{name: word_of("mjData", name) for name in Offsets._fields[:-2]},
+        **{name: word_of("mjData", name) for name in Offsets._fields[:-3]},
+        warning=block_of("mjData", "warning"),
         nuserdata=word_of("mjModel", "nuserdata"),
         timestep=word_of("mjModel", "opt", "timestep"),
     )
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
     _check_arrays(data)
+    for kind in LOST:
+        data.warning[kind].number = 1
+        if _lost(result, data) != kind:
+            raise unknown_layout("mjData.warning")
+        data.warning[kind].number = 0
     if ctypes.c_int64.from_address(model._address + 8 * result.nuserdata).value != 7919:
         raise unknown_layout("mjModel.nuserdata")
     for struct, name, address in (
@@ -310,24 +317,49 @@ def quiet() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
+# MuJoCo's warnings that what follows is not the model's motion; what else it warns of shows in runs
+LOST = {
+    int(mujoco.mjtWarning.mjWARN_INERTIA): "met an inertia that is nearly singular, took another",
+    int(mujoco.mjtWarning.mjWARN_CONTACTFULL): "ran out of memory, left out contacts",
+    int(mujoco.mjtWarning.mjWARN_CNSTRFULL): "ran out of memory, left out constraints",
+}
+_LOST = tuple(LOST)
+
+
+def lost_words(kind: int) -> str:
+    """What has become of a motion after one of these warnings, and what to do."""
+    return (
+        f"MuJoCo {LOST[kind]}, so that what follows would not be the model's motion: see to its"
+        " contacts and masses, or give more <size memory>"
+    )
+
+
+@kernel
+def forces_lost(at, data):
+    """Of which of LOST MuJoCo has warned, or -1. A warning is a pair of int: what of, how often."""
+    for kind in _LOST:
+        if word(data, at.warning + kind) >> 32 != 0:
+            return kind
+    return -1
+
+
+def _lost(at: Offsets, data: mujoco.MjData) -> int:
+    """The same from Python."""
+    for kind in LOST:
+        address = data._address + 8 * (at.warning + kind)
+        if ctypes.c_int64.from_address(address).value >> 32:
+            return kind
+    return -1
+
+
 def check_warnings(data: mujoco.MjData) -> None:
-    """Refuse to go on where MuJoCo has left out forces; what else it warns of the monitor sees.
+    """Refuse to go on where MuJoCo has left out forces.
 
     Raises:
         EngineError: contacts or constraints did not fit, or an inertia is singular.
     """
-    kinds = mujoco.mjtWarning
-    lost = {
-        kinds.mjWARN_CONTACTFULL: "ran out of memory and left out contacts",
-        kinds.mjWARN_CNSTRFULL: "ran out of memory and left out constraints",
-        kinds.mjWARN_INERTIA: "met an inertia that is nearly singular and took another",
-    }
-    for kind, what in lost.items():
-        if data.warning[kind].number:
-            raise EngineError(
-                f"MuJoCo {what}, by {data.time:.6g} s, so that what follows would not be the"
-                " model's motion: see to its contacts and masses, or give more <size memory>"
-            )
+    if (kind := _lost(offsets(), data)) >= 0:
+        raise EngineError(f"by {data.time:.6g} s {lost_words(kind)}")
 
 
 _installed = threading.Lock()
