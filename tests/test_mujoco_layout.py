@@ -90,6 +90,8 @@ def test_numbers_of_the_structs_themselves():
 def test_a_field_elsewhere_than_declared_is_refused(monkeypatch, name):
     right = native_mujoco.word_of
     monkeypatch.setattr(native_mujoco, "word_of", lambda *path: right(*path) + (path[-1] == name))
+    block = native_mujoco.block_of
+    monkeypatch.setattr(native_mujoco, "block_of", lambda *path: block(*path) + (path[-1] == name))
     with pytest.raises(EngineError, match="elsewhere than expected"):
         native_mujoco.offsets.__wrapped__()
 

@@ -45,7 +45,7 @@ from gne_mj.loops.ode import CONTINUOUS, look
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.mujoco import MEMORY, NA, NQ, NU, NUSERDATA, PLACES, ROOM, SIZES, STAGES
+from gne_mj.plants.mujoco import MEMORY, NA, NQ, NU, NUSERDATA, NV, PLACES, ROOM, SIZES, STAGES
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
@@ -193,7 +193,7 @@ def build(
             save(functions, model, data, saved[0])
             if not moving:
                 timed_step(at, mj_step, model, data)
-                lost = forces_lost(at, data)
+                lost = forces_lost(at, data, sizes[NV])
                 if lost >= 0:
                     watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
                 if monitor[watch.EXIT] != watch.INSIDE:
@@ -207,7 +207,7 @@ def build(
             set_number(model, at.timestep, length)
             set_number(data, at.time, division.begins(divided, step, h))
             call(mj_step, model, data)
-            lost = forces_lost(at, data)
+            lost = forces_lost(at, data, sizes[NV])
             if lost >= 0:
                 watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
                 if divided[division.POSITION] == 0.0:

@@ -335,10 +335,17 @@ def lost_words(kind: int) -> str:
 
 
 @kernel
-def forces_lost(at, data):
-    """Of which of LOST MuJoCo has warned, or -1. A warning is a pair of int: what of, how often."""
+def forces_lost(at, data, nv):
+    """Of which of LOST MuJoCo has warned, or -1. A warning is a pair of int: what of, how often.
+
+    -1 too where velocities (nv) are no longer finite: then that is the reason.
+    """
     for kind in _LOST:
         if word(data, at.warning + kind) >> 32 != 0:
+            qvel = field(data, at.qvel, nv)
+            for r in range(nv):
+                if not np.isfinite(qvel[r]):
+                    return -1
             return kind
     return -1
 
@@ -353,12 +360,12 @@ def _lost(at: Offsets, data: mujoco.MjData) -> int:
 
 
 def check_warnings(data: mujoco.MjData) -> None:
-    """Refuse to go on where MuJoCo has left out forces.
+    """Refuse to go on where MuJoCo has left out forces, and not for numbers that are not finite.
 
     Raises:
         EngineError: contacts or constraints did not fit, or an inertia is singular.
     """
-    if (kind := _lost(offsets(), data)) >= 0:
+    if (kind := _lost(offsets(), data)) >= 0 and np.all(np.isfinite(data.qvel)):
         raise EngineError(f"by {data.time:.6g} s {lost_words(kind)}")
 
 
