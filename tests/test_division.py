@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from gne_mj.controllers import FullInformation
+from gne_mj.faults import Bias
 from gne_mj.games import ten_channels
 from gne_mj.loops import division
 from gne_mj.loops import monitor as watch
@@ -213,6 +214,19 @@ def test_the_first_steps_finest_piece_is_foretold(engine):
             assert told == 0.02 / (run["division"]["smallest_step"] or 0.02)
         found.append(told)
     assert len(set(found)) > 2, "of different lengths"
+
+
+def test_a_first_step_that_ends_the_run_otherwise_is_no_matter_of_its_length():
+    """A sensor's bias of 2 m/s shows the law a profile that is outside from the start on."""
+    start = np.add(V0, -2.5 * np.arange(1.0, 6.0))
+    system = robot_system(robot_state(start), faults=(Bias(agents=(2,), offset=-2.0),))
+    told = certify(system, clock(0.002))
+    assert told.to_dict()["division"]["start"] is None
+    assert told.to_dict()["division"]["ends"] == "estimate_left_feasible_set"
+    assert any("ends it as estimate_left_feasible_set" in each for each in told.not_certified)
+    assert not any("at the start pieces finer" in each for each in told.not_certified)
+    report = Simulation([system], clock(0.002, 0.01)).run().reports["robots"]
+    assert report["status"] == "estimate_left_feasible_set"
 
 
 # --------------------------------------------------------------- pieces of a step, as plain Python

@@ -10,6 +10,7 @@ from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import STABLE
 from gne_mj.theory.periods import linear_period
+from gne_mj.verdicts import EXITS
 
 
 @dataclass(frozen=True)
@@ -17,14 +18,16 @@ class Pieces:
     """Into how many pieces a step is divided: a power of two up to ``finest``, None for more.
 
     Attributes:
-        start: the finest of the first step, by taking it.
+        start: the finest of the first step, by taking it; None too if that cannot be taken.
         equilibrium: at y*, so that the linearised loop is stable under the integrator.
         finest: beyond which no run goes.
+        ends: the status with which the first step ends the run; None if it does not.
     """
 
     start: int | None
     equilibrium: int | None
     finest: int = division.PIECES
+    ends: str | None = None
 
 
 def forecast(system: System, clock: Clock) -> Pieces | None:
@@ -40,19 +43,16 @@ def forecast(system: System, clock: Clock) -> Pieces | None:
         return None
     share = 2.0 * clock.timestep / (STABLE[system.integrator] * longest)  # 0: no mode decays
     level = 0 if share <= 1.0 else int(np.ceil(np.log2(share)))
-    return Pieces(_at_start(system, clock), _power(level))
+    start, ends = _at_start(system, clock)
+    return Pieces(start, 1 << level if level <= division.FINEST else None, ends=ends)
 
 
-def _power(level: int) -> int | None:
-    return 1 << level if level <= division.FINEST else None
-
-
-def _at_start(system: System, clock: Clock) -> int | None:
+def _at_start(system: System, clock: Clock) -> tuple[int | None, str | None]:
     """As a run does, since it is one, of a single step."""
     loop = system.closed_loop(clock)
     loop.advance(1, 1)
     raise_pending()
-    if loop.monitor[watch.EXIT] == watch.STEP_TOO_SMALL:
-        return None
+    if loop.monitor[watch.EXIT] != watch.INSIDE:
+        return None, EXITS[int(loop.monitor[watch.EXIT])]
     smallest = loop.monitor[watch.SMALLEST_STEP]
-    return 1 if smallest == 0.0 else round(clock.timestep / float(smallest))
+    return 1 if smallest == 0.0 else round(clock.timestep / float(smallest)), None

@@ -74,6 +74,9 @@ def not_certified(
 ) -> list[str]:
     """What cannot be certified, and why."""
     found = list(theorem.obstacles)
+    other = pieces is not None and pieces.ends not in (None, "step_too_small")
+    if pieces is not None and other:
+        found.append(f"that this run goes on to its end: its first step ends it as {pieces.ends}")
     places = (
         [] if pieces is None else [("start", pieces.start), ("equilibrium", pieces.equilibrium)]
     )
@@ -82,7 +85,7 @@ def not_certified(
         " the timestep are needed, and it ends there as step_too_small (mode 'implicit', a larger"
         " rho or a smaller timestep can go on)"
         for place, count in places
-        if pieces is not None and count is None
+        if pieces is not None and count is None and not (other and place == "start")
     ]
     if not theorem.continuous:
         mode = theorem.system.mode

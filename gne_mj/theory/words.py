@@ -207,7 +207,10 @@ def _division(division: dict[str, Any]) -> str:
             return f"would have to be divided more finely than into {division['finest']}"
         return "whole" if count == 1 else f"divided into about {count}"
 
-    return f"{told(division['start'])} at the start, {told(division['equilibrium'])} at y*"
+    start = told(division["start"])
+    if division["ends"] not in (None, "step_too_small"):
+        start = f"the run ends in the first, {division['ends']},"
+    return f"{start} at the start, {told(division['equilibrium'])} at y*"
 
 
 def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
