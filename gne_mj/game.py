@@ -267,7 +267,7 @@ class Game:
             self.margins.copy(),
             np.arange(self.agents),
             np.arange(self.constraints_count),
-            functions.compiled_functions(self.kernels)[0],
+            functions.compiled_functions(self.kernels),
         )
         for array in arrays:
             array.flags.writeable = False

@@ -45,12 +45,14 @@ def weigh(game, q, tightening, rho, y, g, weights):
     return outside
 
 
-@cache
-def compiled_functions(game: ModuleType) -> tuple[NDArray[np.int64], list[Any]]:
-    """The addresses of a module's functions, as ``GameData.functions`` has them, and their owners.
+def compiled_functions(game: ModuleType) -> NDArray[np.int64]:
+    """The addresses of a module's functions, as ``GameData.functions`` has them."""
+    return np.array([owner.address for owner in _compiled(game)], dtype=np.int64)
 
-    q is given by its address and length, so is y.
-    """
+
+@cache
+def _compiled(game: ModuleType) -> list[Any]:
+    """The C functions, in the order of their numbers; q and y are given by address and length."""
     source = source_key(game)
 
     def cost(q, size, i, _a, _b, y, m):
@@ -115,7 +117,7 @@ def compiled_functions(game: ModuleType) -> tuple[NDArray[np.int64], list[Any]]:
                 )
         return 0
 
-    owners = [
+    return [
         callback(_OF_Y, cost),
         callback(_OF_Y, cost_gradient),
         callback(_OF_ROW, add_cost_hessian),
@@ -127,9 +129,6 @@ def compiled_functions(game: ModuleType) -> tuple[NDArray[np.int64], list[Any]]:
         callback(_OF_MANY, gradients),
         callback(_OF_MANY, slopes),
     ]
-    addresses = np.array([owner.address for owner in owners], dtype=np.int64)
-    addresses.flags.writeable = False
-    return addresses, owners
 
 
 @kernel
@@ -194,39 +193,31 @@ def evaluate(data, rho, y, g, weights):
 
 
 @kernel
-def values(data, constraints, y, out):
-    """Fill out with g_l(y) of these constraints."""
+def _for_many(data, function, which, rows, columns, y, out):
     q = data.parameters
     call_integer(
-        data.functions[_VALUES],
+        data.functions[function],
         (
-            address_in(q), len(q), address_in(constraints), len(constraints), 0, 0, address_in(y),
+            address_in(q), len(q), address_in(which), len(which), rows, columns, address_in(y),
             len(y), address_in(out),
         ),
     )  # fmt: skip
 
 
 @kernel
+def values(data, constraints, y, out):
+    """Fill out, one entry for each of these constraints, with g_l(y)."""
+    _for_many(data, _VALUES, constraints, 0, 0, y, out)
+
+
+@kernel
 def gradients(data, agents, y, out):
     """Fill these agents' entries of out (m,) with dJ_i/dy_a."""
-    q = data.parameters
-    call_integer(
-        data.functions[_GRADIENTS],
-        (
-            address_in(q), len(q), address_in(agents), len(agents), address_in(data.offsets), 0,
-            address_in(y), len(y), address_in(out),
-        ),
-    )  # fmt: skip
+    _for_many(data, _GRADIENTS, agents, address_in(data.offsets), 0, y, out)
 
 
 @kernel
 def slopes(data, constraints, rows, columns, y, out):
-    """Fill out with dg_l/dy_a: of the k-th of these constraints for a in columns[rows[k]:...]."""
-    q = data.parameters
-    call_integer(
-        data.functions[_SLOPES],
-        (
-            address_in(q), len(q), address_in(constraints), len(constraints), address_in(rows),
-            address_in(columns), address_in(y), len(y), address_in(out),
-        ),
-    )  # fmt: skip
+    """Fill out with dg_l/dy_a, in compressed rows: of the k-th of these constraints for each a in
+    columns[rows[k]:rows[k + 1]]."""
+    _for_many(data, _SLOPES, constraints, address_in(rows), address_in(columns), y, out)

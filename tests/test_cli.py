@@ -6,11 +6,13 @@ import subprocess
 import sys
 import time
 import tomllib
+from types import SimpleNamespace
 
 import pytest
 from commands import COMMAND, environment, gne, gne_here
 
 import gne_mj
+from gne_mj.cli import signals
 from gne_mj.scenario import load_scenario, shipped
 
 COMMANDS = ("run", "solve", "certify", "paper", "plot", "passivity", "scenarios")
@@ -262,3 +264,19 @@ main()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     number = getattr(signal, name)
     assert (done.returncode, done.stderr) == (128 + number, "gne-mj: interrupted\n")
+
+
+def test_what_listened_before_a_command_listens_again(monkeypatch):
+    """To what Python cannot raise, and to signals; one of before is no matter of this command."""
+    heard = []
+    monkeypatch.setattr(sys, "unraisablehook", heard.append)
+    handlers = {number: signal.getsignal(number) for number in signals.ENDING}
+    with pytest.raises(KeyboardInterrupt), signals.unwinding():
+        signal.raise_signal(signal.SIGTERM)
+    assert signals.came()
+    with signals.unwinding():
+        assert not signals.came()
+        sys.unraisablehook(SimpleNamespace(exc_value=ValueError("else")))
+    assert len(heard) == 1
+    assert sys.unraisablehook == heard.append
+    assert {number: signal.getsignal(number) for number in signals.ENDING} == handlers

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import coupled_game
 import numpy as np
 import pytest
+import short_law
 from builders import FIVE, UNEQUAL, V0, clock, integrators, robot_state, robot_system
 from plain_loops import parts_of, run_plain
 
@@ -117,6 +118,19 @@ def test_a_known_delay_does_not_deceive_mode_implicit(steps):
     assert found.u[:-1] == pytest.approx(np.array(expected), abs=1e-6)
     for k in range(9):
         assert np.array_equal(found.seen[k], found.y[max(k - 2, 0)])
+
+
+class ShortLaw(FullInformation):
+    @property
+    def kernels(self):
+        return short_law
+
+
+def test_a_law_of_ones_own_needs_no_kernel_of_agents_alone():
+    given = {"mode": "implicit", "integrator": "euler"}
+    expected = run_plain(robot_system(robot_state(FIVE), **given), clock(0.01), 3)
+    found = run_plain(robot_system(robot_state(FIVE), law=ShortLaw(), **given), clock(0.01), 3)
+    assert np.array_equal(found.u, expected.u)
 
 
 # ------------------------------------------------------------------------------- one equation

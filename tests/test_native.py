@@ -160,7 +160,6 @@ def test_loops_are_cached_between_processes(tmp_path):
     assert any(tmp_path.rglob("*.nbi"))
 
 
-@pytest.mark.skipif(native.INTERPRETED, reason="loops are not compiled")
 def test_loops_are_compiled_once_for_all_games_laws_and_agents(tmp_path):
     """Each of these has another game, law, agent type or mode; two have no loop of a fixed step."""
     for name, changes in (

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 _OTHERS = (signal.SIGTERM, signal.SIGHUP)  # than Ctrl-C, for which Python has an exception already
 ENDING = (signal.SIGINT, *_OTHERS)
 _received, _came = int(signal.SIGINT), False
-_SOON = 0.05  # s
+_SOON = 0.05  # s until a signal comes again that Python has swallowed
 
 
 @contextmanager
@@ -22,28 +22,30 @@ def unwinding() -> Iterator[None]:
     What is ignored stays so, as SIGHUP under nohup. A signal that comes while Python finalises an
     object comes again soon after, since what is raised there is only printed.
     """
+    global _came
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    _came, others = False, sys.unraisablehook
     before = {number: signal.getsignal(number) for number in ENDING}
     for number, handler in before.items():
         if handler in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _end)
-    sys.unraisablehook = _unraisable
+
+    def unraisable(what: Any) -> None:
+        if isinstance(what.exc_value, KeyboardInterrupt):
+            with suppress(RuntimeError):  # Python is ending anyway
+                threading.Timer(_SOON, _thread.interrupt_main, (_received,)).start()
+        else:
+            others(what)
+
+    sys.unraisablehook = unraisable
     try:
         yield
     finally:
-        sys.unraisablehook = sys.__unraisablehook__
+        sys.unraisablehook = others
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _unraisable(unraisable: Any) -> None:
-    if isinstance(unraisable.exc_value, KeyboardInterrupt):
-        with suppress(RuntimeError):  # Python is ending anyway
-            threading.Timer(_SOON, _thread.interrupt_main, (_received,)).start()
-    else:
-        sys.__unraisablehook__(unraisable)
 
 
 def received() -> int:
@@ -52,7 +54,7 @@ def received() -> int:
 
 
 def came() -> bool:
-    """Whether one has come that unwound, or tried to."""
+    """Whether one has come since :func:`unwinding` began that unwound, or tried to."""
     return _came
 
 

@@ -97,8 +97,8 @@ def build(at: Offsets, fleet: ModuleType) -> Any:
             for r in range(len(y)):
                 y[r] = state[r * states + output]
             found = INSIDE
+            games.values(data_of_game, data_of_game.all_constraints, y, g)
             for k in range(len(g)):
-                g[k] = games.constraint(data_of_game, k, y)
                 if found == INSIDE and not g[k] < 0.0:
                     found = k
             for array in (qpos, qvel, act):

@@ -15,7 +15,7 @@ COUNT = 10
 
 @kernel
 def action(problem, y, weights, memory, work, u):
-    """Fill u (m,); -1, or agent * p + constraint of the first estimate that is not inside."""
+    """Fill u (m,) at y (m,); -1, or agent * p + constraint of the first estimate not inside."""
     return call_integer(
         problem.functions[ACTION],
         (
@@ -27,7 +27,7 @@ def action(problem, y, weights, memory, work, u):
 
 @kernel
 def rate(problem, y, memory, out):
-    """Fill out with the rate of the law's memory."""
+    """Fill out, as long as the law's memory, with its rate at y (m,)."""
     if len(memory) > 0:
         call_integer(
             problem.functions[RATE],
@@ -85,7 +85,8 @@ def add_pull_slope(problem, i, a, y, memory, out):
 
 @kernel
 def own_profile(problem, i, y, memory, profile):
-    """Fill profile (m,) with what agent i's barrier reads; how its own block moves."""
+    """Fill profile (m,) with what agent i's barrier reads; by how much its own block moves with its
+    own action."""
     return call_number(
         problem.functions[OWN_PROFILE],
         (problem.table, i, address_in(y), address_in(memory), address_in(profile)),
@@ -100,7 +101,10 @@ def settle(problem, ahead, held):
 
 @kernel
 def solve(problem, b, memory, work):
-    """Solve for the outputs of the period's end, in work.solver; how that ended."""
+    """Solve for the outputs of the period's end; how that ended (:mod:`gne_mj.loops.newton`).
+
+    work.solver has base and slope of the plant's map, and b is the half bandwidth of the matrix.
+    """
     return call_integer(
         problem.functions[SOLVE],
         (

@@ -150,13 +150,15 @@ def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
         law.settle(floats_at(ahead, m), floats_at(held, m))
         return 0
 
-    return {
+    found = {
         functions.PREPARE: callback(_whole(*[_whole] * 5), prepare),
         functions.PULLS: callback(_whole(*[_whole] * 6), pulls),
         functions.ADD_PULL_SLOPE: callback(_whole(*[_whole] * 6), add_pull_slope),
-        functions.OWN_PROFILE: callback(_real(*[_whole] * 5), own_profile),
         functions.SETTLE: callback(_whole(*[_whole] * 3), settle),
     }
+    if hasattr(law, "own_profile"):  # what agents alone need of a law
+        found[functions.OWN_PROFILE] = callback(_real(*[_whole] * 5), own_profile)
+    return found
 
 
 @cache

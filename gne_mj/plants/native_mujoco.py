@@ -104,7 +104,8 @@ def offsets() -> Offsets:
     _check_arrays(data)
     for kind in LOST:
         data.warning[kind].number = 1
-        if _lost(result, data) != kind:
+        pair = ctypes.c_int64.from_address(data._address + 8 * (result.warning + kind)).value
+        if pair >> 32 != 1:
             raise unknown_layout("mjData.warning")
         data.warning[kind].number = 0
     if ctypes.c_int64.from_address(model._address + 8 * result.nuserdata).value != 7919:
@@ -350,23 +351,15 @@ def forces_lost(at, data, nv):
     return -1
 
 
-def _lost(at: Offsets, data: mujoco.MjData) -> int:
-    """The same from Python."""
-    for kind in LOST:
-        address = data._address + 8 * (at.warning + kind)
-        if ctypes.c_int64.from_address(address).value >> 32:
-            return kind
-    return -1
-
-
 def check_warnings(data: mujoco.MjData) -> None:
     """Refuse to go on where MuJoCo has left out forces, and not for numbers that are not finite.
 
     Raises:
         EngineError: contacts or constraints did not fit, or an inertia is singular.
     """
-    if (kind := _lost(offsets(), data)) >= 0 and np.all(np.isfinite(data.qvel)):
-        raise EngineError(f"by {data.time:.6g} s {lost_words(kind)}")
+    for kind in LOST:
+        if data.warning[kind].number and np.all(np.isfinite(data.qvel)):
+            raise EngineError(f"by {data.time:.6g} s {lost_words(kind)}")
 
 
 _installed = threading.Lock()
