@@ -22,9 +22,18 @@ def environment():
     return {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "PYTHONPATH")}
 
 
-def hear_hangups():
-    """In a new process: SIGHUP ends it, also where the tests run under nohup and ignore it."""
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+@contextmanager
+def hearing_hangups():
+    """Processes started here end at SIGHUP, also where the tests run under nohup and ignore it.
+
+    A signal that is ignored stays so in a new process, one with a handler is its default there. A
+    preexec_fn would do the same, but forks, of which JAX warns once a test has imported it.
+    """
+    before = signal.signal(signal.SIGHUP, lambda *_: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def gne(*arguments):
@@ -42,11 +51,11 @@ def running(*arguments, until):
     Hands out the process, whose standard output is a pipe.
     """
     master, terminal = pty.openpty()
-    process = subprocess.Popen(
-        [COMMAND, *map(str, arguments)], stdout=subprocess.PIPE, stderr=terminal, text=True,
-        env={**environment(), "TERM": "xterm", "COLUMNS": "200"}, start_new_session=True,
-        preexec_fn=hear_hangups,
-    )  # fmt: skip
+    with hearing_hangups():
+        process = subprocess.Popen(
+            [COMMAND, *map(str, arguments)], stdout=subprocess.PIPE, stderr=terminal, text=True,
+            env={**environment(), "TERM": "xterm", "COLUMNS": "200"}, start_new_session=True,
+        )  # fmt: skip
     os.close(terminal)
     shown, ready = bytearray(), threading.Event()
 

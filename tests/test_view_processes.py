@@ -13,7 +13,7 @@ from urllib.request import urlopen
 
 import psutil
 import pytest
-from commands import hear_hangups
+from commands import hearing_hangups
 
 from gne_mj.trajectory import Trajectory
 
@@ -41,10 +41,11 @@ def start():
     started = []
 
     def begin(command):
-        process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, start_new_session=True, preexec_fn=hear_hangups,
-        )  # fmt: skip
+        with hearing_hangups():
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                text=True, start_new_session=True,
+            )  # fmt: skip
         started.append(process)
         for line in process.stderr:
             if line.startswith("view"):
