@@ -10,8 +10,10 @@ from builders import (
     UNEQUAL,
     V0,
     clock,
+    distributed,
     integrators,
     osnr_system,
+    pi_cascades,
     random_robot_state,
     relative_error,
     robot_state,
@@ -24,9 +26,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from gne_mj.controllers import FullInformation
+from gne_mj.controllers import settings as settings_of_laws
 from gne_mj.faults import Bias
 from gne_mj.games import ten_channels
-from gne_mj.loops import division
+from gne_mj.loops import division, faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.simulation import Simulation
 from gne_mj.theory import certify
@@ -187,6 +190,31 @@ def test_a_law_that_cannot_keep_the_set_leaves_it_and_that_is_said(engine):
     assert report["actuators"]["saturated"] is not None
 
 
+def near_darkness(share):
+    """Ten channels, fully distributed, one with only this share of the others' power."""
+    y = np.full(10, 0.2)
+    y[2] *= share
+    return osnr_system(pi_cascades(10), distributed(), y)
+
+
+def test_an_exit_that_finer_pieces_do_not_have_is_not_the_laws_own():
+    """Its barrier is at z, which starts as near the bound: 1/4096 of a step throws outputs out."""
+    report = Simulation([near_darkness(1e-9)], clock(0.002, 0.1)).run().reports["channels"]
+    assert report["status"] == "step_too_small"
+    assert report["exit"]["value"] < 0
+
+
+def test_an_exit_that_finer_pieces_have_too_is_the_laws_own():
+    """Less near, epsilon is too large all the same: with any timestep outputs leave together."""
+    times = []
+    for h in (0.002, 0.0005):
+        report = Simulation([near_darkness(0.01)], clock(h, 0.1)).run().reports["channels"]
+        assert report["status"] == "left_feasible_set"
+        assert report["exit"]["value"] >= 0
+        times.append(report["exit"]["time"])
+    assert times[0] == pytest.approx(times[1], abs=1e-6)
+
+
 def test_the_report_counts_divided_steps():
     done = gne_here(
         "run", "velocity-sync", "--json", "--set", "simulation.duration=0.1",
@@ -232,22 +260,41 @@ def test_a_first_step_that_ends_the_run_otherwise_is_no_matter_of_its_length():
 # --------------------------------------------------------------- pieces of a step, as plain Python
 
 
-@given(st.lists(st.sampled_from(["fails", "stands", "easy"]), max_size=300))
+def room_for_pieces(m, p):
+    """Those arrays of a loop's that pieces are judged by."""
+    return SimpleNamespace(
+        y=np.zeros(m), g=np.zeros(p), u=np.zeros(m), demand=np.zeros(m),
+        division=np.zeros(division.length(m, p)),
+    )  # fmt: skip
+
+
+@given(
+    st.booleans(), st.lists(st.sampled_from(["fails", "leaves", "stands", "easy"]), max_size=300)
+)
 @settings(deadline=None)
-def test_pieces_fill_their_steps_whatever_fails(outcomes):
+def test_pieces_fill_their_steps_whatever_fails(guarded, outcomes):
     """Each begins to the bit where the one before ended, on the grid of its own length."""
     h, step = 0.007, 3
-    divided, monitor = np.zeros(division.HEADER), np.zeros(watch.length(1, 1))
-    time = step * h
+    problem = SimpleNamespace(settings=np.full(settings_of_laws.COUNT, float(guarded)))
+    work, monitor = room_for_pieces(1, 1), np.zeros(watch.length(1, 1))
+    divided, time = work.division, step * h
     for outcome in outcomes:
-        length = division.piece(divided, h)
+        length, level = division.piece(divided, h), divided[division.LEVEL]
         assert division.begins(divided, step, h) == time
-        assert divided[division.POSITION] % (division.PIECES * (length / h)) == 0
-        assert h / division.PIECES <= length <= h
-        if outcome == "fails":
-            finest = divided[division.LEVEL] == division.FINEST
-            assert division.halve(divided, monitor) == (not finest)
-            continue
+        assert divided[division.POSITION] % (division.UNITS * (length / h)) == 0
+        assert length == h / 2**level
+        assert level <= (division.FINEST if guarded else division.DEEPEST)
+        if outcome in ("fails", "leaves"):
+            if outcome == "leaves":
+                watch.leave(monitor, watch.LEFT_SET, time, -1, 0, 1.0, 0)
+            if division.halve(faultless, step, h, 0, problem, work, monitor):
+                assert monitor[watch.EXIT] == watch.INSIDE
+                continue
+            own = outcome == "leaves" and level == division.DEEPEST
+            assert monitor[watch.EXIT] == (watch.LEFT_SET if own else watch.STEP_TOO_SMALL)
+            assert monitor[watch.EXIT_TIME] == time
+            assert level >= division.FINEST
+            return
         divided[division.EASY] = float(outcome == "easy")
         time = division.ends(divided, step, h)
         step += division.go_on(divided, h, monitor)
@@ -255,11 +302,27 @@ def test_pieces_fill_their_steps_whatever_fails(outcomes):
         assert monitor[watch.DIVIDED] <= step - 3
 
 
+def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
+    problem = SimpleNamespace(settings=np.zeros(settings_of_laws.COUNT))
+    work, monitor = room_for_pieces(1, 1), np.zeros(watch.length(1, 1))
+    work.division[division.LEVEL] = division.FINEST
+    stood = 0
+    while True:
+        watch.leave(monitor, watch.LEFT_SET, 0.0, -1, 0, 1.0, 0)
+        if not division.halve(faultless, 0, 0.1, 0, problem, work, monitor):
+            break
+        division.go_on(work.division, 0.1, monitor)
+        work.division[division.LEVEL] = division.DEEPEST - 1
+        stood += 1
+    assert stood == division.PIECES
+    assert monitor[watch.EXIT] == watch.STEP_TOO_SMALL
+
+
 def piece_of(rate, g, y, h):
     """What division.judge says of one Runge-Kutta piece of y' = rate(y) with constraints g."""
     y = np.asarray(y, dtype=float)
     m, p = len(y), len(g(y))
-    work = SimpleNamespace(y=np.zeros(m), g=np.zeros(p), division=np.zeros(division.length(m, p)))
+    work = room_for_pieces(m, p)
     data = SimpleNamespace(
         tightening=np.zeros(p), member_pointer=m * np.arange(p + 1),
         member_index=np.tile(np.arange(m), p), offsets=np.arange(m + 1),

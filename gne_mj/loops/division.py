@@ -19,6 +19,11 @@ its length, where that lies on the coarser grid and no piece has failed lately. 
 the present state alone, which ``work.division`` is part of, so that a run comes out the same
 however it is cut into calls.
 
+Where a law does not measure what its barrier keeps inside, as the fully distributed one, and
+actuators do what it asks for, an exit can be the law's own or the integrator's. The piece is then
+divided on, down to 2^-32 of the step, with as many pieces as a step may have: an exit that is still
+there is the law's own.
+
 Outputs, slacks and (in runs without faults) the law are evaluated at a piece's end to be looked at;
 the next piece begins with them in place of evaluating them again.
 """
@@ -34,18 +39,21 @@ from gne_mj.native import copy, kernel
 
 FINEST = 12  # steps are halved at most so often
 PIECES = 1 << FINEST
-SHARES = tuple(2.0**-level for level in range(FINEST + 1))
+DEEPEST = 32  # to tell whether an exit is the law's own: so often
+UNITS = 1 << DEEPEST
+SHARES = tuple(2.0**-level for level in range(DEEPEST + 1))
 
 # Entries of ``work.division``, before the arrays of Stages
 LEVEL = 0  # pieces are 2^-LEVEL of a step
-POSITION = 1  # where in its step the next piece begins, in 1/PIECES of it
+POSITION = 1  # where in its step the next piece begins, in 1/UNITS of it
 CALM = 2  # pieces since one failed
 KNOWN = 3  # what is evaluated at the present state, one of the constants below
 SPLIT = 4  # 1: the present step is divided
 EASY = 5  # 1: twice the length is sure to do
 RATED = 6  # Euler, 1: the second row of Stages.g has the rates of g in the piece before
 SIZED = 7  # 1: Stages.size is known
-HEADER = 8
+DEEP = 8  # pieces shorter than 1/PIECES since one that was not
+HEADER = 9
 
 END = -1  # in place of a stage's number: the end of a piece
 NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what the law asks for
@@ -101,16 +109,16 @@ def piece(division, h):
 @kernel
 def begins(division, step, h):
     """Time in s at which the present piece begins."""
-    return step * h + division[POSITION] * (h * SHARES[FINEST])
+    return step * h + division[POSITION] * (h * SHARES[DEEPEST])
 
 
 @kernel
 def ends(division, step, h):
     """Time in s at which it ends, to the bit that at which the next one begins."""
-    position = division[POSITION] + PIECES * SHARES[int(division[LEVEL])]
-    if position == PIECES:
+    position = division[POSITION] + UNITS * SHARES[int(division[LEVEL])]
+    if position == UNITS:
         return (step + 1) * h
-    return step * h + position * (h * SHARES[FINEST])
+    return step * h + position * (h * SHARES[DEEPEST])
 
 
 @kernel
@@ -166,7 +174,7 @@ def error_of(count, h, problem, work, stages, k):
     """The error of slack k in a piece of h seconds over what is allowed of it."""
     m, p, start = len(work.y), len(work.g), stages.g[k]
     slack = -start - problem.data.tightening[k]
-    finest = work.division[LEVEL] == FINEST
+    finest = work.division[LEVEL] >= FINEST
     if count == 1:
         if work.division[RATED] == 0.0 or finest:
             return 0.0
@@ -209,7 +217,7 @@ def judge(count, h, problem, work):
     if ordinary(count, problem, work, stages):
         division[RATED] = 0.0
         return -1
-    finest = division[LEVEL] == FINEST
+    finest = division[LEVEL] >= FINEST
     for k in range(p):
         error = error_of(count, h, problem, work, stages, k)
         use, gain = use_of(count, problem, work, stages, k)
@@ -228,16 +236,17 @@ def judge(count, h, problem, work):
 def go_on(division, h, monitor):
     """Move on to the end of a piece that stands; whether its step is done."""
     level = int(division[LEVEL])
+    division[DEEP] = division[DEEP] + 1.0 if level > FINEST else 0.0
     if level > 0:
         division[SPLIT] = 1.0
         length = h * SHARES[level]
         if monitor[watch.SMALLEST_STEP] == 0.0 or length < monitor[watch.SMALLEST_STEP]:
             monitor[watch.SMALLEST_STEP] = length
-    position = int(division[POSITION]) + (PIECES >> level)
-    if level > 0 and division[EASY] > 0.0 and position % (2 * (PIECES >> level)) == 0:
+    position = int(division[POSITION]) + (UNITS >> level)
+    if level > 0 and division[EASY] > 0.0 and position % (2 * (UNITS >> level)) == 0:
         division[LEVEL] -= 1.0
-    division[POSITION] = position % PIECES
-    if position < PIECES:
+    division[POSITION] = position % UNITS
+    if position < UNITS:
         return False
     monitor[watch.DIVIDED] += division[SPLIT]
     division[SPLIT] = 0.0
@@ -245,23 +254,12 @@ def go_on(division, h, monitor):
 
 
 @kernel
-def halve(division, monitor):
-    """Take back a piece that failed: half of it comes next; False if it is the finest."""
-    division[KNOWN] = NOTHING
-    if division[LEVEL] == FINEST:
-        return False
-    division[LEVEL] += 1.0
-    division[CALM] = 0.0
-    watch.forget_exit(monitor)
-    return True
+def halve(faults, step, h, which, problem, work, monitor):
+    """Take back a piece that failed: half of it comes next; False if there is nothing finer.
 
-
-@kernel
-def give_up(faults, step, h, which, problem, work, monitor):
-    """Latch how a run ends whose finest piece has failed.
-
-    Outputs cannot leave in continuous time where the whole barrier acts on them as they are; if
-    they do all the same, it is the step that fails, not the law.
+    How the run ends is then latched in the monitor. Outputs cannot leave in continuous time where
+    the whole barrier acts on them as they are; if they do all the same, it is the step that fails,
+    not the law.
 
     Args:
         faults: module of kernels.
@@ -270,14 +268,25 @@ def give_up(faults, step, h, which, problem, work, monitor):
         problem, work, monitor: of the run.
     """
     division = work.division
-    start = stages_of(division, len(work.y), len(work.g)).g
-    guarded = problem.settings[GUARDED] > 0.0 and faults.measured(problem)
+    left = monitor[watch.EXIT] == watch.LEFT_SET
+    obeyed = True
     for r in range(len(work.u)):
-        guarded &= work.u[r] == work.demand[r]
-    if guarded and monitor[watch.EXIT] == watch.LEFT_SET:
+        obeyed &= work.u[r] == work.demand[r]
+    guarded = obeyed and problem.settings[GUARDED] > 0.0 and faults.measured(problem)
+    level = int(division[LEVEL])
+    doubtful = (left and obeyed and not guarded) or level > FINEST
+    division[KNOWN] = NOTHING
+    if level < FINEST or (doubtful and level < DEEPEST and division[DEEP] < PIECES):
+        division[LEVEL] += 1.0
+        division[CALM] = 0.0
+        watch.forget_exit(monitor)
+        return True
+    if left and (guarded or (doubtful and level < DEEPEST)):
         which = int(monitor[watch.EXIT_CONSTRAINT])
         watch.forget_exit(monitor)
+    start = stages_of(division, len(work.y), len(work.g)).g
     watch.leave(
         monitor, watch.STEP_TOO_SMALL, begins(division, step, h), -1, which, start[which], 0
     )
     division[POSITION] = 0.0
+    return False

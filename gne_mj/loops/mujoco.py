@@ -235,8 +235,7 @@ def build(
                 restore(functions, model, data, saved[0])
                 if divided[division.POSITION] == 0.0:
                     copy(saved[0], saved[1])
-                if not division.halve(divided, monitor):
-                    division.give_up(faults, step, h, which, problem, work, monitor)
+                if not division.halve(faults, step, h, which, problem, work, monitor):
                     restore(functions, model, data, saved[1])
                     break
             userdata[start + STEP_NOW] = step

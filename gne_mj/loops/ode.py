@@ -254,9 +254,8 @@ def build(faults: ModuleType = faultless) -> Any:
                 continue
             if divided[division.POSITION] == 0.0:
                 copy(state, begun)
-            good = division.halve(divided, monitor)
+            good = division.halve(faults, step, h, which, problem, work, monitor)
             if not good:
-                division.give_up(faults, step, h, which, problem, work, monitor)
                 copy(begun, state)
         if swapped:
             copy(state, trial)

@@ -11,10 +11,9 @@ from campaign import campaign, parser
 from checks import LEFT
 from kinds import KINDS, Draw, draw
 
+from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import GneError
 from gne_mj.simulation import Simulation
-from gne_mj.theory import Theorem
-from gne_mj.theory.theorem import CONDITIONAL
 
 LARGEST = 160  # states of a system that is compared
 WANTED = 1e-6  # greatest relative difference
@@ -75,7 +74,7 @@ def one(seed: int, index: int, *, share: float) -> dict[str, Any]:
     if drawn.loop.length > LARGEST:
         return row
     # The theorem is for some small epsilon: with this one continuous time may leave, too.
-    conditional = row["status"] in LEFT and Theorem(system).status == CONDITIONAL
+    conditional = row["status"] in LEFT and isinstance(system.law, FullyDistributed)
     if conditional and leaves(drawn, times[-1] + 2 * clock.sample_period):
         row["status"] = AS_CONTINUOUS
     elif against:
