@@ -70,7 +70,7 @@ def run_plain(system, timing, periods, plant=held_map):
         faults.begin(channels, problem, clock, step, 0, state, memory, scratch)
         before = memory.copy()
         assert implicit.act(
-            faults, plant, (), problem, channels, clock, time, step, 0, state, memory, scratch,
+            faults, plant, (), problem, channels, clock, time, step, state, memory, scratch,
             monitor,
         )  # fmt: skip
         faults.deliver(problem, clock, step, 0, scratch)

@@ -9,8 +9,8 @@ from gne_mj.native import address_in, call_integer, call_number, kernel
 
 # Entries of ``problem.functions``, the latter for mode implicit
 ACTION, RATE, PROPAGATE, STORAGE = range(4)
-PREPARE, PULLS, ADD_PULL_SLOPE, OWN_PROFILE, SETTLE, SOLVE = range(4, 10)
-COUNT = 10
+PREPARE, PULLS, ADD_PULL_SLOPE, OWN_PROFILE, SETTLE, SOLVE, ACT = range(4, 11)
+COUNT = 11
 
 
 @kernel
@@ -112,3 +112,23 @@ def solve(problem, b, memory, work):
             address_in(work.solver), len(work.solver),
         ),
     )  # fmt: skip
+
+
+@kernel
+def act(problem, place, time, step, state, memory):
+    """Fill work.demand in mode implicit; False, with the exit latched, if there is no input.
+
+    Args:
+        problem: of the run.
+        place: addresses of the loop's room and, in MuJoCo, of model and data.
+        time: in s, at the start of ``step``.
+        step: which.
+        state: flat.
+        memory: the law's.
+    """
+    room, model, data = place
+    good = call_integer(
+        problem.functions[ACT],
+        (problem.table, room, time, step, address_in(state), address_in(memory), model, data),
+    )
+    return good != 0

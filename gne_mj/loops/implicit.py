@@ -30,8 +30,7 @@ FAR = 1e-2
 
 @kernel
 def act(
-    faults, plant, context, problem, channels, clock, time, step, stage, state, memory, work,
-    monitor,
+    faults, plant, context, problem, channels, clock, time, step, state, memory, work, monitor
 ):  # fmt: skip
     """Fill work.demand; False, with the exit latched, if there is no input."""
     m, states = channels.rest.shape
@@ -44,7 +43,7 @@ def act(
     solver.numbers[STANDS] = step + 1.0
     if found > 0.0:
         watch.compare(monitor, time, work.y, solver.ahead)
-    faults.sense(problem, clock, step, stage, work, work.y, work.seen)
+    faults.sense(problem, clock, step, 0, work, work.y, work.seen)
     known = faults.sense_state(
         plant, problem, channels, clock, step, work, state, solver.state, solver.scratch
     )
@@ -94,11 +93,9 @@ def act(
     watch.count_solution(monitor, time, solver.numbers[STEPS], agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
         constraint = int(work.now[SHELL])
-        watch.leave(
-            monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now[SHELL_VALUE], stage
-        )
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now[SHELL_VALUE], 0)
         return False
-    return usable(time, stage, work, monitor)
+    return usable(time, 0, work, monitor)
 
 
 @kernel

@@ -9,8 +9,22 @@ from numba import types
 from numpy.typing import NDArray
 
 from gne_mj.controllers.settings import NOW
-from gne_mj.loops import functions
-from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, STATES, STEP, problem_in
+from gne_mj.loops import functions, implicit
+from gne_mj.loops.layout import (
+    ACTIONS,
+    AGENTS,
+    CONSTRAINTS,
+    HISTORY,
+    MEMORY,
+    SOLVER,
+    STATES,
+    STEP,
+    channels_in,
+    clock_in,
+    parts_of,
+    problem_in,
+    room_needed,
+)
 from gne_mj.loops.newton import solver_in
 from gne_mj.native import callback, source_key
 from gne_mj.table import floats_at, integers
@@ -25,23 +39,40 @@ class LawWork(NamedTuple):
     now: np.ndarray  # see gne_mj.controllers.settings
 
 
+class Implicit(NamedTuple):
+    """What mode implicit is made of.
+
+    Attributes:
+        equation: :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
+        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
+        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
+        at: where MuJoCo keeps what, for a plant that asks it.
+    """
+
+    equation: ModuleType
+    plant: ModuleType
+    faults: ModuleType
+    at: Any = ()
+
+
 def link(
-    law: ModuleType, game: ModuleType, *, memory: bool, equation: ModuleType | None
+    law: ModuleType, game: ModuleType, *, memory: bool, ahead: Implicit | None
 ) -> NDArray[np.int64]:
     """The addresses for ``problem.functions``: those that a run calls, the others 0.
 
     Args:
         law, game: modules of kernels.
         memory: whether the law has one.
-        equation: in mode implicit, :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
+        ahead: what belongs to mode implicit; None in the others.
     """
     addresses = np.zeros(functions.COUNT, dtype=np.int64)
     addresses[functions.ACTION] = action(law, game).address
     owners: dict[int, Any] = {}
     if memory:
         owners |= of_memory(law)
-    if equation is not None:
-        owners |= of_implicit(law, game) | {functions.SOLVE: solve(equation)}
+    if ahead is not None:
+        owners |= of_implicit(law, game) | {functions.SOLVE: solve(ahead.equation)}
+        owners[functions.ACT] = act(ahead.plant, ahead.faults, ahead.at)
     for entry, owner in owners.items():
         addresses[entry] = owner.address
     return addresses
@@ -177,3 +208,25 @@ def solve(equation: ModuleType) -> Any:
         )  # fmt: skip
 
     return callback(_whole(*[_whole] * 7), solve)
+
+
+@cache
+def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
+    """What mode implicit does at a control instant, for all laws and games."""
+    source = source_key(plant, faults)
+
+    def act(table, room, time, step, state, memory, model, data):
+        _ = source
+        steps = integers(table, STEP)
+        size = room_needed(
+            steps[ACTIONS], steps[CONSTRAINTS], steps[AGENTS], steps[HISTORY], steps[SOLVER]
+        )
+        monitor, _u, work, _rest = parts_of(floats_at(room, size), 0, steps)
+        good = implicit.act(
+            faults, plant, (at, model, data, table), problem_in(table), channels_in(table),
+            clock_in(table), time, step, floats_at(state, steps[ACTIONS] * steps[STATES]),
+            floats_at(memory, steps[MEMORY]), work, monitor,
+        )  # fmt: skip
+        return 1 if good else 0
+
+    return callback(_whole(_whole, _whole, _real, *[_whole] * 5), act)

@@ -43,7 +43,7 @@ from gne_mj.loops.layout import (
 )
 from gne_mj.loops.ode import CONTINUOUS, look
 from gne_mj.loops.recorder import Recorder, record
-from gne_mj.native import callback, compiled, copy, kernel, source_key
+from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mujoco import MEMORY, NA, NQ, NU, NUSERDATA, NV, PLACES, ROOM, SIZES, STAGES
 from gne_mj.plants.native_mujoco import (
@@ -106,7 +106,7 @@ def build(
         fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
         faults: module of kernels, as :func:`gne_mj.loops.ode.look` has it.
     """
-    plant, source = fleet.AHEAD, source_key(fleet)
+    source = source_key(fleet)
 
     def control(model, data):
         _ = source
@@ -138,10 +138,10 @@ def build(
             fleet.gather(at, struct, table, state)
         channels = channels_in(table)
         storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
-        context = (at, address_of(model), struct, table)
+        place = (address_in(userdata) + 8 * start, address_of(model), struct)
         good = monitor[watch.EXIT] == watch.INSIDE and look(
-            faults, plant, context, problem, channels, clock, time, step, stage, storage, state,
-            memory, u, monitor, work,
+            faults, place, problem, channels, clock, time, step, stage, storage, state, memory, u,
+            monitor, work,
         )  # fmt: skip
         block = np.int64(userdata[start + RECORDER])
         if good and stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
@@ -223,7 +223,7 @@ def build(
                 fleet.refresh(model, data, table)
                 fleet.gather(at, data, table, state)
                 good = look(
-                    faults, plant, (at, model, data, table), problem, channels, clock,
+                    faults, (0, model, data), problem, channels, clock,
                     division.ends(divided, step, h), step, division.END, 0.0, state, memory, u,
                     monitor, work,
                 )  # fmt: skip

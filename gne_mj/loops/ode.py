@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gne_mj.loops import division, faultless, functions, implicit
+from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
@@ -40,7 +40,6 @@ from gne_mj.loops.layout import (
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import callback, copy, kernel, shaped, source_key
 from gne_mj.plants import functions as agents_functions
-from gne_mj.plants import held_map
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import EULER, RK4
 from gne_mj.table import floats_at, integers
@@ -64,8 +63,8 @@ def measure(channels, state, y):
 
 @kernel
 def look(
-    faults, plant, context, problem, channels, clock, time, step, stage, storage, state, memory, u,
-    monitor, work,
+    faults, place, problem, channels, clock, time, step, stage, storage, state, memory, u, monitor,
+    work,
 ):  # fmt: skip
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
@@ -77,8 +76,7 @@ def look(
 
     Args:
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
-        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
-        context: what that module needs of the engine.
+        place: see :func:`gne_mj.loops.functions.act`.
         problem, channels, clock: as the loop has them.
         time: at the stage, in s.
         step: which step this is.
@@ -114,10 +112,7 @@ def look(
             work.stands[0] = step
         faults.begin(channels, problem, clock, step, stage, state, memory, work)
         if clock.mode == IMPLICIT:
-            good = implicit.act(
-                faults, plant, context, problem, channels, clock, time, step, stage, state, memory,
-                work, monitor,
-            )  # fmt: skip
+            good = functions.act(problem, place, time, step, state, memory)
         else:
             seen = faults.sense(problem, clock, step, stage, work, y, work.seen)
             good = explicit_law(problem, time, max(stage, 0), seen, memory, work, monitor)
@@ -218,7 +213,7 @@ def build(faults: ModuleType = faultless) -> Any:
                     stage_state(point, length, state, k, trial)
                     now, at = trial, time + (0.5 * length, 0.5 * length, length)[point - 1]
                 good = look(
-                    faults, held_map, (), problem, channels, clock, at, step, stage, storage,
+                    faults, (address, 0, 0), problem, channels, clock, at, step, stage, storage,
                     now, now[size:], u, monitor, work,
                 )  # fmt: skip
                 if not good:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.native import kernel
-from gne_mj.plants import mjcf_ahead, mjcf_file, mjcf_robot
+from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import add_memory, read_model
@@ -38,13 +38,13 @@ from gne_mj.plants.native_mujoco import (
 )
 from gne_mj.table import Table
 
-__all__ = ["AGENT", "AHEAD", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
+__all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
 SENSOR = mujoco.mjtSensor
 VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
 
-AGENT, AHEAD = mjcf_robot, mjcf_ahead
+AGENT = mjcf_robot
 
 
 @kernel

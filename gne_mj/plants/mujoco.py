@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import callback, compiled, kernel, source_key
-from gne_mj.plants import flexible_robot, held_map
+from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import compile_model, compose, element_names
@@ -46,9 +46,8 @@ NQ, NV, NU, NUSERDATA, NA, ROOM, MEMORY = range(7)
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
 
-# What a loop asks of a module of fleets: its agents' type, the module that predicts outputs (these
-# robots' ODE, stepped as MuJoCo does, predicts to rounding), and the three kernels that follow
-AGENT, AHEAD = flexible_robot, held_map
+# What a loop asks of a module of fleets: its agents' type and the kernels that follow
+AGENT = flexible_robot
 
 
 @kernel

@@ -31,10 +31,11 @@ from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import NO_ORDER, Order, Problem, Sizes
 from gne_mj.loops.layout import Clock as LoopClock
 from gne_mj.loops.layout import Setup
-from gne_mj.loops.link import link
+from gne_mj.loops.link import Implicit, link
 from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import MODES, OdeLoop
 from gne_mj.margins import Disturbance
+from gne_mj.plants import held_map
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import METHODS
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -217,11 +218,21 @@ class System:
         return native_faults if self.faults else faultless
 
     @property
+    def _ahead(self) -> Implicit | None:
+        if self.equation is None:
+            return None
+        if not isinstance(self.agents, MjcfRobots):
+            return Implicit(self.equation, held_map, self.fault_kernels)
+        from gne_mj.plants import mjcf_ahead, native_mujoco  # late: MuJoCo is slow to import
+
+        return Implicit(self.equation, mjcf_ahead, self.fault_kernels, native_mujoco.offsets())
+
+    @property
     def functions(self) -> NDArray[np.int64]:
         """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
         return link(
             self.law.kernels, self.game.kernels,
-            memory=bool(len(self.loop_memory)), equation=self.equation,
+            memory=bool(len(self.loop_memory)), ahead=self._ahead,
         )  # fmt: skip
 
     @property
