@@ -62,6 +62,25 @@ def test_differences_know_their_error(kind, at, rate, reach):
     assert abs(value - slope) <= 20.0 * error + 1e-9 * abs(slope)
 
 
+def test_differences_know_what_rounding_does_next_to_a_bound():
+    """A disc's bound is there a difference of great numbers, of which short steps see the steps."""
+    vague = 0
+    for seed in range(3000):
+        rng = np.random.default_rng(seed)
+        slope, center, radius = rng.uniform([1.0, -0.5, 0.3], [4.0, 0.5, 2.0])
+        y = (center + radius * (1.0 - 10.0 ** rng.uniform(-10.0, -8.0))) / slope
+        h = steps(0.1 * (1.0 - (slope * y - center) / radius))
+        ahead, behind = (
+            np.array([(slope * (y + sign * t) - center) ** 2 - radius**2 for t in h])
+            for sign in (1.0, -1.0)
+        )
+        value, error = derivative(ahead, behind, h, around=1.0)
+        right = 2.0 * slope * (slope * y - center)
+        assert abs(value - right) <= 20.0 * error + 1e-5 * right, seed
+        vague += 20.0 * error > 1e-2 * right
+    assert vague < 2000
+
+
 def test_differences_are_accurate_where_functions_are_smooth():
     h = steps(0.5)
     value, error = derivative(np.exp(1 + h), np.exp(1 - h), h)

@@ -180,6 +180,18 @@ def test_channels_agree_with_scipy(kind, epsilon):
     assert abs(want[-1, 0] - 0.2) > 5e-3  # something happened
 
 
+def test_a_start_within_1e_10_of_a_bound_is_followed():
+    """The law acts there within 1e-12 s, before z moves: the first steps are shorter still."""
+    agents, y = pi_cascades(3), np.array([0.2, 1e-10, 0.1])
+    system = channels(agents, 1e-5, y=y)
+    rows, _, memory, loop = run_loop(system, 0.02, 5)
+    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    want = expected(
+        system, reference_pi(3), reference_osnr(three_channels()), np.arange(6) * 0.02, 1e-5, 1.0
+    )
+    assert np.max(np.abs(flat(rows, memory, 2) - want)) < 1e-6
+
+
 @pytest.mark.slow
 def test_robots_agree_with_scipy():
     y = np.array([1.0, 0.5, 1.5])

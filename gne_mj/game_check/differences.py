@@ -17,24 +17,27 @@ def steps(reach: float) -> Array:
     return np.array([reach / _RATIO**n for n in range(STEPS)])
 
 
-def derivative(ahead: Array, behind: Array, h: Array) -> tuple[float, float]:
+def derivative(ahead: Array, behind: Array, h: Array, around: float = 0.0) -> tuple[float, float]:
     """The derivative of f at 0, and an estimate of its error.
 
     One step of Richardson's extrapolation for each pair of neighbouring steps. Long steps suffer
-    from curvature and short ones from rounding; the result is where three extrapolations in a row
-    differ least, and the error how much, with what rounding of the values can do.
+    from curvature and short ones from rounding; the error is how much three extrapolations in a row
+    differ, with what rounding of values and arguments can do, and the result where that is least.
 
     Args:
         ahead: f(h), shape (STEPS,).
         behind: f(-h), shape (STEPS,).
         h: as :func:`steps` gives them.
+        around: size of the arguments, or of what f subtracts from them: near a bound f is small
+            because terms of that size cancel.
     """
     quotients = (ahead - behind) / (2.0 * h)
     weight = _RATIO**2
     better = (weight * quotients[1:] - quotients[:-1]) / (weight - 1.0)
     change = np.abs(np.diff(better))
     spread = np.maximum(change[1:], change[:-1])
-    best = int(np.argmin(spread))
     size = max(float(np.max(np.abs(ahead))), float(np.max(np.abs(behind))))
-    rounding = _ROUNDING * size / float(h[best + 2])
-    return float(better[best + 1]), float(spread[best]) + rounding
+    size = np.maximum(size, around * np.abs(better[1:-1]))
+    error = spread + _ROUNDING * size / h[2 : 2 + len(spread)]
+    best = int(np.argmin(error))
+    return float(better[best + 1]), float(error[best])

@@ -193,7 +193,10 @@ class Stencil:
     def derivative(self, function: Callable[[Array], float]) -> tuple[float, float]:
         """A function's derivative along the direction, and its error."""
         ahead = np.array([function(y) for y in self.ahead])
-        return derivative(ahead, np.array([function(y) for y in self.behind]), self.h)
+        behind = np.array([function(y) for y in self.behind])
+        moved = self.middle[self.direction != 0.0]
+        around = max(1.0, float(np.max(np.abs(moved)))) / float(np.max(np.abs(self.direction)))
+        return derivative(ahead, behind, self.h, around)
 
 
 def unit(length: int, a: int) -> Array:

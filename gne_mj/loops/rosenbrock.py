@@ -36,7 +36,10 @@ from gne_mj.plants.ode import Channels
 # How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
 SAFETY, GROW, SHRINK = 0.9, 6.0, 0.2
 POWER = 1.0 / ORDER
-SMALLEST = 1e-12  # step in s per max(1, time) below which a run ends
+# Step in s, relative to the time from EARLY on, below which a run ends; and how far beyond it is
+# looked whether the boundary is why, relative to the time from 1 s on
+SMALLEST, EARLY = 1e-12, 1e-6
+AHEAD = 1e-6
 
 # Entries of a loop's `progress`: the last accepted step runs from START to END.
 START, END, NEXT, LAST_STEP, LAST_ERROR, ACCEPTED, REJECTED, COUNT = range(8)
@@ -147,15 +150,16 @@ def try_step(
 
 
 @kernel
-def look_ahead(problem, channels, time, state, work, solver):
+def look_ahead(problem, channels, time, h, state, work, solver):
     """Tell in solver.exit if the boundary is why even the smallest step has failed.
 
     Next to the boundary the demand grows so fast that no step is accurate. The trial vector is
-    moved on along the step, until it is outside or a microsecond away.
+    moved on along the step of length h, until it is outside or a microsecond away.
     """
     y, trial = work.y, solver.trial
     size = channels.rest.size
-    for _ in range(20):
+    while h < AHEAD * max(1.0, time):
+        h *= 2.0
         for r in range(len(trial)):
             trial[r] += trial[r] - state[r]
         measure(channels, trial, y)
@@ -213,7 +217,7 @@ def step_on(
     linearise(problem, channels, states, state, u, work, solver.system)
     h, retried = progress[NEXT], False
     while True:
-        smallest = SMALLEST * max(1.0, time)
+        smallest = SMALLEST * max(EARLY, time)
         if not h > smallest:
             h = smallest
         error = try_step(
@@ -224,7 +228,7 @@ def step_on(
         if h == smallest:
             why = solver.exit
             if why[watch.EXIT] == watch.DIVERGED:
-                look_ahead(problem, channels, time, state, work, solver)
+                look_ahead(problem, channels, time, h, state, work, solver)
             watch.leave(
                 monitor, int(why[watch.EXIT]), time, why[watch.EXIT_AGENT],
                 why[watch.EXIT_CONSTRAINT], why[watch.EXIT_VALUE], why[watch.EXIT_STAGE],
