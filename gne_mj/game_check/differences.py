@@ -37,7 +37,7 @@ def derivative(ahead: Array, behind: Array, h: Array, around: float = 0.0) -> tu
     change = np.abs(np.diff(better))
     spread = np.maximum(change[1:], change[:-1])
     size = max(float(np.max(np.abs(ahead))), float(np.max(np.abs(behind))))
-    size = np.maximum(size, around * np.abs(better[1:-1]))
-    error = spread + _ROUNDING * size / h[2 : 2 + len(spread)]
+    sizes = np.maximum(size, around * np.abs(better[1:-1]))
+    error = spread + _ROUNDING * sizes / h[2 : 2 + len(spread)]
     best = int(np.argmin(error))
     return float(better[best + 1]), float(error[best])
