@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
+from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.native import copy, kernel
 
 
@@ -18,6 +19,7 @@ class FullInformation(Law):
     """Gradient feedback of the penalised costs, all actions measured."""
 
     information: ClassVar[str] = "full"
+    proven: ClassVar[LawTheorem] = LawTheorem("full information, lemma:FI and thm:FI")
     guarded: ClassVar[bool] = True
 
     @property

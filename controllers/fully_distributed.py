@@ -24,6 +24,7 @@ from gne_mj.controllers.estimates import (
 )
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
+from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
@@ -40,8 +41,16 @@ class FullyDistributed(Law):
     """
 
     information: ClassVar[str] = "distributed"
-    graph: Graph = field()  # hides the base class's default
-    epsilon: float
+    proven: ClassVar[LawTheorem] = LawTheorem(
+        "fully distributed, lemma:centreInv and the theorem after it",
+        strong=True,
+        singular_perturbation=True,
+    )
+    has_estimates: ClassVar[bool] = True
+    alone: ClassVar[bool] = True
+    rosenbrock: ClassVar[bool] = True
+    graph: Graph = field()  # these two hide the base class's defaults
+    epsilon: float = field()
     gain: float = 1.0
 
     def __post_init__(self) -> None:

@@ -35,6 +35,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers import settings
 from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
+from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph, GraphData
 
@@ -44,9 +45,20 @@ _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
 class Law(ABC):
     """A feedback law of one information structure.
 
+    What other modules ask of a law is here, so that none of them has to know which laws there are.
+
     Attributes:
         information: name of the information structure; "custom" if it is none of the paper's.
+        proven: what is proven of the law; a subclass, which may change the law, says it again.
         graph: over which agents communicate; None if they need not.
+        gain: k, the factor of the penalised pseudo-gradient in the input.
+        coupling: c, the factor of the Laplacian of all profiles in the input; 0 without.
+        time_constant: tau of the estimates in s, where the input has a Laplacian.
+        epsilon: time constant of fast estimates in s; None without.
+        has_estimates: whether its memory begins with each agent's row of estimates, (N, m).
+        alone: in mode implicit, whether each agent solves alone because its barrier is at what it
+            takes for the profile. Others may (``decentralised``), or solve all together.
+        rosenbrock: whether integrator rosenbrock knows its Jacobian.
         propagates: whether its memory can be propagated, as mode sampled needs.
         guarded: whether the barrier's whole gradient at the measured outputs is part of the input,
             so that outputs which are measured and driven as they should be cannot leave the set in
@@ -54,9 +66,28 @@ class Law(ABC):
     """
 
     information: ClassVar[str] = "custom"
+    proven: ClassVar[LawTheorem | None] = None
     graph: Graph | None = None
+    gain: float = 1.0
+    coupling: float = 0.0
+    time_constant: float = 1.0
+    epsilon: float | None = None
+    has_estimates: ClassVar[bool] = False
+    alone: ClassVar[bool] = False
+    rosenbrock: ClassVar[bool] = False
     propagates: bool = True
     guarded: ClassVar[bool] = False
+
+    @property
+    def theorem(self) -> LawTheorem | None:
+        """What is proven of this very law; None if nothing is."""
+        found: LawTheorem | None = vars(type(self)).get("proven")
+        return found
+
+    @property
+    def implicit(self) -> bool:
+        """Whether its kernels have what mode implicit solves with."""
+        return hasattr(self.kernels, "add_pull_slope")
 
     @property
     @abstractmethod

@@ -28,6 +28,7 @@ from gne_mj.controllers.estimates import (
 )
 from gne_mj.controllers.law import Law, check_positive, initial_estimates
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
+from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
 
@@ -43,6 +44,12 @@ class PartialInformation(Law):
     """
 
     information: ClassVar[str] = "partial"
+    proven: ClassVar[LawTheorem] = LawTheorem(
+        "partial information, lemma:nonlinearPI and the theorem after it",
+        strong=True,
+        at_estimates=True,
+    )
+    has_estimates: ClassVar[bool] = True
     guarded: ClassVar[bool] = True
     graph: Graph = field()  # hides the base class's default
     coupling: float = 1.0

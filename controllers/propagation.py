@@ -7,7 +7,7 @@ the exponential acts through its Chebyshev series, which only needs products wit
 Laplacian: work and memory grow with edges times agents.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.special import ive
@@ -27,9 +27,11 @@ _LONGEST = 1e8  # half the bound times s: some 90,000 terms
 class Propagator(NamedTuple):
     """exp(-L_j s) for all agents j, read-only: dense maps or a series, the other one empty."""
 
-    maps: np.ndarray  # (N, N, N), symmetric, row and column j of the j-th are zero
-    coefficients: np.ndarray  # of the Chebyshev polynomials in 2 L_j / bound - 1
-    numbers: np.ndarray  # [bound on the spectrum of L_j, s, exp(-s)]
+    # (N, N, N), symmetric, row and column j of the j-th are zero
+    maps: Annotated[np.ndarray, "n // (agents * agents), agents, agents"]
+    # of the Chebyshev polynomials in 2 L_j / bound - 1
+    coefficients: Annotated[np.ndarray, "n"]
+    numbers: Annotated[np.ndarray, "3"]  # [bound on the spectrum of L_j, s, exp(-s)]
 
 
 @kernel

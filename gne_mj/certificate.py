@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import verdicts
-from gne_mj.controllers import FullyDistributed
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
@@ -275,7 +274,7 @@ def _concerned(system: System, monitor: NDArray[np.float64]) -> list[int]:
 def _instead(system: System) -> str:
     """What does where steps cannot be divided finely enough."""
     ways = ["mode 'implicit'", "a larger rho", "a smaller timestep"]
-    if isinstance(system.law, FullyDistributed) and system.engine == "ode":
+    if system.law.rosenbrock and system.engine == "ode":
         ways.insert(0, "integrator 'rosenbrock'")
     return f"{', '.join(ways[:-1])} or {ways[-1]}"
 

@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
-from typing import Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,19 +49,22 @@ class GameData(NamedTuple):
     Index lists are in compressed rows: those of row r are ``index[pointer[r]:pointer[r + 1]]``.
     """
 
-    parameters: np.ndarray  # q, the game's own numbers
-    offsets: np.ndarray  # (N + 1,) where each agent's action starts in a profile
-    owner: np.ndarray  # (m,) the agent that each entry of a profile belongs to
-    cost_pointer: np.ndarray  # agent i -> the agents that appear in J_i (i itself first)
-    cost_index: np.ndarray
-    member_pointer: np.ndarray  # constraint l -> the agents that appear in g_l
-    member_index: np.ndarray
-    own_pointer: np.ndarray  # agent i -> the constraints that contain y_i
-    own_index: np.ndarray
-    tightening: np.ndarray  # (p,) t >= 0: the barrier guards g + t < 0
-    everyone: np.ndarray  # 0, ..., N - 1
-    all_constraints: np.ndarray  # 0, ..., p - 1
-    functions: np.ndarray  # addresses of the kernels' C functions, see gne_mj.game_functions
+    parameters: Annotated[np.ndarray, "n"]  # q, the game's own numbers
+    offsets: Annotated[np.ndarray, "N + 1", int]  # where each agent's action starts in a profile
+    owner: Annotated[np.ndarray, "m", int]  # the agent that each entry of a profile belongs to
+    # agent i -> the agents that appear in J_i (i itself first)
+    cost_pointer: Annotated[np.ndarray, "N + 1", int]
+    cost_index: Annotated[np.ndarray, "n", int]
+    # constraint l -> the agents that appear in g_l
+    member_pointer: Annotated[np.ndarray, "p + 1", int]
+    member_index: Annotated[np.ndarray, "n", int]
+    own_pointer: Annotated[np.ndarray, "N + 1", int]  # agent i -> the constraints that contain y_i
+    own_index: Annotated[np.ndarray, "n", int]
+    tightening: Annotated[np.ndarray, "p"]  # t >= 0: the barrier guards g + t < 0
+    everyone: Annotated[np.ndarray, "N", int]  # 0, ..., N - 1
+    all_constraints: Annotated[np.ndarray, "p", int]  # 0, ..., p - 1
+    # addresses of the kernels' C functions, see gne_mj.game_functions
+    functions: Annotated[np.ndarray, "n", int]
 
 
 @dataclass(frozen=True, eq=False)

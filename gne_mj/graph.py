@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -21,8 +21,8 @@ _DENSE = 300
 class GraphData(NamedTuple):
     """Neighbour lists for native code: agent i hears ``neighbour[pointer[i]:pointer[i + 1]]``."""
 
-    pointer: np.ndarray
-    neighbour: np.ndarray
+    pointer: Annotated[np.ndarray, "N + 1", int]
+    neighbour: Annotated[np.ndarray, "n", int]
 
 
 @dataclass(frozen=True, eq=False)

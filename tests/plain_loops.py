@@ -11,7 +11,7 @@ import numpy as np
 from gne_mj.loops import functions, implicit
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import inside, work
-from gne_mj.loops.layout import in_table
+from gne_mj.loops.layout import problem_and_table
 from gne_mj.loops.newton import solver_in
 from gne_mj.plants import held_map
 from gne_mj.plants.functions import compiled_functions
@@ -45,10 +45,10 @@ def parts_of(system, timing):
     game, setup = system.game, system.setup(timing)
     m, p, states = game.actions, game.constraints_count, system.agents.states
     scratch = work(m, p, game.agents, system._sizes)
-    solver = solver_in(scratch.solver, m, p, states, int(setup.problem.order.band[0]))
+    solver = solver_in(scratch.solver, setup.problem.order, p, states)
     kind = system.agents.kind
     channels = Channels(system.agents.parameters, setup.rest, compiled_functions(kind), kind.OUTPUT)
-    problem, table = in_table(setup, system.agents, len(system.loop_memory))
+    problem, table = problem_and_table(setup, system.agents, len(system.loop_memory))
     return Parts(
         problem, table, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
     )

@@ -31,7 +31,7 @@ from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.loops.layout import Clock, Setup, in_table
+from gne_mj.loops.layout import Clock, Setup, problem_and_table
 from gne_mj.loops.link import link
 from gne_mj.loops.ode import CONTINUOUS, OdeLoop
 from gne_mj.plants.functions import EULER
@@ -79,7 +79,9 @@ def problem_of(game, law, limit=np.inf):
 def tabled(problem, memory):
     """The problem with its table, which has to be kept."""
     rest, clock = np.zeros((len(problem.limit), 1)), Clock(1.0, 1, CONTINUOUS, EULER)
-    return in_table(Setup(problem, rest, clock), integrators(len(problem.limit)), len(memory))
+    return problem_and_table(
+        Setup(problem, rest, clock), integrators(len(problem.limit)), len(memory)
+    )
 
 
 def loop_at(game, law, y, memory, h=2.0**-30):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
-from gne_mj.loops.layout import ACTIONS, CONSTRAINTS, MEMORY, STATES, STEP
+from gne_mj.loops.layout import Steps, steps_of
 from gne_mj.loops.recorder import Recorder
 from gne_mj.table import Table
 
@@ -86,7 +86,7 @@ class Outcome:
 
 def begin(
     cases: Sequence[Case], span: Span, faulty: bool
-) -> tuple[list[Table], NDArray[np.int64], Recorder, NDArray[np.float64]]:
+) -> tuple[list[Table], Steps, Recorder, NDArray[np.float64]]:
     """What a native batch begins with: tables, the sizes that all share, room for rows, monitors.
 
     Args:
@@ -95,8 +95,8 @@ def begin(
         faulty: whether runs record what was seen and what acted.
     """
     tables = [case.table for case in cases if case.table is not None]
-    sizes = tables[0].arrays[STEP]
-    m, p, states, memory = (sizes[i] for i in (ACTIONS, CONSTRAINTS, STATES, MEMORY))
+    sizes = steps_of(tables[0])
+    m, p, states, memory = sizes.actions, sizes.constraints, sizes.states, sizes.memory
     recorder = Recorder(len(cases), span.rows, (m, states), memory, faulty, every=span.every)
     return tables, sizes, recorder, np.zeros((len(cases), watch.length(m, p)))
 

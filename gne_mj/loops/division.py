@@ -28,7 +28,7 @@ Outputs, slacks and (in runs without faults) the law are evaluated at a piece's 
 the next piece begins with them in place of evaluating them again.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from gne_mj.controllers.settings import GUARDED
 from gne_mj.loops import monitor as watch
 from gne_mj.native import copy, kernel
+from gne_mj.records import in_array
 
 FINEST = 12  # steps are halved at most so often
 PIECES = 1 << FINEST
@@ -76,23 +77,25 @@ CALM_FOR = 32  # pieces after a failure before twice the length is tried again
 class Stages(NamedTuple):
     """What a piece's stages have shown, stage after stage; views of ``work.division``."""
 
-    y: np.ndarray  # (4 m,) outputs
-    g: np.ndarray  # (4 p,) constraints
-    size: np.ndarray  # (1 + p,) typical sizes of outputs, then of each slack: at the start or at y*
+    y: Annotated[np.ndarray, "4 * m"]  # outputs
+    g: Annotated[np.ndarray, "4 * p"]  # constraints
+    # typical sizes of outputs, then of each slack: at the start or at y*
+    size: Annotated[np.ndarray, "1 + p"]
+
+
+_length, _views = in_array(Stages, "m p")
 
 
 @kernel
 def length(m, p):
     """Entries of ``work.division``."""
-    return HEADER + 4 * m + 4 * p + 1 + p
+    return HEADER + _length(m, p)
 
 
 @kernel
 def stages_of(division, m, p):
     """The arrays in ``work.division``."""
-    at = HEADER + 4 * m
-    end = at + 4 * p
-    return Stages(division[HEADER:at], division[at:end], division[end : end + 1 + p])
+    return _views(division, HEADER, m, p)
 
 
 def sizes_at(y: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """What every loop's feedback reads and works on, and the look at the true outputs."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.native import kernel
+from gne_mj.records import in_array
 
 # MuJoCo silently applies no force at all beyond this magnitude (its mjMAXVAL).
 LARGEST_INPUT = 1e10
@@ -21,19 +22,20 @@ LARGEST_INPUT = 1e10
 class Order(NamedTuple):
     """Rows of Newton's matrix, mode implicit."""
 
-    position: np.ndarray  # (m,) each action's row
-    band: np.ndarray  # [half bandwidth, 1 if shares of slacks are kept to], integers
-    start: np.ndarray  # (p + 1,) where each constraint's actions begin in the next
-    column: np.ndarray  # the actions in one constraint after the other
-    within: np.ndarray  # and the constraint that each of these entries is of
+    position: Annotated[np.ndarray, "m", int]  # each action's row
+    band: Annotated[np.ndarray, "2", int]  # [half bandwidth, 1 if shares of slacks are kept to]
+    start: Annotated[np.ndarray, "p + 1", int]  # where each constraint's actions begin in the next
+    column: Annotated[np.ndarray, "n", int]  # the actions in one constraint after the other
+    within: Annotated[np.ndarray, "n", int]  # and the constraint that each of these entries is of
 
 
 class Faults(NamedTuple):
     """Faults of a run, see :mod:`gne_mj.loops.faults`."""
 
-    rows: np.ndarray  # (faults, FAULT_COLUMNS), sorted by kind
-    pointer: np.ndarray  # kind k has the rows from pointer[k] to pointer[k + 1]
-    numbers: np.ndarray  # [seed, sensor delay, greatest message delay], delays in control periods
+    rows: Annotated[np.ndarray, "n // columns, columns"]  # (faults, columns), sorted by kind
+    # kind k has the rows from pointer[k] to pointer[k + 1]
+    pointer: Annotated[np.ndarray, "n", int]
+    numbers: Annotated[np.ndarray, "3"]  # [seed, sensor delay, greatest message delay], in periods
 
 
 NO_ORDER = Order(*(np.zeros(n, dtype=np.int64) for n in (0, 2, 0, 0, 0)))
@@ -48,38 +50,41 @@ class Problem(NamedTuple):
 
     data: GameData
     graph: GraphData
-    settings: np.ndarray  # the law's numbers, see gne_mj.controllers.settings
-    limit: np.ndarray  # (m,) greatest |u| that the actuators deliver
-    equilibrium: np.ndarray  # (m,) y*, from which storage is measured
+    # the law's numbers, see gne_mj.controllers.settings
+    settings: Annotated[np.ndarray, "n"]
+    limit: Annotated[np.ndarray, "m"]  # greatest |u| that the actuators deliver
+    equilibrium: Annotated[np.ndarray, "m"]  # y*, from which storage is measured
     propagator: Propagator  # exact motion of the law's memory over a control period
-    schedule: np.ndarray = np.zeros(4)  # of the penalty; all zero: settings[RHO] for all time
+    # of the penalty; all zero: settings[RHO] for all time
+    schedule: Annotated[np.ndarray, "4"] = np.zeros(4)
     order: Order = NO_ORDER
     faults: Faults = NO_FAULTS
-    # (1 + p,) at y*: division.sizes_at; read in mode continuous only
-    size: np.ndarray = np.zeros(1)
+    # at y*: division.sizes_at; read in mode continuous only
+    size: Annotated[np.ndarray, "1 + p"] = np.zeros(1)
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
-    functions: np.ndarray = np.zeros(functions.COUNT, dtype=np.int64)
+    functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
     table: int = 0
 
 
 class Work(NamedTuple):
     """Scratch arrays of one loop, so that a step allocates nothing."""
 
-    g: np.ndarray  # (p,) constraint values at the last evaluation
-    weights: np.ndarray  # (p,) rho / (-g - t)
-    demand: np.ndarray  # (m,) what the law asks for
-    profile: np.ndarray  # (m,) an agent's own profile
-    y: np.ndarray  # (m,) outputs
-    u: np.ndarray  # (m,) inputs at a stage
-    held: np.ndarray  # (m,) outputs at the last control instant, held modes
-    stands: np.ndarray  # (1,) the step that the law's memory belongs to, held modes
-    scratch: np.ndarray  # for the propagation of estimates
-    now: np.ndarray  # see gne_mj.controllers.settings
-    seen: np.ndarray  # (m,) outputs as the law sees them
-    acts: np.ndarray  # (m,) inputs with pushes, which move the plant
-    history: np.ndarray  # past states and inputs, where sensors are late
-    division: np.ndarray  # of steps, mode continuous: see gne_mj.loops.division
-    solver: np.ndarray  # of mode implicit
+    g: Annotated[np.ndarray, "p"]  # constraint values at the last evaluation
+    weights: Annotated[np.ndarray, "p"]  # rho / (-g - t)
+    demand: Annotated[np.ndarray, "m"]  # what the law asks for
+    profile: Annotated[np.ndarray, "m"]  # an agent's own profile
+    y: Annotated[np.ndarray, "m"]  # outputs
+    u: Annotated[np.ndarray, "m"]  # inputs at a stage
+    held: Annotated[np.ndarray, "m"]  # outputs at the last control instant, held modes
+    stands: Annotated[np.ndarray, "1"]  # the step that the law's memory belongs to, held modes
+    scratch: Annotated[np.ndarray, "propagation(agents)"]  # for the propagation of estimates
+    now: Annotated[np.ndarray, "now_length"]  # see gne_mj.controllers.settings
+    seen: Annotated[np.ndarray, "m"]  # outputs as the law sees them
+    acts: Annotated[np.ndarray, "m"]  # inputs with pushes, which move the plant
+    history: Annotated[np.ndarray, "history"]  # past states and inputs, where sensors are late
+    # of steps, mode continuous: see gne_mj.loops.division
+    division: Annotated[np.ndarray, "divided(m, p)"]
+    solver: Annotated[np.ndarray, "solver"]  # of mode implicit
 
 
 class Sizes(NamedTuple):
@@ -92,17 +97,17 @@ class Sizes(NamedTuple):
 NO_SIZES = Sizes()
 
 
-@kernel
-def work_sizes(actions, constraints, agents, history, solver):
-    """Lengths of the arrays of :class:`Work`, in its order."""
-    m, p = actions, constraints
-    divided = division.length(m, p)
-    return p, p, m, m, m, m, m, 1, scratch_length(agents), NOW, m, m, history, divided, solver
+work_length, work_views = in_array(
+    Work, "m p agents history solver",
+    propagation=scratch_length, now_length=NOW, divided=division.length,
+)  # fmt: skip
 
 
 def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> Work:
     """Fresh scratch arrays."""
-    return Work(*(np.zeros(n) for n in work_sizes(actions, constraints, agents, *sizes)))
+    lengths = (actions, constraints, agents, *sizes)
+    found: Work = work_views(np.zeros(work_length(*lengths)), 0, *lengths)
+    return found
 
 
 @kernel

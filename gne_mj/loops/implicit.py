@@ -35,7 +35,7 @@ def act(
     """Fill work.demand; False, with the exit latched, if there is no input."""
     m, states = channels.rest.shape
     p, b = len(work.g), problem.order.band[0]
-    solver = solver_in(work.solver, m, p, states, b)
+    solver = solver_in(work.solver, problem.order, p, states)
     found = solver.numbers[FOUND]
     if solver.numbers[STANDS] == step + 1.0:  # a run that goes on after its end was looked at
         copy(solver.held, work.demand)

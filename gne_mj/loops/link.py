@@ -11,23 +11,16 @@ from numpy.typing import NDArray
 from gne_mj.controllers.settings import NOW
 from gne_mj.loops import functions, implicit
 from gne_mj.loops.layout import (
-    ACTIONS,
-    AGENTS,
-    CONSTRAINTS,
-    HISTORY,
-    MEMORY,
-    SOLVER,
-    STATES,
-    STEP,
     channels_in,
     clock_in,
     parts_of,
     problem_in,
     room_needed,
+    steps_in,
 )
 from gne_mj.loops.newton import solver_in
 from gne_mj.native import callback, source_key
-from gne_mj.table import floats_at, integers
+from gne_mj.table import floats_at
 
 _whole, _real = types.int64, types.float64
 
@@ -85,11 +78,11 @@ def action(law: ModuleType, game: ModuleType) -> Any:
 
     def action(table, y, weights, memory, profile, now, u):
         _ = source
-        steps = integers(table, STEP)
-        m = steps[ACTIONS]
+        steps = steps_in(table)
+        m = steps.actions
         return law.action(
-            game, problem_in(table), floats_at(y, m), floats_at(weights, steps[CONSTRAINTS]),
-            floats_at(memory, steps[MEMORY]), LawWork(floats_at(profile, m), floats_at(now, NOW)),
+            game, problem_in(table), floats_at(y, m), floats_at(weights, steps.constraints),
+            floats_at(memory, steps.memory), LawWork(floats_at(profile, m), floats_at(now, NOW)),
             floats_at(u, m),
         )  # fmt: skip
 
@@ -103,26 +96,26 @@ def of_memory(law: ModuleType) -> dict[int, Any]:
 
     def rate(table, y, memory, out):
         _ = source
-        steps = integers(table, STEP)
-        size = steps[MEMORY]
+        steps = steps_in(table)
+        size = steps.memory
         law.rate(
-            problem_in(table), floats_at(y, steps[ACTIONS]), floats_at(memory, size),
+            problem_in(table), floats_at(y, steps.actions), floats_at(memory, size),
             floats_at(out, size),
         )  # fmt: skip
         return 0
 
     def propagate(table, y, memory, scratch, length):
         _ = source
-        steps = integers(table, STEP)
+        steps = steps_in(table)
         law.propagate(
-            problem_in(table), floats_at(y, steps[ACTIONS]), floats_at(memory, steps[MEMORY]),
+            problem_in(table), floats_at(y, steps.actions), floats_at(memory, steps.memory),
             floats_at(scratch, length),
         )  # fmt: skip
         return 0
 
     def storage(table, memory):
         _ = source
-        return law.storage(problem_in(table), floats_at(memory, integers(table, STEP)[MEMORY]))
+        return law.storage(problem_in(table), floats_at(memory, steps_in(table).memory))
 
     return {
         functions.RATE: callback(_whole(*[_whole] * 4), rate),
@@ -138,18 +131,18 @@ def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
 
     def prepare(table, first, last, y, memory):
         _ = source
-        steps = integers(table, STEP)
+        steps = steps_in(table)
         law.prepare(
-            problem_in(table), first, last, floats_at(y, steps[ACTIONS]),
-            floats_at(memory, steps[MEMORY]),
+            problem_in(table), first, last, floats_at(y, steps.actions),
+            floats_at(memory, steps.memory),
         )  # fmt: skip
         return 0
 
     def pulls(table, first, last, at_y, at_memory, at_out):
         _ = source
-        problem, steps = problem_in(table), integers(table, STEP)
-        y, memory = floats_at(at_y, steps[ACTIONS]), floats_at(at_memory, steps[MEMORY])
-        out, data = floats_at(at_out, steps[ACTIONS]), problem.data
+        problem, steps = problem_in(table), steps_in(table)
+        y, memory = floats_at(at_y, steps.actions), floats_at(at_memory, steps.memory)
+        out, data = floats_at(at_out, steps.actions), problem.data
         law.prepare(problem, first, last, y, memory)
         for i in range(first, last):
             for a in range(data.offsets[i], data.offsets[i + 1]):
@@ -158,26 +151,26 @@ def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
 
     def add_pull_slope(table, i, a, y, memory, out):
         _ = source
-        steps = integers(table, STEP)
-        m = steps[ACTIONS]
+        steps = steps_in(table)
+        m = steps.actions
         law.add_pull_slope(
-            game, problem_in(table), i, a, floats_at(y, m), floats_at(memory, steps[MEMORY]),
+            game, problem_in(table), i, a, floats_at(y, m), floats_at(memory, steps.memory),
             floats_at(out, m),
         )  # fmt: skip
         return 0
 
     def own_profile(table, i, y, memory, profile):
         _ = source
-        steps = integers(table, STEP)
-        m = steps[ACTIONS]
+        steps = steps_in(table)
+        m = steps.actions
         return law.own_profile(
-            problem_in(table), i, floats_at(y, m), floats_at(memory, steps[MEMORY]),
+            problem_in(table), i, floats_at(y, m), floats_at(memory, steps.memory),
             floats_at(profile, m),
         )  # fmt: skip
 
     def settle(table, ahead, held):
         _ = source
-        m = integers(table, STEP)[ACTIONS]
+        m = steps_in(table).actions
         law.settle(floats_at(ahead, m), floats_at(held, m))
         return 0
 
@@ -199,11 +192,12 @@ def solve(equation: ModuleType) -> Any:
 
     def solve(table, b, memory, profile, now, solver, length):
         _ = source
-        steps = integers(table, STEP)
-        m = steps[ACTIONS]
-        views = solver_in(floats_at(solver, length), m, steps[CONSTRAINTS], steps[STATES], b)
+        steps = steps_in(table)
+        m = steps.actions
+        problem = problem_in(table)
+        views = solver_in(floats_at(solver, length), problem.order, steps.constraints, steps.states)
         return equation.solve(
-            problem_in(table), b, floats_at(memory, steps[MEMORY]),
+            problem, b, floats_at(memory, steps.memory),
             LawWork(floats_at(profile, m), floats_at(now, NOW)), views,
         )  # fmt: skip
 
@@ -217,15 +211,15 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
 
     def act(table, room, time, step, state, memory, model, data):
         _ = source
-        steps = integers(table, STEP)
+        steps = steps_in(table)
         size = room_needed(
-            steps[ACTIONS], steps[CONSTRAINTS], steps[AGENTS], steps[HISTORY], steps[SOLVER]
+            steps.actions, steps.constraints, steps.agents, steps.history, steps.solver
         )
         monitor, _u, work, _rest = parts_of(floats_at(room, size), 0, steps)
         good = implicit.act(
             faults, plant, (at, model, data, table), problem_in(table), channels_in(table),
-            clock_in(table), time, step, floats_at(state, steps[ACTIONS] * steps[STATES]),
-            floats_at(memory, steps[MEMORY]), work, monitor,
+            clock_in(table), time, step, floats_at(state, steps.actions * steps.states),
+            floats_at(memory, steps.memory), work, monitor,
         )  # fmt: skip
         return 1 if good else 0
 

@@ -25,13 +25,8 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import NO_SIZES, Sizes
 from gne_mj.loops.layout import (
-    ACTIONS,
-    EVALUATIONS,
-    MODE,
     RECORDER,
     STAGE_NOW,
-    STATES,
-    STEP,
     STEP_NOW,
     Setup,
     channels_in,
@@ -39,6 +34,8 @@ from gne_mj.loops.layout import (
     parts_of,
     problem_in,
     room_needed,
+    steps_in,
+    steps_of,
     table_arrays,
 )
 from gne_mj.loops.ode import CONTINUOUS, look
@@ -77,7 +74,7 @@ if TYPE_CHECKING:
 @kernel
 def split(rest, steps):
     """What MuJoCo's loop has behind a room's other parts: flat states now and later, memory."""
-    size = steps[ACTIONS] * steps[STATES]
+    size = steps.actions * steps.states
     return rest[:size], rest[size : 2 * size], rest[2 * size :]
 
 
@@ -114,8 +111,8 @@ def build(
         table = table_of(at, address_of(model), struct)
         if table <= 0:
             return
-        sizes, steps = integers(table, SIZES), integers(table, STEP)
-        m, stages, mode = steps[ACTIONS], steps[EVALUATIONS], steps[MODE]
+        sizes, steps = integers(table, SIZES), steps_in(table)
+        m, stages, mode = steps.actions, steps.evaluations, steps.mode
         ctrl = field(struct, at.ctrl, sizes[NU])
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
         start = sizes[ROOM]
@@ -160,7 +157,7 @@ def build(
         table = table_of(at, address_of(model), struct)
         if table <= 0:
             return 0.0
-        sizes, steps = integers(table, SIZES), integers(table, STEP)
+        sizes, steps = integers(table, SIZES), steps_in(table)
         rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
         userdata = field(struct, at.userdata, sizes[NUSERDATA])
         work = parts_of(userdata, sizes[ROOM], steps)[2]
@@ -180,9 +177,9 @@ def build(
         """
         _ = source
         table = table_of(at, model, data)
-        sizes, steps = integers(table, SIZES), integers(table, STEP)
+        sizes, steps = integers(table, SIZES), steps_in(table)
         userdata = field(data, at.userdata, sizes[NUSERDATA])
-        start, moving = sizes[ROOM], steps[MODE] == CONTINUOUS
+        start, moving = sizes[ROOM], steps.mode == CONTINUOUS
         monitor, u, work, rest = parts_of(userdata, start, steps)
         state, channels = split(rest, steps)[0], channels_in(table)
         memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
@@ -227,7 +224,7 @@ def build(
                     division.ends(divided, step, h), step, division.END, 0.0, state, memory, u,
                     monitor, work,
                 )  # fmt: skip
-            which = division.judge(steps[EVALUATIONS], length, problem, work) if good else 0
+            which = division.judge(steps.evaluations, length, problem, work) if good else 0
             if good and which < 0:
                 if division.go_on(divided, h, monitor):
                     step, done = step + 1, done + 1
@@ -296,7 +293,7 @@ class MujocoLoop(ClosedLoop):
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
         self._table = mujoco_table(plant, setup, plant.agents, len(memory))
         self._faulty = faults is not faultless
-        data, sizes = plant.data, self._table.arrays[STEP]
+        data, sizes = plant.data, steps_of(self._table)
         self._start = int(plant.table_arrays[SIZES][ROOM])
         self._memory = put_start(data, self._start, self._table, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0

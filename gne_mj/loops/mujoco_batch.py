@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
-from gne_mj.loops.layout import MEMORY, MODE, MONITOR, RECORDER, STEP
+from gne_mj.loops.layout import MONITOR, RECORDER, steps_of
 from gne_mj.loops.mujoco import build, observe, put_start, room_for_states
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.recorder import FIRST
@@ -83,7 +83,7 @@ class MujocoBatch(BatchLoop):
             finally:
                 self._fleets.put(fleet)
 
-        remember = self._remember if sizes[MODE] == CONTINUOUS and sizes[MEMORY] else None
+        remember = self._remember if sizes.mode == CONTINUOUS and sizes.memory else None
         with (
             callbacks(control=self._control, passive=self._passive, activation=remember),
             workers(self._threads) as pool,
@@ -109,7 +109,7 @@ class _Fleet:
             mujoco.mj_setConst(plant.model, plant.data)
             self._parameters = case.parameters
         plant.reset(case.state)
-        put_start(plant.data, start, table, int(table.arrays[STEP][MODE]), case.memory)
+        put_start(plant.data, start, table, steps_of(table).mode, case.memory)
         userdata: NDArray[np.float64] = plant.data.userdata
         return userdata
 

@@ -12,13 +12,14 @@ and stays inside converges from every interior start. Each iterate is strictly i
 set is kept even by one that is not accurate.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gne_mj import banded
 from gne_mj.controllers.settings import PENALTY
 from gne_mj.native import copy, kernel
+from gne_mj.records import in_array
 
 # How it ended
 SOLVED, ROUNDED, UNSOLVED, OUTSIDE = range(4)
@@ -48,76 +49,44 @@ FOUND, STEPS, MOVES, USES, LEAVES, RHO, STANDS, COUNT = range(8)
 class Solver(NamedTuple):
     """Arrays of mode implicit, views into a loop's ``work.solver``."""
 
-    numbers: np.ndarray  # see above
-    slope: np.ndarray  # (m,) dy+/du of each channel; kept from period to period
-    stiff: np.ndarray  # (m,) 1 / slope
-    ahead: np.ndarray  # (m,) outputs that are expected at the next control instant; kept
-    held: np.ndarray  # (m,) the input that was asked for last; kept, as the two before it
-    before: np.ndarray  # (m,)
-    earlier: np.ndarray  # (m,)
-    base: np.ndarray  # (m,)
-    reached: np.ndarray  # (m,) predicted outputs under an input
-    u: np.ndarray  # (m,) that input
-    y: np.ndarray  # (m,) the iterate
-    trial: np.ndarray  # (m,)
-    residual: np.ndarray  # (m,)
-    step: np.ndarray  # (m,) in the order of the matrix's rows
-    old_step: np.ndarray  # (m,) by the factors of an earlier period
-    row: np.ndarray  # (m,) zero between uses
-    anchor: np.ndarray  # (m,) outputs as the law has them
-    mixed: np.ndarray  # (m,) the same, but for the agent that is solving
-    own: np.ndarray  # (m,) where agents' barriers see their own actions if they do not move
-    inverse: np.ndarray  # (p,) 1 / (-g - t) at the trial
-    jacobian: np.ndarray  # dg_l/dy_a there, constraint by constraint, for the actions in it
-    state: np.ndarray  # flat, as the law has it
-    rolled: np.ndarray  # flat, the prediction's
-    scratch: np.ndarray  # five times a channel's state
-    band: np.ndarray  # (m, 2 b + 1) factors, kept
+    numbers: Annotated[np.ndarray, "count"]  # see above
+    slope: Annotated[np.ndarray, "m"]  # dy+/du of each channel; kept from period to period
+    stiff: Annotated[np.ndarray, "m"]  # 1 / slope
+    ahead: Annotated[np.ndarray, "m"]  # outputs expected at the next control instant; kept
+    # the input that was asked for last; kept, as the two before it
+    held: Annotated[np.ndarray, "m"]
+    before: Annotated[np.ndarray, "m"]
+    earlier: Annotated[np.ndarray, "m"]
+    base: Annotated[np.ndarray, "m"]
+    reached: Annotated[np.ndarray, "m"]  # predicted outputs under an input
+    u: Annotated[np.ndarray, "m"]  # that input
+    y: Annotated[np.ndarray, "m"]  # the iterate
+    trial: Annotated[np.ndarray, "m"]
+    residual: Annotated[np.ndarray, "m"]
+    step: Annotated[np.ndarray, "m"]  # in the order of the matrix's rows
+    old_step: Annotated[np.ndarray, "m"]  # by the factors of an earlier period
+    row: Annotated[np.ndarray, "m"]  # zero between uses
+    anchor: Annotated[np.ndarray, "m"]  # outputs as the law has them
+    mixed: Annotated[np.ndarray, "m"]  # the same, but for the agent that is solving
+    # where agents' barriers see their own actions if they do not move
+    own: Annotated[np.ndarray, "m"]
+    inverse: Annotated[np.ndarray, "p"]  # 1 / (-g - t) at the trial
+    # dg_l/dy_a there, constraint by constraint, for the actions in it
+    jacobian: Annotated[np.ndarray, "entries"]
+    state: Annotated[np.ndarray, "m * states"]  # flat, as the law has it
+    rolled: Annotated[np.ndarray, "m * states"]  # flat, the prediction's
+    scratch: Annotated[np.ndarray, "5 * states"]  # five times a channel's state
+    band: Annotated[np.ndarray, "m, 2 * b + 1"]  # factors of half bandwidth b, kept
 
 
-def solver_length(actions: int, constraints: int, entries: int, states: int, b: int) -> int:
-    """Entries of ``work.solver``; ``entries`` are those of dg/dy, b the half bandwidth."""
-    m, p = actions, constraints
-    return COUNT + 18 * m + p + entries + 2 * m * states + 5 * states + m * (2 * b + 1)
+# Of m actions, p constraints, so many entries of dg/dy, and states of a channel
+solver_length, _views = in_array(Solver, "m p entries states b", count=COUNT)
 
 
 @kernel
-def solver_in(flat, m, p, states, b):
+def solver_in(flat, order, p, states):
     """The views into ``work.solver``."""
-    at = COUNT
-    end = at + 18 * m
-    w = end + p
-    f = len(flat) - m * (2 * b + 1)
-    s = f - 5 * states
-    z = s - m * states
-    x = z - m * states
-    return Solver(
-        flat[:at],
-        flat[at : at + m],
-        flat[at + m : at + 2 * m],
-        flat[at + 2 * m : at + 3 * m],
-        flat[at + 3 * m : at + 4 * m],
-        flat[at + 4 * m : at + 5 * m],
-        flat[at + 5 * m : at + 6 * m],
-        flat[at + 6 * m : at + 7 * m],
-        flat[at + 7 * m : at + 8 * m],
-        flat[at + 8 * m : at + 9 * m],
-        flat[at + 9 * m : at + 10 * m],
-        flat[at + 10 * m : at + 11 * m],
-        flat[at + 11 * m : at + 12 * m],
-        flat[at + 12 * m : at + 13 * m],
-        flat[at + 13 * m : at + 14 * m],
-        flat[at + 14 * m : at + 15 * m],
-        flat[at + 15 * m : at + 16 * m],
-        flat[at + 16 * m : at + 17 * m],
-        flat[at + 17 * m : at + 18 * m],
-        flat[end:w],
-        flat[w:x],
-        flat[x:z],
-        flat[z:s],
-        flat[s:f],
-        flat[f:].reshape((m, 2 * b + 1)),
-    )
+    return _views(flat, 0, len(order.position), p, len(order.column), states, order.band[0])
 
 
 @kernel

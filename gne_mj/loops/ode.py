@@ -19,15 +19,7 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
-    ACTIONS,
-    AGENTS,
-    CONSTRAINTS,
-    HISTORY,
-    MEMORY,
     RECORDER,
-    SOLVER,
-    STATES,
-    STEP,
     STEP_NOW,
     Setup,
     channels_in,
@@ -36,13 +28,15 @@ from gne_mj.loops.layout import (
     parts_of,
     problem_in,
     room_needed,
+    steps_in,
+    steps_of,
 )
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import callback, copy, kernel, shaped, source_key
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import EULER, RK4
-from gne_mj.table import floats_at, integers
+from gne_mj.table import floats_at
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
@@ -178,9 +172,9 @@ def build(faults: ModuleType = faultless) -> Any:
 
     def advance(table, address, count):
         _ = source
-        sizes = integers(table, STEP)
-        m, states = sizes[ACTIONS], sizes[STATES]
-        size, n = m * states, m * states + sizes[MEMORY]
+        sizes = steps_in(table)
+        m, states = sizes.actions, sizes.states
+        size, n = m * states, m * states + sizes.memory
         room = floats_at(address, room_length(sizes))
         problem, clock, channels = problem_in(table), clock_in(table), channels_in(table)
         monitor, u, work, rest = parts_of(room, 0, sizes)
@@ -263,21 +257,18 @@ def build(faults: ModuleType = faultless) -> Any:
 @kernel
 def scratch_width(sizes):
     """Entries of each of the SCRATCH_ROWS rows behind state and memory."""
-    m, states = sizes[ACTIONS], sizes[STATES]
-    return max(m * states + sizes[MEMORY], m, 5 * states)
+    m, states = sizes.actions, sizes.states
+    return max(m * states + sizes.memory, m, 5 * states)
 
 
 @kernel
 def room_length(sizes):
     """Entries of the room of a loop of these sizes, as a table has them."""
     needed = room_needed(
-        sizes[ACTIONS], sizes[CONSTRAINTS], sizes[AGENTS], sizes[HISTORY], sizes[SOLVER]
+        sizes.actions, sizes.constraints, sizes.agents, sizes.history, sizes.solver
     )
     return (
-        needed
-        + sizes[ACTIONS] * sizes[STATES]
-        + sizes[MEMORY]
-        + SCRATCH_ROWS * scratch_width(sizes)
+        needed + sizes.actions * sizes.states + sizes.memory + SCRATCH_ROWS * scratch_width(sizes)
     )
 
 
@@ -305,7 +296,7 @@ class OdeLoop(ClosedLoop):
         self._table = ode_table(setup, agents, len(memory))
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
         self._faulty = faults is not faultless
-        sizes = self._table.arrays[STEP]
+        sizes = steps_of(self._table)
         self._room = np.zeros(room_length(sizes))
         self.monitor, _u, _work, rest = parts_of(self._room, 0, sizes)
         self._state = rest[: state.size + len(memory)]

@@ -22,7 +22,7 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import add_from_modes, modes_of, to_modes
 from gne_mj.loops.feedback import Problem, feedback, work
-from gne_mj.loops.layout import Setup, in_table
+from gne_mj.loops.layout import Setup, problem_and_table
 from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
@@ -364,7 +364,7 @@ class RosenbrockLoop(ClosedLoop):
         """What the loop reads, and as a table what the law's functions do."""
         kind = self._agents.kind
         memory = self._length - math.prod(self._shape)
-        problem, self._table = in_table(setup, self._agents, memory)
+        problem, self._table = problem_and_table(setup, self._agents, memory)
         addresses = compiled_functions(kind)
         channels = Channels(self._agents.parameters, setup.rest, addresses, kind.OUTPUT)
         return problem, channels

@@ -13,7 +13,7 @@ behind them the estimates' modes.
   remains for k_u, and it alone is factorised.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -24,54 +24,39 @@ from gne_mj.loops.linear import add_multiple, factorise, substitute
 from gne_mj.loops.rodas import GAMMA
 from gne_mj.native import copy, kernel
 from gne_mj.plants import functions
+from gne_mj.records import fresh
 
 
 class StageSystem(NamedTuple):
     """Arrays of the systems of one step."""
 
-    inputs: np.ndarray  # (m, states) G, read-only
-    local: np.ndarray  # (m, states, states) A
-    resolvent: np.ndarray  # (m, states, states) (s I - A)^-1 by columns, that is transposed
-    response: np.ndarray  # (m, states) (s I - A)^-1 G
-    small: np.ndarray  # (states, states) s I - A of one channel, factorised
-    small_pivot: np.ndarray  # (states,)
-    own: np.ndarray  # (m, m) du / dy and, off the agents' own blocks, du / d estimate
-    filtered: np.ndarray  # (m, m) du / dz
-    decay: np.ndarray  # (N - 1, m) 1 / (epsilon s + lambda)
-    pull: np.ndarray  # (N - 1, m) what a k_y of 1 adds to k_w
-    spread: np.ndarray  # (N, m) T: what a k_y of 1 adds to k_e
-    slope: np.ndarray  # (m, m) what k_y adds to k_u, directly and through z and the estimates
-    matrix: np.ndarray  # (m, m) of the system for k_u, factorised
-    pivot: np.ndarray  # (m,)
-    k_x: np.ndarray  # (states,) one channel's
-    k_y: np.ndarray  # (m,)
-    k_u: np.ndarray  # (m,)
-    known: np.ndarray  # (m,) what V and the rates share, see gne_mj.plants.functions
+    inputs: Annotated[np.ndarray, "m, states"]  # G, read-only
+    local: Annotated[np.ndarray, "m, states, states"]  # A
+    # (s I - A)^-1 by columns, that is transposed
+    resolvent: Annotated[np.ndarray, "m, states, states"]
+    response: Annotated[np.ndarray, "m, states"]  # (s I - A)^-1 G
+    small: Annotated[np.ndarray, "states, states"]  # s I - A of one channel, factorised
+    small_pivot: Annotated[np.ndarray, "states", int]
+    own: Annotated[np.ndarray, "m, m"]  # du/dy and, off the agents' own blocks, du/d estimate
+    filtered: Annotated[np.ndarray, "m, m"]  # du/dz
+    decay: Annotated[np.ndarray, "N - 1, m"]  # 1 / (epsilon s + lambda)
+    pull: Annotated[np.ndarray, "N - 1, m"]  # what a k_y of 1 adds to k_w
+    spread: Annotated[np.ndarray, "N, m"]  # T: what a k_y of 1 adds to k_e
+    # what k_y adds to k_u, directly and through z and the estimates
+    slope: Annotated[np.ndarray, "m, m"]
+    matrix: Annotated[np.ndarray, "m, m"]  # of the system for k_u, factorised
+    pivot: Annotated[np.ndarray, "m", int]
+    k_x: Annotated[np.ndarray, "states"]  # one channel's
+    k_y: Annotated[np.ndarray, "m"]
+    k_u: Annotated[np.ndarray, "m"]
+    known: Annotated[np.ndarray, "m"]  # what V and the rates share, see gne_mj.plants.functions
 
 
 def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
     """Fresh arrays for N agents; inputs (m, states) is G."""
     m, states = inputs.shape
-    return StageSystem(
-        inputs=inputs,
-        local=np.zeros((m, states, states)),
-        resolvent=np.zeros((m, states, states)),
-        response=np.zeros((m, states)),
-        small=np.zeros((states, states)),
-        small_pivot=np.zeros(states, dtype=np.int64),
-        own=np.zeros((m, m)),
-        filtered=np.zeros((m, m)),
-        decay=np.zeros((agents - 1, m)),
-        pull=np.zeros((agents - 1, m)),
-        spread=np.zeros((agents, m)),
-        slope=np.zeros((m, m)),
-        matrix=np.zeros((m, m)),
-        pivot=np.zeros(m, dtype=np.int64),
-        k_x=np.zeros(states),
-        k_y=np.zeros(m),
-        k_u=np.zeros(m),
-        known=np.zeros(m),
-    )
+    made: StageSystem = fresh(StageSystem, m=m, states=states, N=agents)
+    return made._replace(inputs=inputs)
 
 
 @kernel

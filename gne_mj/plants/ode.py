@@ -1,7 +1,7 @@
 """Agents as ordinary differential equations, stepped natively."""
 
 import ctypes
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +15,9 @@ from gne_mj.plants.functions import METHODS, ROLL, compiled_functions
 class Channels(NamedTuple):
     """A group of agents for native code, read-only."""
 
-    parameters: np.ndarray  # (m, numbers of the agent type)
-    rest: np.ndarray  # (m, states) equilibrium, from which V is measured
-    functions: np.ndarray  # addresses, see gne_mj.plants.functions
+    parameters: Annotated[np.ndarray, "m, n // m"]  # (m, numbers of the agent type)
+    rest: Annotated[np.ndarray, "m, n // m"]  # (m, states) equilibrium, from which V is measured
+    functions: Annotated[np.ndarray, "n", int]  # addresses, see gne_mj.plants.functions
     output: int  # which of a channel's states is its output
 
 

@@ -69,7 +69,7 @@ def check_parts(system: "System") -> None:
             system.mode,
             "a plain law with a memory runs in mode 'continuous'",
         )
-    if system.mode == "implicit" and not hasattr(system.law.kernels, "add_pull_slope"):
+    if system.mode == "implicit" and not system.law.implicit:
         raise InvalidInput(
             f"systems.{system.name}.controller.mode",
             system.mode,
@@ -77,7 +77,7 @@ def check_parts(system: "System") -> None:
             " with; use mode 'sampled'",
         )
     if system.decentralised and (
-        system.mode != "implicit" or system.law.information not in ("full", "partial")
+        system.mode != "implicit" or system.law.theorem is None or system.law.alone
     ):
         raise InvalidInput(
             f"systems.{system.name}.controller.decentralised",
@@ -193,9 +193,7 @@ def check_engine(system: "System") -> None:
             f" {system.game.agents}; use mode 'sampled'",
         )
     if system.integrator == "rosenbrock" and (
-        system.law.information != "distributed"
-        or system.mode != "continuous"
-        or system.engine != "ode"
+        not system.law.rosenbrock or system.mode != "continuous" or system.engine != "ode"
     ):
         raise InvalidInput(
             f"{key}.integrator",

@@ -11,7 +11,7 @@ from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
 from gne_mj.loops.layout import Clock as Steps
-from gne_mj.loops.layout import Setup, in_table
+from gne_mj.loops.layout import Setup, problem_and_table
 from gne_mj.plain import raise_pending
 from gne_mj.system.clock import Clock
 from gne_mj.system.system import System
@@ -26,7 +26,7 @@ def law_at_start(system: System) -> Array:
     """
     game, problem, memory = system.game, problem_at_start(system), system.loop_memory.copy()
     setup = Setup(problem, system.agents.equilibrium(system.start), Steps(1.0, 1, 0, 0))
-    problem, _table = in_table(setup, system.agents, len(memory))
+    problem, _table = problem_and_table(setup, system.agents, len(memory))
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now[PENALTY] = rho

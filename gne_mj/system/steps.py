@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_HELD, check_count
-from gne_mj.controllers import PartialInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.margins import influence
 from gne_mj.plants.base import Plant
@@ -37,7 +36,7 @@ def largest_step(system: "System") -> float:
     # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
     fastest = max(1.0, law.graph.largest_eigenvalue)
     rate = law.estimate_rate
-    if isinstance(law, PartialInformation) and system.agents.mobility is not None:
+    if system.agents.mobility is not None:
         rate = max(rate, law.coupling * float(np.max(system.agents.mobility)))
     return STABLE[system.integrator] / (fastest * rate)
 
@@ -47,7 +46,7 @@ def check_step(system: "System", clock: Clock) -> None:
     largest = largest_step(system)
     if clock.timestep > largest:
         others = "in mode 'sampled' estimates have no such limit"
-        if system.law.information == "distributed" and system.engine == "ode":
+        if system.law.rosenbrock and system.engine == "ode":
             others = "integrator 'rosenbrock' and mode 'sampled' have no such limit"
         raise InvalidInput(
             "simulation.timestep",

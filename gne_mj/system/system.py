@@ -117,8 +117,7 @@ class System:
         """In mode implicit the module that says who solves together."""
         if self.mode != "implicit":
             return None
-        # Agents that know others by estimates only cannot but act by themselves.
-        return local if self.decentralised or self.law.information == "distributed" else joint
+        return local if self.decentralised or self.law.alone else joint
 
     @cached_property
     def rows(self) -> Order:

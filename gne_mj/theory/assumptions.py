@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from gne_mj.controllers import FullyDistributed
 from gne_mj.margins import is_affine
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
@@ -111,7 +110,6 @@ def estimates_start(system: System) -> Assumption:
     """The start of z and the estimates in a ball about y(0) that lies inside [lemma:centreInv]."""
     label = "lemma:centreInv, start"
     law, game = system.law, system.game
-    assert isinstance(law, FullyDistributed)
     own = law.barrier_profiles(game.agent_of_action, system.memory)
     distance = float(np.linalg.norm(own - system.start))
     if distance == 0.0:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InvalidInput
 from gne_mj.system import Clock, System
 from gne_mj.theory.trials import stays_inside
@@ -52,7 +51,7 @@ def search_epsilon(
         InvalidInput: another law.
     """
     law = system.law
-    if not isinstance(law, FullyDistributed):
+    if law.epsilon is None:
         raise InvalidInput(
             f"systems.{system.name}.controller.information",
             law.information,
@@ -63,7 +62,7 @@ def search_epsilon(
     def stays(epsilon: float) -> bool:
         if progress is not None:
             progress(f"{system.name}: trying epsilon = {epsilon:.4g} s")
-        trial = replace(system, law=replace(law, epsilon=epsilon))
+        trial = replace(system, law=replace(law, epsilon=epsilon))  # type: ignore[type-var]
         stayed = stays_inside(trial, clock)
         trials.append((epsilon, stayed))
         return stayed

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
-from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.game import Box
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
@@ -97,9 +96,9 @@ def certify(system: System, clock: Clock) -> Guarantees:
         },
         coupling=_coupling(theorem),
         gain=None if theorem.gain is None else asdict(theorem.gain),
-        epsilon={"given": law.epsilon, "star": None, "search": None}
-        if isinstance(law, FullyDistributed)
-        else None,
+        epsilon=None
+        if law.epsilon is None
+        else {"given": law.epsilon, "star": None, "search": None},
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": None if known is None else known.action.tolist(),
@@ -153,7 +152,6 @@ def _coupling(theorem: Theorem) -> dict[str, Any] | None:
     conditions = theorem.coupling
     if conditions is None:
         return None
-    assert isinstance(theorem.system.law, PartialInformation)
     return {**asdict(conditions), "time_constant": theorem.system.law.time_constant}
 
 
@@ -174,7 +172,7 @@ def _start(system: System, box: Box | None) -> dict[str, Any]:
             "constraint": game.constraint_names[constraint],
             "margin": -float(values[agent, constraint]),
         }
-    elif isinstance(system.law, PartialInformation):
+    elif system.law.has_estimates:
         away = np.abs(system.memory.reshape(game.agents, game.actions) - system.start)
         away[game.agent_of_action, np.arange(game.actions)] = 0.0  # own blocks are no estimates
         distance = float(np.max(away))

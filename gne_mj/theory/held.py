@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.controllers import FullyDistributed
 from gne_mj.margins import Disturbance, Influence, influence, largest_push
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
@@ -115,7 +114,7 @@ class Held:
 
     def _law(self) -> Assumption:
         label = "law"
-        if isinstance(self.system.law, FullyDistributed):
+        if self.system.law.alone:
             return Assumption(
                 label,
                 FAILS,

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_EXAMINED
-from gne_mj.controllers import FullyDistributed, PartialInformation
 from gne_mj.system import System
 from gne_mj.theory import spectra
 
@@ -34,8 +33,8 @@ def push_period(system: System, y: Array) -> float | None:
     heaviest_push = np.array(
         [np.max(inverse[np.isin(owner, list(members))]) for members in system.game.in_constraint]
     )
-    gain = system.law.gain if isinstance(system.law, FullyDistributed) else 1.0
-    return float(np.min(bounds * (bounds - gaps) / (2.0 * system.rho * gain * heaviest_push)))
+    push = 2.0 * system.rho * system.law.gain * heaviest_push
+    return float(np.min(bounds * (bounds - gaps) / push))
 
 
 def linear_period(system: System, y: Array) -> float | None:
@@ -44,10 +43,8 @@ def linear_period(system: System, y: Array) -> float | None:
     if inverse is None or system.game.actions > MOST_EXAMINED:
         return None
     game, law = system.game, system.law
-    matrix = system.barrier.hessian(y) + game.pseudo_gradient_jacobian(y)
-    if isinstance(law, FullyDistributed):
-        matrix *= law.gain
-    if isinstance(law, PartialInformation):
+    matrix = law.gain * (system.barrier.hessian(y) + game.pseudo_gradient_jacobian(y))
+    if law.coupling and law.graph is not None:
         neighbours = np.diff(law.graph.data.pointer)[game.agent_of_action]
         matrix += law.coupling * np.diag(neighbours)
     values = spectra.eigenvalues(inverse[:, None] * matrix)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED
-from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.game import Box
 from gne_mj.graph import complete
@@ -26,11 +25,6 @@ from gne_mj.theory.spectra import DENSE
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
 HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.held
-THEOREMS = {
-    FullInformation: "full information, lemma:FI and thm:FI",
-    PartialInformation: "partial information, lemma:nonlinearPI and the theorem after it",
-    FullyDistributed: "fully distributed, lemma:centreInv and the theorem after it",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +39,20 @@ class Theorem:
 
     @property
     def name(self) -> str | None:
-        """Which theorem; None for a law that the paper does not have."""
-        return THEOREMS.get(type(self.system.law))
+        """Which theorem; None for a law of which nothing is proven."""
+        proven = self.system.law.theorem
+        return None if proven is None else proven.name
+
+    @property
+    def _at_estimates(self) -> bool:
+        proven = self.system.law.theorem
+        return proven is not None and proven.at_estimates
+
+    @property
+    def singular_perturbation(self) -> bool:
+        """Whether what is proven is for epsilon small enough."""
+        proven = self.system.law.theorem
+        return proven is not None and proven.singular_perturbation
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -57,16 +63,17 @@ class Theorem:
         has been, but for what faults of sensors and estimates add, and the mean of all profiles, at
         which the proof takes F, lies in the box too.
         """
-        partial = isinstance(self.system.law, PartialInformation)
-        box = _with_estimates(self.system) if partial else self.system.game.box
-        return Slopes(self.system.game, box, self.system.start, feasible=not partial)
+        widened = self._at_estimates
+        box = _with_estimates(self.system) if widened else self.system.game.box
+        return Slopes(self.system.game, box, self.system.start, feasible=not widened)
 
     @cached_property
     def coupling(self) -> Coupling | None:
-        """The conditions on the coupling gain, under partial information."""
+        """The conditions on the coupling gain, of a law that evaluates F at estimates."""
         law = self.system.law
-        if not isinstance(law, PartialInformation):
+        if not self._at_estimates:
             return None
+        assert law.graph is not None
         return coupling(self.slopes, law.graph, law.coupling)
 
     @cached_property
@@ -101,22 +108,22 @@ class Theorem:
 
     @cached_property
     def gain(self) -> Gain | None:
-        """The condition on k, for the fully distributed law."""
-        law = self.system.law
-        if not isinstance(law, FullyDistributed):
+        """The condition on k, where estimates are fast."""
+        if not self.singular_perturbation:
             return None
         mu = self.slopes.mu.value if self.slopes.monotone else None
-        return required_gain(self.system.agents, mu, law.gain)
+        return required_gain(self.system.agents, mu, self.system.law.gain)
 
     @cached_property
     def assumptions(self) -> tuple[Assumption, ...]:
         """All that the theorem assumes of game, agents, graph and start."""
-        if self.name is None:
+        proven = self.system.law.theorem
+        if proven is None:
             return ()
         system, slopes = self.system, self.slopes
         found = [
             assumptions.costs(system, slopes),
-            assumptions.pseudo_gradient(system, slopes, strong=system.law.graph is not None),
+            assumptions.pseudo_gradient(system, slopes, strong=proven.strong),
             assumptions.plants(system),
         ]
         if system.law.graph is not None:
@@ -168,16 +175,14 @@ class Theorem:
         """Whether the system as it is set up is certified."""
         if self.obstacles or not self.continuous:
             return NOT_CERTIFIED
-        return CONDITIONAL if isinstance(self.system.law, FullyDistributed) else CERTIFIED
+        return CONDITIONAL if self.singular_perturbation else CERTIFIED
 
     @property
     def lyapunov(self) -> bool:
         """Whether V is claimed never to rise, as long as no actuator's limit is met.
 
-        The fully distributed theorem has a Lyapunov function for its reduced system only.
+        Where it is for small epsilon, there is a Lyapunov function of the reduced system only.
         """
-        if isinstance(self.system.law, FullyDistributed) or not self.continuous:
-            return False
         return self.status == CERTIFIED
 
 

@@ -35,7 +35,7 @@ from gne_mj.controllers.propagation import no_propagator
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, feedback, work
 from gne_mj.loops.layout import Clock as Steps
-from gne_mj.loops.layout import Setup, in_table
+from gne_mj.loops.layout import Setup, problem_and_table
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.plants.functions import EULER
 from gne_mj.system import Clock
@@ -115,7 +115,7 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         one.equilibrium.action, no_propagator(), functions=one.functions,
     )  # fmt: skip
     setup = Setup(problem, one.state, Steps(1.0, 1, CONTINUOUS, EULER))
-    problem, table = in_table(setup, one.agents, 0)
+    problem, table = problem_and_table(setup, one.agents, 0)
     scratch, monitor, memory = work(n, n, n), np.zeros(watch.length(n, n)), np.zeros(0)
     start, u = np.ascontiguousarray(_some_state()[1::3]), np.zeros(n)
 

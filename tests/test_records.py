@@ -1,0 +1,97 @@
+"""Records lie where their declarations say, as a hand would lay them out."""
+
+from typing import Annotated, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+
+from gne_mj.game import GameData
+from gne_mj.loops.feedback import Problem
+from gne_mj.loops.layout import Run, Steps
+from gne_mj.loops.newton import COUNT, Solver, solver_length
+from gne_mj.records import arrays, count, fields, fresh, in_array, in_numbers, in_table, place
+from gne_mj.table import Table
+
+Array = np.ndarray
+
+
+def twice(n):
+    return 2 * n
+
+
+class Parts(NamedTuple):
+    first: Annotated[Array, "twice(m)"]
+    grid: Annotated[Array, "m, p + 1"]
+    last: Annotated[Array, "extra"]
+
+
+class Inner(NamedTuple):
+    numbers: Annotated[Array, "n", int]
+    cube: Annotated[Array, "n // (w * w), w, w"]
+
+
+class Outer(NamedTuple):
+    row: Annotated[Array, "m"]
+    inner: Inner
+    level: int
+    end: Annotated[Array, "3"]
+
+
+def test_a_flat_array_is_cut_in_the_declarations_order():
+    length, views = in_array(Parts, "m p", twice=twice, extra=5)
+    m, p = 3, 2
+    assert length(m, p) == 6 + 9 + 5
+    flat = np.arange(2.0 + length(m, p))
+    parts = views(flat, 2, m, p)
+    assert parts.first.tolist() == list(range(2, 8))
+    assert parts.grid.tolist() == [[8, 9, 10], [11, 12, 13], [14, 15, 16]]
+    assert parts.last.tolist() == list(range(17, 22))
+    parts.grid[1, 2] = -1.0
+    assert flat[13] == -1.0, "views, not copies"
+
+
+def test_a_table_is_read_in_the_declarations_order():
+    inner = Inner(np.array([4, 5]), np.arange(8.0).reshape(2, 2, 2))
+    record = Outer(np.array([1.0, 2.0]), inner, 7, np.zeros(3))
+    given = arrays(record)
+    assert [a.size for a in given] == [2, 2, 8, 3]
+    assert (count(Outer), place(Outer, "inner"), place(Outer, "end")) == (4, 1, 3)
+    with pytest.raises(KeyError):
+        place(Outer, "nothing")
+    table = Table([np.zeros(1), *given])
+    read = in_table(Outer, 1)
+
+    @numba.njit
+    def look(address):
+        found = read(address, 9, 2)  # level and w, in alphabetical order
+        return found.row[1], found.inner.numbers[1], found.inner.cube[1, 0, 1], found.level
+
+    assert look(table.address) == (2.0, 5, 5.0, 9)
+
+
+def test_numbers_are_read_by_name():
+    numbers = Table([np.arange(len(Steps._fields))])
+    read = in_numbers(Steps, 0)
+    found = numba.njit(lambda address: read(address).output)(numbers.address)
+    assert found == Steps._fields.index("output")
+
+
+def test_fresh_arrays_have_the_declared_shapes():
+    made = fresh(Parts, {"twice": twice}, m=2, p=3, extra=4)
+    assert [a.shape for a in made] == [(4,), (2, 4), (4,)]
+    assert fresh(GameData, N=2, m=3, p=4, n=1).offsets.dtype == np.int64
+
+
+@pytest.mark.parametrize("record", [Problem, Run, GameData, Solver])
+def test_every_array_of_a_loop_is_declared(record):
+    """A field without a shape would be taken for a number that whoever reads gives."""
+    numbers = {name for name, field in fields(record).items() if field is None}
+    assert numbers <= {"table"}
+
+
+def test_the_solvers_length_is_that_of_its_arrays():
+    sizes = {"m": 4, "p": 3, "entries": 6, "states": 2, "b": 1}
+    made = fresh(Solver, {"count": COUNT}, **sizes)
+    assert solver_length(*sizes.values()) == sum(a.size for a in made)
+    assert made.band.shape == (4, 3)
