@@ -1,5 +1,6 @@
 """Whether the tests notice a mutant: the nearest ones first, until one fails."""
 
+import ast
 import hashlib
 import json
 import os
@@ -9,9 +10,11 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+import coverage
 from operators import Mutant
 from tree import Tree, environment
 
@@ -32,15 +35,35 @@ def give_up() -> None:
 
 @dataclass
 class Baseline:
-    """What the tests do without any mutant: seconds of those that pass, by their names.
+    """What the tests do without any mutant.
 
     Attributes:
-        compiled: as users run it.
-        plain: with numba switched off, so that kernels are plain Python functions.
+        seconds: of those that pass, by their names.
+        executing: which of them execute a function, by file and dotted name; of a function that
+            runs as machine code nothing is known.
     """
 
-    compiled: dict[str, float] = field(default_factory=dict)
-    plain: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    executing: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+
+    def without(self, files: set[str]) -> "Baseline":
+        """What is known of the tests in other files."""
+
+        def stays(test: str) -> bool:
+            return test.partition("::")[0] not in files
+
+        executing = {
+            file: {name: list(filter(stays, tests)) for name, tests in functions.items()}
+            for file, functions in self.executing.items()
+        }
+        return Baseline({t: s for t, s in self.seconds.items() if stays(t)}, executing)
+
+    def add(self, other: "Baseline") -> None:
+        """Join what is known of other tests."""
+        self.seconds |= other.seconds
+        for file, functions in other.executing.items():
+            for name, tests in functions.items():
+                self.executing.setdefault(file, {}).setdefault(name, []).extend(tests)
 
 
 @dataclass
@@ -52,30 +75,80 @@ class Verdict:
     seconds: float
 
 
-def baseline(tree: Tree, folder: Path) -> Baseline:
-    """Run all tests that are new in the untouched copy, which also warms its machine code."""
+def baseline(tree: Tree, folder: Path) -> dict[str, Baseline]:
+    """Run all tests that are new in the untouched copy, which also warms its machine code.
+
+    Returns:
+        "plain", with numba switched off, so that kernels are plain Python functions; and
+        "compiled", as users run them.
+    """
     kept = folder / "baseline.json"
     texts = {str(path.relative_to(tree.base)): path.read_bytes() for path in _test_files(tree.base)}
     files = {file: hashlib.sha256(text).hexdigest() for file, text in texts.items()}
-    known = json.loads(kept.read_text()) if kept.exists() else {"files": {}}
-    same = {file for file in files if known["files"].get(file) == files[file]}
+    before = json.loads(kept.read_text()) if kept.exists() else {"files": {}}
+    new = sorted(file for file in files if before["files"].get(file) != files[file])
+    gone = set(before["files"]) - set(files)
+    known = {}
     for name, limit in (("plain", PLAIN_LIMIT), ("compiled", 0.0)):
-        found = {t: s for t, s in known.get(name, {}).items() if t.partition("::")[0] in same}
-        new = sorted(set(files) - same)
+        known[name] = Baseline(**before.get(name, {})).without({*new, *gone})
         if new:
             print(f"running {len(new)} files of tests without any mutant, {name} ...", flush=True)
-            report, _ = _pytest(tree.base, folder, new, limit, 7200.0, [])
-            found |= {test: seconds for test, outcome, seconds in report if outcome == "passed"}
+            lines = folder / "coverage"
+            lines.unlink(missing_ok=True)
+            report, _ = _pytest(tree.base, folder, new, limit, 7200.0, [], lines)
+            passed = {test: seconds for test, outcome, seconds in report if outcome == "passed"}
             failed = [test for test, outcome, _ in report if outcome == "failed"]
+            known[name].add(Baseline(passed, executed(lines, tree.base, set(passed))))
             if name == "compiled" and failed:
                 print("left out, since they fail without any mutant:", *failed, sep="\n  ")
-        known[name] = found
-    known["files"] = files
-    kept.write_text(json.dumps(known))
-    return Baseline(known["compiled"], known["plain"])
+    kept.write_text(json.dumps({"files": files} | {n: asdict(k) for n, k in known.items()}))
+    return known
 
 
-def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: float) -> Verdict:
+def executed(lines: Path, base: Path, passed: set[str]) -> dict[str, dict[str, list[str]]]:
+    """Which tests execute which functions, see :class:`Baseline`, from a file of coverage."""
+    data = coverage.CoverageData(str(lines))
+    data.read()
+    by_file: dict[str, set[str]] = {}
+    for test in passed:
+        by_file.setdefault(test.partition("::")[0], set()).add(test)
+    found: dict[str, dict[str, list[str]]] = {}
+    for measured in data.measured_files():
+        path = Path(measured)
+        if not path.is_relative_to(base.resolve()):
+            continue
+        name = str(path.relative_to(base.resolve()))
+        owner = functions_of_lines(path.read_bytes())
+        tests: dict[str, set[str]] = {}
+        for line, contexts in data.contexts_by_lineno(measured).items():
+            for context in contexts:
+                own = {context} & passed if "::" in context else by_file.get(context, set())
+                tests.setdefault(owner.get(line, ""), set()).update(own)
+        found[name] = {function: sorted(own) for function, own in tests.items() if function}
+    return found
+
+
+def functions_of_lines(source: bytes) -> dict[int, str]:
+    """For each line in a function's body the dotted name of the innermost one."""
+    found: dict[int, str] = {}
+
+    def visit(node: ast.AST, scopes: tuple[str, ...]) -> None:
+        for child in ast.iter_child_nodes(node):
+            inner = scopes
+            if isinstance(child, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef):
+                inner = (*scopes, child.name)
+                if not isinstance(child, ast.ClassDef):
+                    for line in range(child.body[0].lineno, (child.end_lineno or 0) + 1):
+                        found[line] = ".".join(inner)
+            visit(child, inner)
+
+    visit(ast.parse(source), ())
+    return found
+
+
+def judge(
+    mutant: Mutant, tree: Tree, known: dict[str, Baseline], folder: Path, limit: float
+) -> Verdict:
     """Try one mutant in a copy of its own; ``limit`` in s is for all tests together."""
     begun = time.monotonic()
     work = folder / "tree"
@@ -83,30 +156,57 @@ def judge(mutant: Mutant, tree: Tree, known: Baseline, folder: Path, limit: floa
         tree.put(mutant, work)
     except ValueError as error:
         return Verdict("undecided", str(error), 0.0)
-    rank = _Rank(mutant, tree)
     verdict = None
-    for plain in (True, False) if mutant.native else (False,):
+    for plain, tests in _stages(mutant, tree, known):
         how = ", as plain Python" if plain else ""
-        for tests in rank.stages(known.plain if plain else known.compiled):
-            left = max(limit - (time.monotonic() - begun), 10.0)
-            own_limit = 3 * PLAIN_LIMIT if plain else 0.0
-            report, ended = _pytest(work, folder, tests, own_limit, left, ["-x"])
-            failed = [test for test, outcome, _ in report if outcome == "failed"]
-            if failed:
-                verdict = ("killed", failed[0] + how)
-            elif ended == "limit":
-                verdict = ("undecided", f"at {_next(tests, report)}{how}")
-            elif ended == "hung":
-                verdict = ("timed out", _next(tests, report) + how)
-            elif ended != "passed":
-                verdict = ("killed", f"{_next(tests, report)}{how}: the process ended, {ended}")
-            if verdict:
-                break
+        left = max(limit - (time.monotonic() - begun), 10.0)
+        report, ended = _pytest(
+            work, folder, tests, 3 * PLAIN_LIMIT if plain else 0.0, left, ["-x"]
+        )
+        failed = [test for test, outcome, _ in report if outcome == "failed"]
+        if failed:
+            verdict = ("killed", failed[0] + how)
+        elif ended == "limit":
+            verdict = ("undecided", f"at {_next(tests, report)}{how}")
+        elif ended == "hung":
+            verdict = ("timed out", _next(tests, report) + how)
+        elif ended != "passed":
+            verdict = ("killed", f"{_next(tests, report)}{how}: the process ended, {ended}")
         if verdict:
             break
     shutil.rmtree(work)
     outcome, by = verdict or ("survived", "")
     return Verdict(outcome, by, round(time.monotonic() - begun, 1))
+
+
+def _stages(
+    mutant: Mutant, tree: Tree, known: dict[str, Baseline]
+) -> Iterator[tuple[bool, list[str]]]:
+    """Lists of tests to run one after the other, and whether as plain Python.
+
+    First those that are known to execute the mutant's function; then those of near files, and all
+    others, since a cache or a process may hide from what is known.
+    """
+    rank, compiled, done = _Rank(mutant, tree), known["compiled"], set()
+
+    def executing(baseline: Baseline) -> list[str]:
+        own = baseline.executing.get(mutant.file, {}).get(mutant.function, [])
+        return sorted(own, key=lambda test: baseline.seconds[test])
+
+    if mutant.native:
+        plain = executing(known["plain"])
+        if plain:
+            yield True, plain
+        if mutant.function:  # where they can execute it they have, as plain Python
+            done = set(known["plain"].seconds)
+    else:
+        first = executing(compiled)
+        if first:
+            yield False, first
+        done = set(first)
+    left = {test: seconds for test, seconds in compiled.seconds.items() if test not in done}
+    for tests in rank.stages(left):
+        yield False, tests
 
 
 class _Rank:
@@ -157,15 +257,21 @@ def _next(tests: list[str], report: list) -> str:
 
 
 def _pytest(
-    tree: Path, folder: Path, tests: list[str], plain_limit: float, limit: float, more: list[str]
-) -> tuple[list, str]:
-    """Run tests; what each did, and how the process ended: passed, failed, hung, limit or other."""
+    tree: Path, folder: Path, tests: list[str], plain_limit: float, limit: float, more: list[str],
+    lines: Path | None = None,
+) -> tuple[list, str]:  # fmt: skip
+    """Run tests; what each did, and how the process ended: passed, failed, hung, limit or other.
+
+    With ``lines`` a file of coverage is made, which tells what each test has executed.
+    """
     report, chosen = folder / "report.jsonl", folder / "tests.json"
     report.unlink(missing_ok=True)
     settings = environment(tree) | {"MUTATION_REPORT": str(report.resolve())}
     settings["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent / "plugin")
     if plain_limit:
         settings |= {"NUMBA_DISABLE_JIT": "1", "MUTATION_LIMIT": str(plain_limit)}
+    if lines:
+        settings["MUTATION_COVERAGE"] = str(lines.resolve())
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
     if any("::" in test for test in tests):
         chosen.write_text(json.dumps(tests))

@@ -2,7 +2,9 @@
 
 MUTATION_TESTS names a JSON list of the tests to run, in this order (all if it is not set),
 MUTATION_REPORT a file that gets [test, outcome, seconds] line by line, MUTATION_LIMIT the seconds
-that a test of plain Python may take. A mutant that fills the memory gets no more than 8 GiB.
+that a test of plain Python may take, MUTATION_COVERAGE a file for the lines that each test executes
+(of what its fixtures do: each test of its file). A mutant that fills the memory gets no more than
+8 GiB.
 """
 
 import json
@@ -15,6 +17,27 @@ import pytest
 
 MEMORY = 2**33
 LIMIT = float(os.environ.get("MUTATION_LIMIT", "0"))
+COVERAGE = None
+if path := os.environ.get("MUTATION_COVERAGE"):  # before the package is imported
+    import coverage
+
+    COVERAGE = coverage.Coverage(path, config_file=False, source=["gne_mj", "controllers"])
+    COVERAGE.start()
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_setup(item):
+    """What fixtures do is done for all tests of a file."""
+    if COVERAGE:
+        COVERAGE.switch_context(item.nodeid.partition("::")[0])
+    yield
+
+
+def pytest_unconfigure():
+    """Write down which lines were executed."""
+    if COVERAGE:
+        COVERAGE.stop()
+        COVERAGE.save()
 
 
 def pytest_configure():
@@ -34,6 +57,8 @@ def pytest_collection_modifyitems(items):
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_call(item):
     """Let a test of plain Python take no longer than it may."""
+    if COVERAGE:
+        COVERAGE.switch_context(item.nodeid)
     if LIMIT:
         signal.signal(signal.SIGALRM, _too_long)
         signal.setitimer(signal.ITIMER_REAL, LIMIT)
