@@ -1,22 +1,22 @@
 """The tool that puts faults into the code: which ones, where, and what they leave alone."""
 
-import importlib.util
+import importlib
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-FILE = Path(__file__).parent.parent / "scripts/mutation/operators.py"
+FOLDER = Path(__file__).parent.parent / "scripts/mutation"
 
 
 @pytest.fixture(scope="module")
 def operators():
-    specification = importlib.util.spec_from_file_location("mutation_operators", FILE)
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[specification.name] = module  # which dataclasses look for
-    specification.loader.exec_module(module)
-    yield module
-    del sys.modules[specification.name]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(FOLDER)
+        yield importlib.import_module("operators")
+        for name in ("operators", "judge", "tree"):
+            sys.modules.pop(name, None)
 
 
 SOURCE = '''"""Words, 1 + 2 < 3."""
@@ -71,3 +71,54 @@ def test_a_mutant_of_another_file_is_refused(operators):
     mutant = operators.mutants("some.py", SOURCE.encode())[0]
     with pytest.raises(ValueError, match="not the file"):
         mutant.applied(b"x" + SOURCE.encode())
+
+
+def test_functions_are_known_by_their_lines(operators):
+    """As the mutants in them are; a default belongs to what is around the function."""
+    judge = importlib.import_module("judge")
+    found = judge.functions_of_lines(SOURCE.encode())
+    assert {line: found.get(line, "") for line in (4, 7, 8, 9, 12, 15, 17, 18)} == {
+        4: "", 7: "", 8: "", 9: "inner", 12: "inner", 15: "", 17: "plain", 18: "plain",
+    }  # fmt: skip
+    named = {m.line: m.function for m in operators.mutants("some.py", SOURCE.encode())}
+    assert all(named[line] == found[line] for line in (9, 12, 17, 18))
+    nested = (
+        b"class A:\n    def f(self):\n        def g():\n            return 1\n        return g\n"
+    )
+    assert judge.functions_of_lines(nested) == {3: "A.f", 4: "A.f.g", 5: "A.f"}
+
+
+def test_coverage_is_told_by_tests(operators, tmp_path):
+    judge = importlib.import_module("judge")
+    (tmp_path / "some.py").write_text("def f():\n    return 1\n\ndef g():\n    return 2\n")
+    data = judge.coverage.CoverageData(str(tmp_path / "lines"))
+    path = str((tmp_path / "some.py").resolve())
+    for context, lines in (("", {1, 4}), ("t.py::one", {2}), ("t.py", {5}), ("u.py::x", {5})):
+        data.set_context(context)
+        data.add_lines({path: lines})
+    data.write()
+    passed = {"t.py::one", "t.py::two"}  # the third has failed
+    assert judge.executed(tmp_path / "lines", tmp_path, passed) == {
+        "some.py": {"f": ["t.py::one"], "g": ["t.py::one", "t.py::two"]}
+    }
+
+
+def test_tests_that_execute_a_mutant_come_first(operators, monkeypatch):
+    judge = importlib.import_module("judge")
+    tests = {"t.py::a": 2.0, "t.py::b": 1.0, "t.py::c": 0.5}
+    known = {
+        "plain": judge.Baseline({"t.py::c": 0.1}, {"some.py": {"inner": ["t.py::c"]}}),
+        "compiled": judge.Baseline(tests, {"some.py": {"plain": ["t.py::a", "t.py::b"]}}),
+    }
+    monkeypatch.setattr(
+        judge, "_Rank", lambda mutant, tree: SimpleNamespace(stages=lambda left: [sorted(left)])
+    )
+    found = {m.function: m for m in operators.mutants("some.py", SOURCE.encode())}
+    assert list(judge._stages(found["plain"], None, known)) == [
+        (False, ["t.py::b", "t.py::a"]), (False, ["t.py::c"])
+    ]  # fmt: skip
+    assert list(judge._stages(found["inner"], None, known)) == [
+        (True, ["t.py::c"]), (False, ["t.py::a", "t.py::b"])
+    ]  # fmt: skip
+    later = known["compiled"].without({"t.py"})
+    assert (later.seconds, later.executing) == ({}, {"some.py": {"plain": []}})
