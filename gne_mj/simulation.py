@@ -19,6 +19,7 @@ from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
+from gne_mj.variables import Rows, changed, declared
 from gne_mj.verdicts import check_numbers
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
@@ -295,6 +296,32 @@ class SystemRun:
             for name, (dimensions, values, _) in variables_of_parts(parts).items()
             if dimensions[:1] == ("time",)
         }
+
+    def present(self) -> dict[str, NDArray[Any]]:
+        """What a page shows of this instant, one row each, by the variables' names.
+
+        Inputs, and what else an instant's state does not say, are those of the last sample; before
+        the first one they are left out.
+        """
+        now = self.loop.present()
+        state, memory, configuration = (part[None] for part in now)
+        none = np.full(state.shape[:2], np.nan)
+        samples = Samples(state, none, memory, none, none, configuration)
+        instant = Rows(self.system, np.array([self.loop.time]), samples)
+        found = {}
+        for variable in declared(self.system):
+            rows = instant if variable.instant else self._last
+            if variable.page and rows is not None:
+                found[variable.name] = variable.source(rows)
+        return found
+
+    @property
+    def _last(self) -> Rows | None:
+        """The last sample."""
+        part = next((part for part in reversed(self._recorded) if len(part.time)), None)
+        if part is None:
+            return None
+        return Rows(part.system, part.time[-1:], changed(part.samples, lambda rows: rows[-1:]))
 
     def change(self, system: System) -> None:
         """See :meth:`Simulation.change`."""
