@@ -16,7 +16,7 @@ from gne_mj import variables, verdicts
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
-from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed
+from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed, input_unit
 
 if TYPE_CHECKING:
     import pandas
@@ -142,6 +142,12 @@ def _agent_out(runs: Runs) -> Array:
     return _where(runs.violated & (agent >= 0), 1 + agent)
 
 
+def _rise(runs: Runs) -> Array:
+    """Not a number without a y*, which V is about."""
+    rise = runs.seen(watch.STORAGE_RISE)
+    return rise if runs.system.known_equilibrium is not None else np.full_like(rise, np.nan)
+
+
 def _status(runs: Runs) -> Array:
     tail = verdicts.tail_distance(runs.time, runs.distance, runs.duration)
     return verdicts.status(runs.monitors, tail, runs.tolerance)
@@ -153,10 +159,6 @@ def _of_monitor(name: str, entry: int, **about: Any) -> Variable:
 
 def _is_implicit(system: System) -> bool:
     return system.mode == "implicit"
-
-
-def _kind_unit(system: System) -> str:
-    return system.agents.kind.INPUT_UNIT
 
 
 JUDGED = (
@@ -224,7 +226,7 @@ JUDGED = (
         long_name="1: seen at a control instant, 0: between two",
     ),
     Variable(
-        "peak_input", ("run",), lambda runs: np.max(runs.inputs.peak, axis=1), unit=_kind_unit,
+        "peak_input", ("run",), lambda runs: np.max(runs.inputs.peak, axis=1), unit=input_unit,
         columns=(Column("peak_input_max", "", lambda values: values.max()),),
     ),
     Variable(
@@ -232,7 +234,7 @@ JUDGED = (
         lambda runs: _in_each(runs.inputs.peak_time, np.argmax(runs.inputs.peak, axis=1)),
         unit="s",
     ),
-    Variable("rms_input", ("run", AXIS), lambda runs: runs.inputs.rms, unit=_kind_unit),
+    Variable("rms_input", ("run", AXIS), lambda runs: runs.inputs.rms, unit=input_unit),
     Variable(
         "energy", ("run", AXIS), lambda runs: runs.inputs.energy, long_name="integral of u y"
     ),
@@ -243,9 +245,8 @@ JUDGED = (
         ),
         unit="s", long_name="when an input limit was first met",
     ),
-    _of_monitor(
-        "lyapunov_rise", watch.STORAGE_RISE,
-        long_name="largest rise of V from one step to the next",
+    Variable(
+        "lyapunov_rise", ("run",), _rise, long_name="largest rise of V from one step to the next"
     ),
     _of_monitor("steps", watch.STEPS),
 )  # fmt: skip

@@ -183,7 +183,8 @@ def _action_unit(system: System) -> str:
     return system.game.action_unit
 
 
-def _input_unit(system: System) -> str:
+def input_unit(system: System) -> str:
+    """The unit of inputs; the action's per second where the agent type names none."""
     return system.agents.kind.INPUT_UNIT or f"{system.game.action_unit or 1}/s"
 
 
@@ -266,7 +267,7 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     ),
     Variable(
         "input", ("time", AXIS), lambda rows: rows.samples.input,
-        unit=_input_unit, long_name="delivered input u", instant=False,
+        unit=input_unit, long_name="delivered input u", instant=False,
     ),
     Variable(
         "state", ("time", AXIS, "component"), lambda rows: rows.samples.state,
@@ -312,7 +313,7 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     ),
     Variable(
         "acting_input", ("time", AXIS), lambda rows: rows.samples.acts, there=_is_faulty,
-        unit=_input_unit, long_name="input with the faults' pushes, as it moved the plant",
+        unit=input_unit, long_name="input with the faults' pushes, as it moved the plant",
         instant=False,
     ),
     Variable(

@@ -52,6 +52,18 @@ def test_a_dataset_says_what_each_run_was(tmp_path):
     assert dict(grid.sizes) == {"barrier.rho": 3, "start": 4}
 
 
+def test_what_only_some_combinations_have_is_kept(tmp_path):
+    """Steps are divided with a fixed step only, and the first combination has none."""
+    sweep = [Sweep("plant.integrator", ("rosenbrock", "rk4"))]
+    plan = make_plan(
+        "osnr", {"simulation.timestep": 1e-3, "simulation.duration": 0.1}, sweeps=sweep
+    )
+    store = Store.create(tmp_path / "a", plan)
+    execute(store, threads=1)
+    divided = store.dataset()["divided_steps"].to_numpy()
+    assert divided.tolist() == pytest.approx([np.nan, 0.0], nan_ok=True)
+
+
 def test_summaries_are_the_same_with_and_without_samples(tmp_path):
     kept, dropped = small(tmp_path, record=1), small(tmp_path, "b", record=0)
     execute(kept, threads=1)

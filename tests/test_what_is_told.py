@@ -11,6 +11,7 @@ from builders import FIVE, V0, distributed, integrators, robot_state, robot_syst
 from gne_mj import graph as graphs
 from gne_mj import verdicts
 from gne_mj.barrier import Schedule
+from gne_mj.batch_variables import declared_figures
 from gne_mj.batches import summary
 from gne_mj.batches.plan import make_plan
 from gne_mj.controllers import FullInformation, PartialInformation, PlainLaw
@@ -279,6 +280,25 @@ def test_the_columns_of_a_batch():
     assert found["final_action"][1] == pytest.approx(found["equilibrium"][1])
     assert "solutions" not in found
     assert "action" not in found
+
+
+def test_of_a_system_without_a_known_equilibrium_no_rise_is_told(monkeypatch):
+    """As in the certificate of one run."""
+    one = batch(line(), monitor_of(STORAGE_RISE=0.125))
+    assert summary.columns_of(*one, record=0)["lyapunov_rise"][1].tolist() == [0.125]
+    monkeypatch.setattr(System, "known_equilibrium", None)
+    found = summary.columns_of(*one, record=0)
+    for name in ("lyapunov_rise", "final_error", "settling_time"):
+        assert found[name][1].tolist() == pytest.approx([np.nan], nan_ok=True)
+
+
+def test_inputs_of_a_batch_have_the_unit_that_a_trajectorys_have():
+    for system in (line(), robot_system(robot_state(FIVE))):
+        unit = variables_of(system, TIMES, samples_of(system))["input"][2]["units"]
+        found = {each.name: each for each in declared_figures(system)}
+        for name in ("peak_input", "rms_input"):
+            assert found[name].attributes(system)["units"] == unit
+    assert unit == "N"
 
 
 def test_mode_implicit_has_columns_of_its_own():
