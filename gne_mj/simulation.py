@@ -310,9 +310,10 @@ class SystemRun:
         instant = Rows(self.system, np.array([self.loop.time]), samples)
         found = {}
         for variable in declared(self.system):
-            rows = instant if variable.instant else self._last
-            if variable.page and rows is not None:
-                found[variable.name] = variable.source(rows)
+            if variable.page:
+                rows = instant if variable.instant else self._last
+                if rows is not None:
+                    found[variable.name] = variable.source(rows)
         return found
 
     @property
