@@ -74,8 +74,7 @@ class Runs:
     @cached_property
     def equilibrium(self) -> NDArray[np.float64]:
         """(m,) y*; not a number where it is not known."""
-        known = self.system.known_equilibrium
-        return np.full(self.system.game.actions, np.nan) if known is None else known.action
+        return variables.equilibrium_of(self.system)
 
     @cached_property
     def distance(self) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
-from gne_mj.variables import Rows, changed, declared
+from gne_mj.variables import Rows, changed, check_names, declared
 from gne_mj.verdicts import check_numbers
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
@@ -79,6 +79,8 @@ class Simulation:
         if len(set(names)) != len(names) or not names:
             raise InvalidInput("systems", names, "there must be systems, with different names")
         check_recording(systems, clock)
+        for system in systems:
+            check_names(system, declared(system))
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
         self.interventions: list[dict[str, Any]] = []

@@ -23,7 +23,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.files import written
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
-from gne_mj.variables import Labelled, axis_of, declared, variables_of
+from gne_mj.variables import Labelled, coordinates_of, declared, variables_of
 from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
@@ -232,21 +232,6 @@ def variables_of_parts(parts: Sequence[Part]) -> Labelled:
             values = np.concatenate([each[name][1] for each in found])
             variables[name] = (dimensions, values, attributes)
     return variables
-
-
-def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
-    """The coordinates that go with these variables."""
-    game = system.game
-    coordinates: dict[str, Any] = {
-        "time": ("time", time, {"units": "s"}),
-        "agent": ("agent", np.arange(1, game.agents + 1)),
-        "constraint_name": ("constraint", np.array(game.constraint_names)),
-        "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
-    }
-    if axis_of(system) == "action":
-        coordinates["owner"] = ("action", game.agent_of_action + 1)
-        coordinates["axis"] = ("action", np.array(game.axis_of_action))
-    return coordinates
 
 
 def _dataset(parts: list[Part], certificate: Certificate) -> "xarray.Dataset":

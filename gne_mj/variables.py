@@ -4,7 +4,7 @@ Trajectories, rows and summaries of batches, the live page, replays and figures 
 ``SIGNALS``: to add a signal is to add its :class:`Variable` there (docs/developers.md).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.loops.base import Samples
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -99,11 +100,6 @@ class Variable:
             if text is not None
         }
 
-    @property
-    def sampled(self) -> bool:
-        """Whether it has a value for each sample."""
-        return self.dimensions[:1] == ("time",)
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -153,6 +149,40 @@ def declared(system: System) -> list[Variable]:
     return [variable for variable in found if variable.there(system)]
 
 
+def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
+    """The coordinates that go with a system's variables, at times (samples,) in s."""
+    game = system.game
+    coordinates: dict[str, Any] = {
+        "time": ("time", time, {"units": "s"}),
+        "agent": ("agent", np.arange(1, game.agents + 1)),
+        "constraint_name": ("constraint", np.array(game.constraint_names)),
+        "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
+    }
+    if axis_of(system) == "action":
+        coordinates["owner"] = ("action", game.agent_of_action + 1)
+        coordinates["axis"] = ("action", np.array(game.axis_of_action))
+    return coordinates
+
+
+def check_names(system: System, variables: Iterable[Variable], others: Iterable[str] = ()) -> None:
+    """Refuse a game or agent type of which a variable has the name of another one.
+
+    Args:
+        system: whose.
+        variables: which are to be in one dataset.
+        others: names that are taken besides those of coordinates.
+    """
+    taken = {*coordinates_of(system, np.zeros(0)), *others}
+    for variable in variables:
+        for name in (variable.name, *variable.bounds(system)):
+            if name in taken:
+                raise InvalidInput(
+                    f"systems.{system.name}", name, "results have something else of that name;"
+                    " give the game's quantity, or the agents' state, another one",
+                )  # fmt: skip
+            taken.add(name)
+
+
 def variables_of(system: System, time: NDArray[np.float64], samples: Samples) -> Labelled:
     """What is kept of a run's samples: (dimensions, values, attributes) by name.
 
@@ -192,21 +222,26 @@ def _state_units(system: System) -> str:
     return ", ".join(unit or system.game.action_unit for _, unit in system.agents.kind.STATES)
 
 
-def _equilibrium(rows: Rows) -> Array:
-    known = rows.system.known_equilibrium
-    return np.full(rows.system.game.actions, np.nan) if known is None else known.action
+def equilibrium_of(system: System) -> NDArray[np.float64]:
+    """(m,) y*; not a number where it is not known."""
+    known = system.known_equilibrium
+    return np.full(system.game.actions, np.nan) if known is None else known.action
 
 
 def _states(system: System) -> Iterator[Variable]:
     """The agents' states but the output, each by its name."""
     kind = system.agents.kind
-    for index, (name, unit) in enumerate(kind.STATES):
-        if index != kind.OUTPUT:
+    states = (_state(index, *state) for index, state in enumerate(kind.STATES))
+    return (state for index, state in enumerate(states) if index != kind.OUTPUT)
 
-            def source(rows: Rows, index: int = index) -> Array:
-                return rows.samples.state[:, :, index]
 
-            yield Variable(name, ("time", AXIS), source, unit=unit or _action_unit)
+def _state(index: int, name: str, unit: str) -> Variable:
+    return Variable(
+        name,
+        ("time", AXIS),
+        lambda rows: rows.samples.state[:, :, index],
+        unit=unit or _action_unit,
+    )
 
 
 def _quantities(system: System) -> Iterator[Variable]:
@@ -278,7 +313,7 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
         long_name="g(y), negative inside the set", page="behind",
     ),
     Variable(
-        "equilibrium", (AXIS,), _equilibrium,
+        "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
         unit=_action_unit, long_name="y*", batch=False,
         runs=(
             Variable(

@@ -28,8 +28,7 @@ from gne_mj.files import storing, written
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import Outcome
 from gne_mj.loops.recorder import Recorder
-from gne_mj.trajectory import coordinates_of
-from gne_mj.variables import Labelled, declared
+from gne_mj.variables import Labelled, check_names, coordinates_of, declared
 
 if TYPE_CHECKING:
     import xarray
@@ -323,7 +322,9 @@ def _schema(plan: Plan) -> tuple[Combination, Labelled]:
         if first is None:
             first = combination
         _check_layout(first, combination)
-        shown = [*declared_figures(system), *declared(system)]
+        rows = [each for each in declared(system) if each.batch] if plan.record else []
+        shown = [*declared_figures(system), *rows]
+        check_names(system, shown, ("run", "start", "seed", *plan.labels()))
         kind = (len(system.loop_memory), *((each.name, each.dims(system)) for each in shown))
         if kind not in known:
             known[kind] = _one_run(combination, plan.record)
