@@ -4,7 +4,7 @@ Most are what its monitor saw at every step; the others are what signals say tha
 them (``Variable.runs``).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -271,10 +271,14 @@ OF_MODES = (
 
 def figures() -> list[Variable]:
     """All figures that runs may have, in the order of a batch's dataset."""
-    of_signals = (each for each in variables.SIGNALS if isinstance(each, Variable))
-    return [*JUDGED, *(figure for signal in of_signals for figure in signal.runs), *OF_MODES]
+    return _with_figures_of(each for each in variables.SIGNALS if isinstance(each, Variable))
 
 
 def declared_figures(system: System) -> list[Variable]:
     """The figures that a system's runs have."""
-    return [figure for figure in figures() if figure.there(system)]
+    found = _with_figures_of(variables.declared(system))
+    return [figure for figure in found if figure.there(system)]
+
+
+def _with_figures_of(signals: Iterable[Variable]) -> list[Variable]:
+    return [*JUDGED, *(figure for signal in signals for figure in signal.runs), *OF_MODES]

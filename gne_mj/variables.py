@@ -171,6 +171,9 @@ def check_names(system: System, variables: Iterable[Variable], others: Iterable[
         system: whose.
         variables: which are to be in one dataset.
         others: names that are taken besides those of coordinates.
+
+    Raises:
+        InvalidInput: names the first such variable.
     """
     taken = {*coordinates_of(system, np.zeros(0)), *others}
     for variable in variables:

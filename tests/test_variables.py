@@ -97,6 +97,7 @@ POWER = Variable(
     "delivered_power",
     ("time", AXIS),
     power,
+    there=lambda system: system.agents.kind.INPUT_UNIT == "N",
     unit="W",
     long_name="delivered power",
     symbol="u_i y_i",
@@ -136,7 +137,7 @@ def test_a_signal_more_is_in_trajectories_replays_and_figures():
 
     meta, arrays = unpack(replay_pack(trajectory))
     line = meta["systems"][0]["quantities"][1]
-    assert line["name"], line["unit"] == ("delivered_power", "W")
+    assert (line["name"], line["unit"]) == ("delivered_power", "W")
     assert line["labels"] == ["1", "2", "3", "4", "5"]
     assert line["bound"] == [90.0] * 5
     shown = arrays["robots/quantity/delivered_power"]
@@ -148,6 +149,15 @@ def test_a_signal_more_is_in_trajectories_replays_and_figures():
     assert axes.get_ylabel() == "delivered power $u_i y_i$ (W)"
     assert [line.get_ydata().tolist() for line in axes.lines[:5]] == values.T.tolist()
     assert axes.lines[5].get_ydata() == [90.0, 90.0]
+
+
+@pytest.mark.usefixtures("more")
+def test_a_signal_is_of_the_systems_that_have_it_and_so_are_its_figures():
+    for system in load_scenario("paper").system_objects():
+        has = system.name == "robots"
+        assert ("delivered_power" in [each.name for each in declared(system)]) == has
+        assert ("peak_power" in [each.name for each in declared_figures(system)]) == has
+    assert "peak_power" in [each.name for each in figures()]
 
 
 @pytest.mark.usefixtures("more")
