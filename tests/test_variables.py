@@ -198,6 +198,20 @@ def test_a_signal_more_is_on_the_live_page_as_it_was_last_recorded():
     assert np.array_equal(now["robots/action"], trajectory["robots"]["action"][3])  # of 0.12 s
 
 
+def test_a_frame_is_of_the_numbers_of_now():
+    changes = {**SHORT, "plant.engine": "ode"}
+    session = Session(load_scenario("velocity-sync", changes), "a title")
+    try:
+        session._move(10)
+        before = unpack(session._frame())[1]["robots/quantity/gap"]
+        key = "systems.robots.game.reference_velocity"
+        session._do({"do": "set", "key": key, "value": 3.25}, None)
+        after = unpack(session._frame())[1]["robots/quantity/gap"]
+    finally:
+        session.server.close()
+    assert after - before == pytest.approx([-0.25, 0.0, 0.0, 0.0, 0.0])
+
+
 @pytest.mark.usefixtures("more")
 def test_a_signal_more_is_in_batches_tables_and_figures(tmp_path):
     store = small(tmp_path, record=1, starts=2)
