@@ -19,6 +19,7 @@ from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
+from gne_mj.variables import Rows, Variable, changed, check_names, declared
 from gne_mj.verdicts import check_numbers
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
@@ -78,6 +79,8 @@ class Simulation:
         if len(set(names)) != len(names) or not names:
             raise InvalidInput("systems", names, "there must be systems, with different names")
         check_recording(systems, clock)
+        for system in systems:
+            check_names(system, declared(system))
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
         self.interventions: list[dict[str, Any]] = []
@@ -222,6 +225,7 @@ class SystemRun:
 
     def __init__(self, system: System, clock: Clock) -> None:
         self.system, self.clock = system, clock
+        self._shown = _shown(system)
         self.loop = system.closed_loop(clock)
         self.wall_time = 0.0
         self._due: int | None = None  # the step at which the next row is recorded; None: at once
@@ -296,11 +300,38 @@ class SystemRun:
             if dimensions[:1] == ("time",)
         }
 
+    def present(self) -> dict[str, NDArray[Any]]:
+        """What a page shows of this instant, one row each, by the variables' names.
+
+        Inputs, and what else an instant's state does not say, are those of the last sample; before
+        the first one they are left out.
+        """
+        now = self.loop.present()
+        state, memory, configuration = (part[None] for part in now)
+        none = np.full(state.shape[:2], np.nan)
+        samples = Samples(state, none, memory, none, none, configuration)
+        instant = Rows(self.system, np.array([self.loop.time]), samples)
+        found = {}
+        for variable in self._shown:
+            rows = instant if variable.instant else self._last
+            if rows is not None:
+                found[variable.name] = variable.source(rows)
+        return found
+
+    @property
+    def _last(self) -> Rows | None:
+        """The last sample."""
+        part = next((part for part in reversed(self._recorded) if len(part.time)), None)
+        if part is None:
+            return None
+        return Rows(part.system, part.time[-1:], changed(part.samples, lambda rows: rows[-1:]))
+
     def change(self, system: System) -> None:
         """See :meth:`Simulation.change`."""
         self.loop.adopt(system.setup(self.clock))
         self.loop.keeps = system
         self.system = system
+        self._shown = _shown(system)
 
     def push(self, channel: int, force: float, steps: int) -> None:
         """See :meth:`Simulation.push`."""
@@ -353,6 +384,11 @@ class SystemRun:
         last = self._recorded[-1]
         if len(last.time) and last.time[-1] >= self.loop.time:
             self._recorded[-1] = Part(last.system, last.time[:-1], last.samples.first(-1))
+
+
+def _shown(system: System) -> list[Variable]:
+    """What a page has of a system, by its present numbers."""
+    return [variable for variable in declared(system) if variable.page]
 
 
 _asked: threading.Event | None = None  # the event of the interruption that is going on

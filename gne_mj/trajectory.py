@@ -21,15 +21,13 @@ from gne_mj import chunks
 from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
 from gne_mj.files import written
-from gne_mj.game import Game
 from gne_mj.loops.base import Samples
 from gne_mj.system import System
+from gne_mj.variables import Labelled, coordinates_of, declared, variables_of
 from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray
-
-ESTIMATING = ("partial", "distributed")  # information structures whose laws hold estimates
 
 # From bad to good: a run's status is the worst of its systems'.
 _ORDER = (
@@ -225,133 +223,7 @@ def _worst(statuses: Iterable[str]) -> str:
     return min(statuses, key=_ORDER.index)
 
 
-def axis_of(system: System) -> str:
-    """The dimension of actions: agents, where each has one."""
-    return "agent" if system.game.actions == system.game.agents else "action"
-
-
-def estimates_of(
-    game: Game, y: NDArray[np.float64], memory: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(samples, N, m) what agents take the actions to be, of actions (samples, m) and memories."""
-    m, owner = game.actions, game.agent_of_action
-    estimates = memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
-    estimates[:, owner, np.arange(m)] = y  # an agent's own block is its action, not an estimate
-    return estimates
-
-
-def variables_of(
-    system: System, time: NDArray[np.float64], samples: Samples
-) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
-    """What is kept of a run's samples: (dimensions, values, attributes) by name.
-
-    Args:
-        system: what was run.
-        time: (samples,) in s.
-        samples: at these times.
-    """
-    game, kind, known = system.game, system.agents.kind, system.known_equilibrium
-    y = samples.state[:, :, kind.OUTPUT]
-    unit = {"units": game.action_unit}
-    axis = axis_of(system)
-    variables: dict[str, Any] = {
-        "action": (("time", axis), y, {**unit, "long_name": game.action_name}),
-        "input": (
-            ("time", axis),
-            samples.input,
-            {
-                "units": kind.INPUT_UNIT or f"{game.action_unit or 1}/s",
-                "long_name": "delivered input u",
-            },
-        ),
-        "state": (
-            ("time", axis, "component"),
-            samples.state,
-            {"units": ", ".join(u or game.action_unit for _, u in kind.STATES)},
-        ),
-        "constraint": (
-            ("time", "constraint"),
-            game.constraints(y),
-            {"long_name": "g(y), negative inside the set"},
-        ),
-        "equilibrium": (
-            (axis,),
-            np.full(game.actions, np.nan) if known is None else known.action,
-            {**unit, "long_name": "y*"},
-        ),
-    }
-    for index, (name, state_unit) in enumerate(kind.STATES):
-        if index != kind.OUTPUT:
-            attributes = {"units": state_unit or game.action_unit}
-            variables[name] = (("time", axis), samples.state[:, :, index], attributes)
-    for quantity in game.quantities:
-        entries = game.entries(quantity)
-        dimensions = (quantity.each,) if quantity.each else ()
-        units = {"units": quantity.unit}
-        variables[quantity.name] = (
-            ("time", *dimensions),
-            quantity.at(y, entries),
-            {**units, "long_name": quantity.long_name, "symbol": quantity.symbol},
-        )
-        for name, bound in quantity.bounds(entries).items():
-            variables[name] = (dimensions, bound, units)
-    if samples.memory.shape[1] and system.law.information == "custom":
-        variables["memory"] = (
-            ("time", "memory_entry"),
-            samples.memory,
-            {"long_name": "the law's memory"},
-        )
-    elif system.law.information in ESTIMATING:
-        m = game.actions
-        variables["estimate"] = (
-            ("time", "estimating_agent", axis),
-            estimates_of(game, y, samples.memory),
-            {**unit, "long_name": "what each agent takes the actions to be"},
-        )
-        if system.law.information == "distributed":
-            variables["filtered_action"] = (
-                ("time", axis),
-                samples.memory[:, game.agents * m : (game.agents + 1) * m],
-                {**unit, "long_name": "z"},
-            )
-    if samples.seen.shape[1]:
-        variables["measurement"] = (
-            ("time", axis),
-            samples.seen,
-            {**unit, "long_name": "outputs as the law read them for the input of that time"},
-        )
-        variables["acting_input"] = (
-            ("time", axis),
-            samples.acts,
-            {
-                **variables["input"][2],
-                "long_name": "input with the faults' pushes, as it moved the plant",
-            },
-        )
-    if samples.configuration.shape[1]:
-        variables["configuration"] = (
-            ("time", "coordinate"),
-            samples.configuration,
-            {"long_name": "all joints' positions, MuJoCo's qpos"},
-        )
-    if system.schedule is not None:
-        variables["penalty"] = (
-            ("time",),
-            system.schedule.at(time),
-            {"long_name": "penalty rho", "units": ""},
-        )
-    if np.any(game.margins):
-        variables["tightening"] = (
-            ("constraint",),
-            game.margins,
-            {"long_name": "t: the barrier guards g + t < 0"},
-        )
-    return variables
-
-
-def variables_of_parts(
-    parts: Sequence[Part],
-) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
+def variables_of_parts(parts: Sequence[Part]) -> Labelled:
     """The same of parts one after the other; what has no time is that of the last numbers."""
     found = [variables_of(part.system, part.time, part.samples) for part in parts]
     variables = found[-1]
@@ -362,27 +234,13 @@ def variables_of_parts(
     return variables
 
 
-def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
-    """The coordinates that go with these variables."""
-    game = system.game
-    coordinates: dict[str, Any] = {
-        "time": ("time", time, {"units": "s"}),
-        "agent": ("agent", np.arange(1, game.agents + 1)),
-        "constraint_name": ("constraint", np.array(game.constraint_names)),
-        "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
-    }
-    if axis_of(system) == "action":
-        coordinates["owner"] = ("action", game.agent_of_action + 1)
-        coordinates["axis"] = ("action", np.array(game.axis_of_action))
-    return coordinates
-
-
 def _dataset(parts: list[Part], certificate: Certificate) -> "xarray.Dataset":
     """The dataset of a system."""
     import xarray
 
     system = parts[-1].system
     game, report = system.game, certificate.to_dict()
+    drawn = [variable for variable in declared(system) if variable.figure]
     time = np.concatenate([part.time for part in parts])
     return xarray.Dataset(
         variables_of_parts(parts),
@@ -390,7 +248,7 @@ def _dataset(parts: list[Part], certificate: Certificate) -> "xarray.Dataset":
         attrs={
             "game": game.name,
             "agent_name": game.agent_name,
-            "quantities": json.dumps([quantity.name for quantity in game.quantities]),
+            "quantities": json.dumps([each.name for each in drawn if each.name != "action"]),
             "information": system.law.information,
             "mode": system.mode,
             "decentralised": int(system.decentralised),

@@ -52,6 +52,38 @@ def test_a_dataset_says_what_each_run_was(tmp_path):
     assert dict(grid.sizes) == {"barrier.rho": 3, "start": 4}
 
 
+def test_what_only_some_combinations_have_is_kept(tmp_path):
+    """Steps are divided with a fixed step only, and the first combination has none."""
+    sweep = [Sweep("plant.integrator", ("rosenbrock", "rk4"))]
+    plan = make_plan(
+        "osnr", {"simulation.timestep": 1e-3, "simulation.duration": 0.1}, sweeps=sweep
+    )
+    store = Store.create(tmp_path / "a", plan)
+    execute(store, threads=1)
+    divided = store.dataset()["divided_steps"].to_numpy()
+    assert divided.tolist() == pytest.approx([np.nan, 0.0], nan_ok=True)
+
+
+OWN = """
+from gne_mj.games import velocity_game
+from gne_mj.quantity import Quantity
+from dataclasses import replace
+def game(count):
+    energy = Quantity("energy", "energy", "J", lambda y: y**2, each="agent")
+    return replace(velocity_game(count, 3.0, 3.0), quantities=(energy,))
+"""
+
+
+def test_a_quantity_with_the_name_of_a_figure_is_refused_where_rows_are_kept(tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    game = {"type": "custom", "file": str(tmp_path / "own.py")}
+    changes = {**ODE, "game": game, "initial.action": [1.0, 1.5, 2.0, 2.5, 3.0]}
+    Store.create(tmp_path / "a", make_plan("velocity-sync", changes))
+    with pytest.raises(InvalidInput, match="got 'energy', but results have something else"):
+        Store.create(tmp_path / "b", make_plan("velocity-sync", changes, record=1))
+    assert not (tmp_path / "b").exists()
+
+
 def test_summaries_are_the_same_with_and_without_samples(tmp_path):
     kept, dropped = small(tmp_path, record=1), small(tmp_path, "b", record=0)
     execute(kept, threads=1)

@@ -54,6 +54,15 @@ def trajectory():
     return simulate(game(LENGTH, SHARE, SLACK))
 
 
+@pytest.mark.parametrize(
+    "name", ["input", "state", "time", "agent", "axis", "squared_length_bound"]
+)
+def test_a_name_that_results_have_already_is_refused_before_the_run(name):
+    own = replace(SLACK, name=name)
+    with pytest.raises(InvalidInput, match=f"systems.points: got '{name}', but results have"):
+        simulate(game(LENGTH, own))
+
+
 def test_all_are_recorded(trajectory, tmp_path):
     loaded = Trajectory.load(trajectory.save(tmp_path / "run"))["points"]
     y = loaded["action"].to_numpy()

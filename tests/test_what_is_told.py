@@ -5,20 +5,24 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from batch_plans import ROOT
 from builders import FIVE, V0, distributed, integrators, robot_state, robot_system
 
 from gne_mj import graph as graphs
 from gne_mj import verdicts
 from gne_mj.barrier import Schedule
+from gne_mj.batch_variables import declared_figures
 from gne_mj.batches import summary
 from gne_mj.batches.plan import make_plan
 from gne_mj.controllers import FullInformation, PartialInformation, PlainLaw
+from gne_mj.faults import Push
 from gne_mj.games import velocity_consensus_game, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Outcome, Span
+from gne_mj.scenario import load_scenario
 from gne_mj.system import Clock, System
-from gne_mj.trajectory import variables_of
+from gne_mj.variables import variables_of
 
 M, P = 2, 3
 GAMES = {2: velocity_game(2, V0, 3.0)}
@@ -169,13 +173,20 @@ def test_estimates_and_filtered_actions_are_kept():
 
 
 def test_what_was_seen_and_what_acted_is_kept_with_faults():
-    system, rows = line(), np.arange(6.0).reshape(3, 2)
-    given = samples_of(system, seen=rows, acts=10.0 + rows, configuration=np.ones((3, 5)))
-    found = variables_of(system, TIMES, given)
+    system, rows = line(faults=(Push(force=2.0),)), np.arange(6.0).reshape(3, 2)
+    found = variables_of(system, TIMES, samples_of(system, seen=rows, acts=10.0 + rows))
     assert found["measurement"][1] is rows
     assert found["acting_input"][1].tolist() == (10.0 + rows).tolist()
-    assert found["configuration"][:1] == (("time", "coordinate"),)
     assert found["input"][2]["units"] == found["acting_input"][2]["units"]
+    assert "configuration" not in found
+
+
+def test_all_joints_of_mjcf_robots_are_kept():
+    (system,) = load_scenario(ROOT / "examples" / "robot" / "scenario.toml").system_objects()
+    given = samples_of(system, configuration=np.ones((3, 5)))
+    dimensions, values, _ = variables_of(system, TIMES, given)["configuration"]
+    assert dimensions == ("time", "coordinate")
+    assert values is given.configuration
 
 
 def test_states_but_the_output_are_kept_by_their_names():
@@ -269,6 +280,25 @@ def test_the_columns_of_a_batch():
     assert found["final_action"][1] == pytest.approx(found["equilibrium"][1])
     assert "solutions" not in found
     assert "action" not in found
+
+
+def test_of_a_system_without_a_known_equilibrium_no_rise_is_told(monkeypatch):
+    """As in the certificate of one run."""
+    one = batch(line(), monitor_of(STORAGE_RISE=0.125))
+    assert summary.columns_of(*one, record=0)["lyapunov_rise"][1].tolist() == [0.125]
+    monkeypatch.setattr(System, "known_equilibrium", None)
+    found = summary.columns_of(*one, record=0)
+    for name in ("lyapunov_rise", "final_error", "settling_time"):
+        assert found[name][1].tolist() == pytest.approx([np.nan], nan_ok=True)
+
+
+def test_inputs_of_a_batch_have_the_unit_that_a_trajectorys_have():
+    for system in (line(), robot_system(robot_state(FIVE))):
+        unit = variables_of(system, TIMES, samples_of(system))["input"][2]["units"]
+        found = {each.name: each for each in declared_figures(system)}
+        for name in ("peak_input", "rms_input"):
+            assert found[name].attributes(system)["units"] == unit
+    assert unit == "N"
 
 
 def test_mode_implicit_has_columns_of_its_own():

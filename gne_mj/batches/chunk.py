@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gne_mj.batches.plan import Combination, Plan
 from gne_mj.batches.structure import Structure, key_of
 from gne_mj.batches.summary import (
-    Variables,
     columns_of,
     join,
     rearranged,
@@ -26,6 +25,7 @@ from gne_mj.loops.layout import Setup
 from gne_mj.plain import raise_pending
 from gne_mj.scenario_tables.table import per_action
 from gne_mj.system import Clock, System
+from gne_mj.variables import Labelled
 
 _STRUCTURES, _COMBINATIONS = 16, 1024  # that are kept; a structure has a model, rows and threads
 
@@ -55,7 +55,7 @@ class Runner:
         self._prepared: OrderedDict[int, _Prepared] = OrderedDict()
         self._structures: OrderedDict[Hashable, Structure] = OrderedDict()
 
-    def run(self, chunk: int, stopped: Callable[[], bool] = lambda: False) -> Variables | None:
+    def run(self, chunk: int, stopped: Callable[[], bool] = lambda: False) -> Labelled | None:
         """The variables of a chunk's runs, or None if ``stopped`` said so meanwhile.
 
         Raises:
@@ -63,7 +63,7 @@ class Runner:
         """
         with _ONE_AT_A_TIME:
             entries = list(self._entries(chunk))
-            parts: dict[int, Variables] = {}
+            parts: dict[int, Labelled] = {}
             for key in dict.fromkeys(prepared.key for prepared, _ in entries):
                 mine = [entry for entry in entries if entry[0].key == key]
                 found = self._run_group(mine, stopped)
@@ -74,7 +74,7 @@ class Runner:
 
     def _run_group(
         self, entries: list[tuple[_Prepared, list[int]]], stopped: Callable[[], bool]
-    ) -> dict[int, Variables] | None:
+    ) -> dict[int, Labelled] | None:
         """The variables of combinations of one structure (or of none), by their numbers."""
         first = entries[0][0]
         cases = [list(self._cases(*entry)) for entry in entries]

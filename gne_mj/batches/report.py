@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gne_mj import plots
+from gne_mj.batch_variables import figures
 from gne_mj.batches.integrity import reading
 from gne_mj.batches.store import RUNS, Store
 from gne_mj.errors import InvalidInput
@@ -106,27 +107,12 @@ def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":
             "ended_early": int((~stayed).sum()),
             "converged": int((own["status"] == "converged").sum()),
         }
-        # A run that never settled took longer than any that did, and one that left has no end.
-        settling = own["settling_time"].fillna(np.inf)
-        error = own["final_error"].fillna(np.inf)
-        for name, value in (
-            ("least_margin_min", own["least_margin"].min()),
-            ("least_margin_median", own["least_margin"].median()),
-            ("settling_time_median", _middle(settling)),
-            ("settling_time_max", settling.max()),
-            ("not_settled", int(np.isinf(settling).sum())),
-            ("final_error_median", _middle(error)),
-            ("final_error_max", own["final_error"].max()),
-            ("peak_input_max", own["peak_input"].max()),
-        ):
-            row[name] = np.nan if np.isinf(value) else value
+        for figure in figures():
+            for column in figure.columns if figure.name in own else ():
+                value = column.of(own[figure.name])
+                row[column.name] = np.nan if np.isinf(value) else value
         rows.append(row)
     return pandas.DataFrame(rows)
-
-
-def _middle(values: "pandas.Series[float]") -> float:
-    """The median, of an even number of runs the lower one."""
-    return float(np.quantile(values, 0.5, method="inverted_cdf"))
 
 
 def summary(table: "pandas.DataFrame", keys: list[str], rows: int = 24) -> Iterator[str]:
@@ -139,10 +125,12 @@ def summary(table: "pandas.DataFrame", keys: list[str], rows: int = 24) -> Itera
         **{key: key for key in keys},
         "runs": "runs",
         "ended_early": "ended early",
-        "least_margin_min": "worst margin",
-        "settling_time_median": "settling (s)",
-        "not_settled": "not settled",
-        "final_error_max": "final error",
+        **{
+            column.name: column.title
+            for figure in figures()
+            for column in figure.columns
+            if column.title and column.name in table
+        },
     }
     shown = table.head(rows)
     cells = [[_cell(row[key]) for key in names] for _, row in shown.iterrows()]

@@ -19,15 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import chunks
+from gne_mj.batch_variables import declared_figures
 from gne_mj.batches.integrity import AGAIN, broken, kept_of_runs, lost_chunks, read_statuses
 from gne_mj.batches.plan import FORMAT, Combination, Plan
-from gne_mj.batches.summary import Variables, columns_of, join, kept, span_of, times
+from gne_mj.batches.summary import columns_of, join, kept, span_of, times
 from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.files import storing, written
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import Outcome
 from gne_mj.loops.recorder import Recorder
-from gne_mj.trajectory import coordinates_of
+from gne_mj.variables import Labelled, check_names, coordinates_of, declared
 
 if TYPE_CHECKING:
     import xarray
@@ -163,7 +164,7 @@ class Store:
         first = self.statuses()[:: self.plan.chunk]
         return np.flatnonzero(first == "").tolist()
 
-    def write(self, chunk: int, variables: Variables) -> None:
+    def write(self, chunk: int, variables: Labelled) -> None:
         """Add a chunk; its runs are there when this returns, and otherwise not.
 
         Raises:
@@ -305,14 +306,14 @@ def _attributes(plan: Plan, first: Combination) -> dict[str, Any]:
     }
 
 
-def _schema(plan: Plan) -> tuple[Combination, Variables]:
+def _schema(plan: Plan) -> tuple[Combination, Labelled]:
     """A combination that can run, and the variables that the combinations have, of one run each.
 
     Raises:
         InvalidInput: they differ in agents or constraints, which one dataset cannot hold.
     """
     first: Combination | None = None
-    known: dict[Any, Variables] = {}
+    known: dict[Any, Labelled] = {}
     for number in range(plan.combinations):
         combination = plan.combination(number)
         system = combination.system
@@ -321,11 +322,10 @@ def _schema(plan: Plan) -> tuple[Combination, Variables]:
         if first is None:
             first = combination
         _check_layout(first, combination)
-        kind = (
-            system.law.information, bool(system.faults), system.schedule is None, system.mode,
-            system.agents.kind, tuple(each.name for each in system.game.quantities),
-            len(system.memory), bool(np.any(system.game.margins)),
-        )  # fmt: skip
+        rows = [each for each in declared(system) if each.batch] if plan.record else []
+        shown = [*declared_figures(system), *rows]
+        check_names(system, shown, ("run", "start", "seed", *plan.labels()))
+        kind = (len(system.loop_memory), *((each.name, each.dims(system)) for each in shown))
         if kind not in known:
             known[kind] = _one_run(combination, plan.record)
     if first is None:
@@ -361,7 +361,7 @@ def _check_layout(first: Combination, other: Combination) -> None:
             )
 
 
-def _one_run(combination: Combination, record: int) -> Variables:
+def _one_run(combination: Combination, record: int) -> Labelled:
     """What one run of a combination would have, nothing of it being a number."""
     system, span = combination.system, span_of(combination)
     assert system is not None

@@ -1,13 +1,14 @@
 """The figure of a batch: margins, settling times and errors over the swept values."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.batch_variables import figures
 from gne_mj.plots.style import STYLE, line_style
+from gne_mj.variables import Panel
 from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
@@ -16,23 +17,6 @@ if TYPE_CHECKING:
 
 LINES = 5  # combinations of the other swept values that get a line each
 _RED = "#B00020"
-
-
-@dataclass(frozen=True)
-class _Figure:
-    """One of the run's figures: how it is called, drawn and made worst of."""
-
-    name: str
-    title: str
-    log: bool
-    worst: str  # "min" or "max" of the runs
-
-
-_PANELS = (
-    _Figure("least_margin", "worst margin", True, "min"),
-    _Figure("settling_time", "settling time", False, "max"),
-    _Figure("final_error", "final error", True, "max"),
-)
 
 
 def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
@@ -57,21 +41,22 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
     key = _horizontal(runs)
     lines = _groups(runs, key)
     early = ~np.isin(runs["status"].to_numpy(), SUCCESSES)
-    panels = len(_PANELS) + bool(early.any())
+    shown = [(each.name, each.panel) for each in figures() if each.panel and each.name in runs]
+    panels = len(shown) + bool(early.any())
     with plt.rc_context(STYLE):
         figure, grid = plt.subplots(
             1, panels, figsize=(2.9 * panels, 2.9), layout="constrained", squeeze=False,
             sharex=key is not None,
         )  # fmt: skip
-        for axes, panel in zip(grid[0], _PANELS, strict=False):
-            unit = runs[panel.name].attrs.get("units", "")
+        for axes, (name, panel) in zip(grid[0], shown, strict=False):
+            unit, values = runs[name].attrs.get("units", ""), runs[name].to_numpy()
             label = f"{panel.title} ({unit})" if unit else panel.title
             if key is not None:
-                _over(axes, runs, key, panel, lines)
+                _over(axes, runs[key].to_numpy(), values, panel, lines)
             elif len(lines) > 1:
-                _beside(axes, runs[panel.name].to_numpy(), panel, lines)
+                _beside(axes, values, panel, lines)
             else:
-                _histogram(axes, runs[panel.name].to_numpy(), label)
+                _histogram(axes, values, label)
                 continue
             axes.set_ylabel(label)
         if early.any():
@@ -132,7 +117,7 @@ def _word(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _spread(values: NDArray[np.float64], panel: _Figure) -> tuple[float, float, float, float]:
+def _spread(values: NDArray[np.float64], panel: Panel) -> tuple[float, float, float, float]:
     """5%, 50% and 95% of the runs, and the worst; not a number where a run has no figure."""
     if len(values) == 0:
         return np.nan, np.nan, np.nan, np.nan
@@ -146,12 +131,11 @@ def _spread(values: NDArray[np.float64], panel: _Figure) -> tuple[float, float, 
 
 def _over(
     axes: "Axes",
-    runs: "xarray.Dataset",
-    key: str,
-    panel: _Figure,
+    swept: NDArray[Any],
+    values: NDArray[np.float64],
+    panel: Panel,
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
-    swept, values = runs[key].to_numpy(), runs[panel.name].to_numpy()
     for number, (label, mine) in enumerate(lines):
         xs = np.unique(swept[mine])
         table = np.array([_spread(values[mine & (swept == x)], panel) for x in xs])
@@ -172,7 +156,7 @@ def _top(low: Any, high: Any, values: NDArray[np.float64]) -> Any:
 def _beside(
     axes: "Axes",
     values: NDArray[np.float64],
-    panel: _Figure,
+    panel: Panel,
     lines: list[tuple[str, NDArray[np.bool_]]],
 ) -> None:
     """One bar for each combination, where there are words in place of numbers."""
@@ -193,7 +177,7 @@ def _name(axes: "Axes", lines: list[tuple[str, NDArray[np.bool_]]]) -> None:
     axes.set_xlim(-0.6, len(lines) - 0.4)
 
 
-def _scale(axes: "Axes", values: NDArray[np.float64], panel: _Figure) -> None:
+def _scale(axes: "Axes", values: NDArray[np.float64], panel: Panel) -> None:
     finite = values[np.isfinite(values)]
     if len(finite) == 0:
         axes.text(0.5, 0.5, "no run has one", ha="center", transform=axes.transAxes)

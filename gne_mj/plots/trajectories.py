@@ -25,8 +25,8 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     """All figures of a trajectory's systems, by name.
 
     For each system its actions, one panel for each of their axes, as ``robots-velocities``, and
-    each quantity that its game derives, with its bounds, as ``robots-gaps`` or, where it is one
-    number, ``channels-total-power``.
+    each other variable that figures draw (:class:`gne_mj.variables.Variable`), with its bounds, as
+    ``robots-gaps`` or, where it is one number, ``channels-total-power``.
     """
     import matplotlib
 
@@ -35,10 +35,12 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     with matplotlib.rc_context(STYLE):
         for name in trajectory.tree.children:
             data = trajectory[name]
-            figures[f"{name}-{_plural(data['action'].attrs['long_name'])}"] = _actions(data)
-            for quantity in json.loads(data.attrs["quantities"]):
-                title = quantity if data[quantity].ndim == 1 else _plural(quantity)
-                figures[f"{name}-{title.replace('_', '-')}"] = _quantity(data, quantity)
+            titles = {"action": data["action"].attrs["long_name"]}
+            others = json.loads(data.attrs["quantities"])
+            titles |= {drawn: drawn.replace("_", "-") for drawn in others}
+            for drawn, title in titles.items():
+                words = title if data[drawn].ndim == 1 else _plural(title)
+                figures[f"{name}-{words}"] = _drawn(data, drawn)
     return figures
 
 
@@ -109,44 +111,34 @@ def _legend(figure: "Figure", axes: "Axes", title: str | None) -> None:
         figure.legend(handles, labels, loc="outside right center", title=title, handlelength=2.4)
 
 
-def _actions(data: "xarray.Dataset") -> "Figure":
-    """Every agent's action, a panel for each axis."""
-    action = data["action"]
-    values = action.to_numpy()
-    if action.dims[1] == "agent":
-        panels = {"": (values, data["agent"].to_numpy())}
-    else:
-        axis, owner = data["axis"].to_numpy(), data["owner"].to_numpy()
-        panels = {
-            str(name): (values[:, axis == name], owner[axis == name])
-            for name in dict.fromkeys(axis.tolist())
-        }
-    figure, axes = _figure(data, len(panels), 4.6)
-    for panel, (name, (columns, owners)) in zip(axes, panels.items(), strict=True):
-        names = [str(number) for number in owners]
-        _lines(panel, data["time"].to_numpy(), columns, owners - 1, names)
-        symbol = f"y_{{i,{name}}}" if name else "y_i"
-        panel.set_ylabel(axis_label(action.attrs["long_name"], symbol, action.attrs["units"]))
-    _legend(figure, axes[0], data.attrs["agent_name"])
-    return figure
-
-
-def _quantity(data: "xarray.Dataset", name: str) -> "Figure":
-    """A derived quantity with its bounds."""
-    quantity = data[name]
-    values = quantity.to_numpy().reshape(len(quantity), -1)
-    single, of_agents = quantity.ndim == 1, "agent" in quantity.dims
-    names = [str(n) for n in data["agent" if of_agents else "constraint_name"].to_numpy()]
-    figure, (axes,) = _figure(data, 1, 4.6 if single or of_agents else 5.6)
-    numbers = np.arange(values.shape[1])
-    _lines(axes, data["time"].to_numpy(), values, numbers, [] if single else names)
-    labelled = False
-    for bound in (f"{name}_bound", f"{name}_lower_bound"):
-        if bound in data:
-            _bounds(axes, np.atleast_1d(data[bound].to_numpy()), "bound" if not labelled else None)
-            labelled = True
-    axes.set_ylabel(axis_label(*(quantity.attrs[key] for key in ("long_name", "symbol", "units"))))
-    _legend(figure, axes, data.attrs["agent_name"] if of_agents else None)
+def _drawn(data: "xarray.Dataset", name: str) -> "Figure":
+    """A variable with its bounds: a panel for each axis of actions, or one."""
+    variable = data[name]
+    single, of_actions = variable.ndim == 1, "action" in variable.dims
+    of_agents = of_actions or "agent" in variable.dims
+    values = variable.to_numpy().reshape(len(variable), -1)
+    axis = data["axis"].to_numpy() if of_actions else np.full(values.shape[1], "")
+    names = data["owner" if of_actions else "agent" if of_agents else "constraint_name"].to_numpy()
+    panels = list(dict.fromkeys(axis.tolist())) or [""]
+    figure, axes = _figure(data, len(panels), 4.6 if single or of_agents else 5.6)
+    for panel, along in zip(axes, panels, strict=True):
+        mine = axis == along
+        numbers = names[mine] - 1 if of_agents else np.arange(np.count_nonzero(mine))
+        labels = [] if single else [str(each) for each in names[mine]]
+        _lines(panel, data["time"].to_numpy(), values[:, mine], numbers, labels)
+        labelled = False
+        for bound in (f"{name}_bound", f"{name}_lower_bound"):
+            if bound in data:
+                each = data[bound].to_numpy().reshape(-1)[mine]
+                _bounds(panel, each, "bound" if not labelled else None)
+                labelled = True
+        # trajectories hold no symbol of the action
+        symbol = variable.attrs.get("symbol", "y_i" if name == "action" else "")
+        if along:
+            symbol = symbol.replace("_i", f"_{{i,{along}}}")
+        about = variable.attrs.get("long_name", name), symbol, variable.attrs.get("units", "")
+        panel.set_ylabel(axis_label(*about))
+    _legend(figure, axes[0], data.attrs["agent_name"] if of_agents else None)
     return figure
 
 

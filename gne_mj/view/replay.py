@@ -14,7 +14,7 @@ from gne_mj.scenario import load_scenario
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.pack import packed_small
 from gne_mj.view.scene import Scene
-from gne_mj.view.stage import Arrays, Stage
+from gne_mj.view.stage import Arrays, Stage, is_line
 
 if TYPE_CHECKING:
     import xarray
@@ -138,7 +138,7 @@ def _values(data: "xarray.Dataset", time: NDArray[np.float64]) -> dict[str, NDAr
 def cut(arrays: Arrays, name: str, gone: NDArray[np.bool_]) -> None:
     """No lines of a system at the samples (T,) after its end."""
     for key, array in arrays.items():
-        if key.startswith((f"{name}/action", f"{name}/quantity/")) and np.any(gone):
+        if is_line(name, key) and np.any(gone):
             arrays[key] = array.copy()
             arrays[key][gone] = np.nan
 

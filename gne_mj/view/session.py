@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 from meshcat import Visualizer
-from numpy.typing import NDArray
 
 from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System
-from gne_mj.trajectory import ESTIMATING, Trajectory, estimates_of
+from gne_mj.trajectory import Trajectory
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
 from gne_mj.view.pack import pack
@@ -351,7 +350,7 @@ class Session:
     def _frame(self) -> bytes:
         """The present instant."""
         simulation = self.simulation
-        values = {name: _now(run) for name, run in simulation.runs.items()}
+        values = {name: run.present() for name, run in simulation.runs.items()}
         rows = self._scene.arrays(values)
         states = {name: self._state(name) for name in simulation.runs}
         time = simulation.time
@@ -385,24 +384,6 @@ class Session:
             return outcome(self._ended.reports[name])
         run = self.simulation.runs[name]
         return status_now(run.system, run.loop.monitor)
-
-
-def _now(run: SystemRun) -> dict[str, NDArray[np.float64]]:
-    """The variables of one instant that a scene asks for, each with one row."""
-    system, present = run.system, run.loop.present()
-    game = system.game
-    y = present.state[None, :, system.agents.kind.OUTPUT]
-    values = {
-        "action": y,
-        "state": present.state[None],
-        "configuration": present.configuration[None],
-        "constraint": game.constraints(y),
-    }
-    for quantity in game.quantities:
-        values[quantity.name] = quantity.at(y, game.entries(quantity))
-    if system.law.information in ESTIMATING:
-        values["estimate"] = estimates_of(game, y, present.memory[None])
-    return values
 
 
 def _changed(run: SystemRun, scenario: Scenario, control: Control, value: float) -> System:

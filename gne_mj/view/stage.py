@@ -14,7 +14,7 @@ from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, System
-from gne_mj.trajectory import ESTIMATING
+from gne_mj.variables import Variable, declared
 from gne_mj.view.fleet import fleet_of
 
 Arrays = dict[str, NDArray[Any]]
@@ -57,12 +57,12 @@ class Stage:
                 "owner": (game.agent_of_action + 1).tolist(),
                 "axis": list(game.axis_of_action) if max(game.sizes) > 1 else [""] * game.actions,
             },
-            "quantities": [_quantity(game, quantity) for quantity in game.quantities],
+            "quantities": [_about(system, line) for line in self._shown("line")[1:]],
             "edges": self._edges,
             "edges_are": "measurements" if system.law.graph is None else "messages",
             "links": self._links,
             "message_period": self._message_period,
-            "estimates": self.has_estimates,
+            "estimates": bool(self._shown("estimates")),
             "anchors": [],
             "height": 0.0,
             "tints": [],
@@ -71,28 +71,32 @@ class Stage:
             about |= self.fleet.places
         return about
 
-    @property
-    def has_estimates(self) -> bool:
-        """Whether agents hold estimates of each other's actions."""
-        return self.system.law.information in ESTIMATING
+    def _shown(self, page: str) -> list[Variable]:
+        """The variables that the page has there; of lines the action is the first."""
+        return [variable for variable in self._variables if variable.page == page]
+
+    @cached_property
+    def _variables(self) -> list[Variable]:
+        return declared(self.system)
 
     def arrays(self, values: Values) -> Arrays:
         """What the page draws at the samples of a trajectory's variables, by array name.
 
         Args:
-            values: of leading dimension T: "action", "constraint", the game's quantities, and
-                "estimate" where agents have some.
+            values: of leading dimension T, of the variables that the page has; without some that
+                an older trajectory, or the present instant, does not know.
         """
         name, game = self.system.name, self.system.game
-        found: Arrays = {f"{name}/action": values["action"]}
-        for quantity in game.quantities:
-            rows = values[quantity.name]
-            found[f"{name}/quantity/{quantity.name}"] = rows.reshape(len(rows), -1)
+        found: Arrays = {}
+        for variable in self._shown("line"):
+            if variable.name in values:
+                rows = values[variable.name]
+                found[line_key(name, variable.name)] = rows.reshape(len(rows), -1)
         margin = -np.max(values["constraint"], axis=1)
         found[f"{name}/margin"] = margin.astype(np.float32)
         found[f"{name}/share"] = shares(game, values).astype(np.float32)
-        if self.has_estimates:
-            found[f"{name}/estimate"] = values["estimate"].astype(np.float32)
+        for variable in self._shown("estimates"):
+            found[f"{name}/{variable.name}"] = values[variable.name].astype(np.float32)
         return found
 
     def messages(self, first: int, last: int) -> Arrays:
@@ -172,22 +176,36 @@ def _range(game: Game, quantity: Quantity) -> tuple[NDArray[np.float64], ...]:
     return middle, np.where(up > 0, up, np.nan), np.where(down < 0, down, np.nan)
 
 
-def _quantity(game: Game, quantity: Quantity) -> dict[str, Any]:
-    entries = game.entries(quantity)
+def line_key(system: str, variable: str) -> str:
+    """The name of the array of a system's line."""
+    return f"{system}/{variable}" if variable == "action" else f"{system}/quantity/{variable}"
+
+
+def is_line(system: str, key: str) -> bool:
+    """Whether an array of this name is a line of this system."""
+    return key == line_key(system, "action") or key.startswith(line_key(system, ""))
+
+
+def _about(system: System, line: Variable) -> dict[str, Any]:
+    """What JSON tells the page of a line but the action."""
+    game, attributes, bounds = system.game, line.attributes(system), line.bounds(system)
     labels = {
         "agent": [str(i + 1) for i in range(game.agents)],
+        "action": [
+            f"{i + 1} {axis}"
+            for i, axis in zip(game.agent_of_action, game.axis_of_action, strict=True)
+        ],
         "constraint": list(game.constraint_names),
     }
-    bounds = quantity.bounds(entries)
     about: dict[str, Any] = {
-        "name": quantity.name,
-        "long_name": quantity.long_name,
-        "symbol": quantity.symbol,
-        "unit": quantity.unit,
-        "labels": labels.get(quantity.each, [""]),
+        "name": line.name,
+        "long_name": attributes.get("long_name", line.name),
+        "symbol": attributes.get("symbol", ""),
+        "unit": attributes.get("units", ""),
+        "labels": labels[line.dims(system)[1]] if len(line.dimensions) > 1 else [""],
     }
     for key in ("bound", "lower_bound"):
-        given = bounds.get(f"{quantity.name}_{key}")
+        given = bounds.get(f"{line.name}_{key}")
         about[key] = None
         if given is not None:
             about[key] = [float(b) if np.isfinite(b) else None for b in given.reshape(-1)]

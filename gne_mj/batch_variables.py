@@ -1,0 +1,284 @@
+"""What batches keep of each run: one figure, or one for each action or constraint.
+
+Most are what its monitor saw at every step; the others are what signals say that batches keep of
+them (``Variable.runs``).
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj import variables, verdicts
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.base import Samples
+from gne_mj.system import System
+from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed, input_unit
+
+if TYPE_CHECKING:
+    import pandas
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What sources of figures are given: runs of one system side by side.
+
+    Attributes:
+        system: what was run.
+        duration: how long the runs were meant to last, in s.
+        tolerance: of the status ``converged``.
+        time: (rows,) sample times in s.
+        samples: of shapes (runs, rows, ...).
+        monitors: (runs, :func:`gne_mj.loops.monitor.length`).
+    """
+
+    system: System
+    duration: float
+    tolerance: float
+    time: NDArray[np.float64]
+    samples: Samples
+    monitors: NDArray[np.float64]
+
+    def of(self, source: Callable[[Rows], Array]) -> Array:
+        """(runs, rows, ...) the values of a signal's source."""
+        return self.in_rows(source(self.flat))
+
+    def in_rows(self, values: Array) -> Array:
+        """Values of all samples (runs * rows, ...) as (runs, rows, ...)."""
+        return values.reshape(len(self.monitors), len(self.time), *values.shape[1:])
+
+    @cached_property
+    def flat(self) -> Rows:
+        """The samples of all runs one after the other."""
+        count = len(self.monitors)
+        flat = changed(self.samples, lambda c: c.reshape(count * len(self.time), *c.shape[2:]))
+        return Rows(self.system, np.tile(self.time, count), flat)
+
+    def thinned(self, rows: NDArray[np.int64]) -> "Runs":
+        """These rows only."""
+        return Runs(
+            self.system, self.duration, self.tolerance, self.time[rows],
+            changed(self.samples, lambda column: column[:, rows]), self.monitors,
+        )  # fmt: skip
+
+    @cached_property
+    def y(self) -> NDArray[np.float64]:
+        """(runs, rows, m) outputs."""
+        return self.samples.state[:, :, :, self.system.agents.kind.OUTPUT]
+
+    @cached_property
+    def equilibrium(self) -> NDArray[np.float64]:
+        """(m,) y*; not a number where it is not known."""
+        return variables.equilibrium_of(self.system)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float64]:
+        """(runs, rows) max |y - y*|."""
+        greatest: NDArray[np.float64] = np.max(np.abs(self.y - self.equilibrium), axis=2)
+        return greatest
+
+    @cached_property
+    def worst(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(runs, p) each constraint's greatest g, and when in s."""
+        return verdicts.worst_constraints(self.monitors, self.system.game.constraints_count)
+
+    @cached_property
+    def tightest(self) -> NDArray[np.int64]:
+        """(runs,) the constraint that was nearest to its bound, or farthest beyond."""
+        return np.argmax(self.worst[0], axis=1)
+
+    @cached_property
+    def inputs(self) -> verdicts.Inputs:
+        """What actuators had to deliver."""
+        game = self.system.game
+        return verdicts.inputs(self.monitors, game.constraints_count, game.actions)
+
+    def seen(self, entry: int) -> NDArray[np.float64]:
+        """(runs,) an entry of the monitors."""
+        return self.monitors[:, entry].copy()
+
+    @property
+    def observed(self) -> NDArray[np.bool_]:
+        """(runs,) whether anything was seen at all."""
+        return self.monitors[:, watch.STARTED] > 0
+
+    @property
+    def left(self) -> NDArray[np.bool_]:
+        """(runs,) whether a run ended early."""
+        return self.monitors[:, watch.EXIT] != watch.INSIDE
+
+    @property
+    def violated(self) -> NDArray[np.bool_]:
+        """(runs,) whether a run ended early at a constraint that is known."""
+        return self.left & (self.monitors[:, watch.EXIT] != watch.DIVERGED)
+
+
+def _where(condition: NDArray[np.bool_], values: Array) -> Array:
+    return np.where(condition, values, np.nan)
+
+
+def _in_each(values: Array, entry: NDArray[np.int64]) -> Array:
+    """(runs,) the entry (runs,) of each row."""
+    return values[np.arange(len(values)), entry]
+
+
+def _middle(values: "pandas.Series[float]") -> float:
+    """The median, of an even number of runs the lower one; a run that has none is beyond all."""
+    return float(np.quantile(values.fillna(np.inf), 0.5, method="inverted_cdf"))
+
+
+def _divides(system: System) -> bool:
+    return system.mode == "continuous" and system.integrator != "rosenbrock"
+
+
+def _agent_out(runs: Runs) -> Array:
+    agent = runs.monitors[:, watch.EXIT_AGENT]
+    return _where(runs.violated & (agent >= 0), 1 + agent)
+
+
+def _rise(runs: Runs) -> Array:
+    """Not a number without a y*, which V is about."""
+    rise = runs.seen(watch.STORAGE_RISE)
+    return rise if runs.system.known_equilibrium is not None else np.full_like(rise, np.nan)
+
+
+def _status(runs: Runs) -> Array:
+    tail = verdicts.tail_distance(runs.time, runs.distance, runs.duration)
+    return verdicts.status(runs.monitors, tail, runs.tolerance)
+
+
+def _of_monitor(name: str, entry: int, **about: Any) -> Variable:
+    return Variable(name, ("run",), lambda runs: runs.seen(entry), **about)
+
+
+def _is_implicit(system: System) -> bool:
+    return system.mode == "implicit"
+
+
+JUDGED = (
+    Variable("status", ("run",), _status, long_name="how the run ended"),
+    Variable(
+        "least_margin", ("run",),
+        lambda runs: _where(runs.observed, -_in_each(runs.worst[0], runs.tightest)),
+        long_name="least -g over constraints and integration steps",
+        panel=Panel("worst margin", log=True, worst="min"),
+        columns=(
+            Column("least_margin_min", "worst margin", lambda values: values.min()),
+            Column("least_margin_median", "", lambda values: values.median()),
+        ),
+    ),
+    Variable(
+        "least_margin_time", ("run",),
+        lambda runs: _where(runs.observed, _in_each(runs.worst[1], runs.tightest)), unit="s",
+    ),
+    Variable(
+        "least_margin_constraint", ("run",),
+        lambda runs: _where(runs.observed, 1.0 + runs.tightest), long_name="numbered from 1",
+    ),
+    Variable(
+        "margin", ("run", "constraint"), lambda runs: -runs.worst[0],
+        long_name="least -g of each constraint",
+    ),
+    Variable(
+        "settling_time", ("run",), lambda runs: verdicts.settling_time(runs.time, runs.distance),
+        unit="s", long_name="until max |y - y*| stays within 2% of its start",
+        panel=Panel("settling time", log=False, worst="max"),
+        columns=(  # a run that never settled took longer than any that did
+            Column("settling_time_median", "settling (s)", _middle),
+            Column("settling_time_max", "", lambda values: values.fillna(np.inf).max()),
+            Column("not_settled", "not settled", lambda values: int(values.isna().sum())),
+        ),
+    ),
+    Variable(
+        "final_error", ("run",), lambda runs: runs.distance[:, -1],
+        unit=lambda system: system.game.action_unit, long_name="max |y - y*| at the end",
+        panel=Panel("final error", log=True, worst="max"),
+        columns=(  # one that left has no end
+            Column("final_error_median", "", _middle),
+            Column("final_error_max", "final error", lambda values: values.max()),
+        ),
+    ),
+    Variable(
+        "end_time", ("run",), lambda runs: _where(~runs.left, runs.seen(watch.TIME)), unit="s"
+    ),
+    Variable(
+        "exit_time", ("run",), lambda runs: _where(runs.left, runs.seen(watch.EXIT_TIME)),
+        unit="s",
+    ),
+    Variable(
+        "exit_constraint", ("run",),
+        lambda runs: _where(runs.violated, 1.0 + runs.seen(watch.EXIT_CONSTRAINT)),
+        long_name="which was violated, numbered from 1",
+    ),
+    Variable("exit_agent", ("run",), _agent_out, long_name="whose estimates left"),
+    Variable(
+        "exit_value", ("run",), lambda runs: _where(runs.left, runs.seen(watch.EXIT_VALUE))
+    ),
+    Variable(
+        "exit_at_instant", ("run",),
+        lambda runs: _where(runs.left, 1.0 - runs.seen(watch.EXIT_BETWEEN)),
+        long_name="1: seen at a control instant, 0: between two",
+    ),
+    Variable(
+        "peak_input", ("run",), lambda runs: np.max(runs.inputs.peak, axis=1), unit=input_unit,
+        columns=(Column("peak_input_max", "", lambda values: values.max()),),
+    ),
+    Variable(
+        "peak_input_time", ("run",),
+        lambda runs: _in_each(runs.inputs.peak_time, np.argmax(runs.inputs.peak, axis=1)),
+        unit="s",
+    ),
+    Variable("rms_input", ("run", AXIS), lambda runs: runs.inputs.rms, unit=input_unit),
+    Variable(
+        "energy", ("run", AXIS), lambda runs: runs.inputs.energy, long_name="integral of u y"
+    ),
+    Variable(
+        "saturated_time", ("run",),
+        lambda runs: _where(
+            runs.seen(watch.SATURATED) > 0, runs.seen(watch.SATURATED_TIME)
+        ),
+        unit="s", long_name="when an input limit was first met",
+    ),
+    Variable(
+        "lyapunov_rise", ("run",), _rise, long_name="largest rise of V from one step to the next"
+    ),
+    _of_monitor("steps", watch.STEPS),
+)  # fmt: skip
+OF_MODES = (
+    _of_monitor(
+        "divided_steps", watch.DIVIDED, there=_divides,
+        long_name="integration steps divided near the boundary",
+    ),
+    Variable(
+        "smallest_step", ("run",),
+        lambda runs: _where(
+            runs.seen(watch.SMALLEST_STEP) > 0, runs.seen(watch.SMALLEST_STEP)
+        ),
+        there=_divides, unit="s", long_name="shortest piece of a divided step",
+    ),
+    _of_monitor("solutions", watch.SOLUTIONS, there=_is_implicit),
+    _of_monitor("newton_steps", watch.SOLVER_STEPS, there=_is_implicit),
+    _of_monitor("not_accurate", watch.UNSOLVED, there=_is_implicit),
+    _of_monitor("prediction_error", watch.PREDICTION, there=_is_implicit),
+    _of_monitor("periods_not_monotone", watch.NOT_MONOTONE, there=_is_implicit),
+)  # fmt: skip
+
+
+def figures() -> list[Variable]:
+    """All figures that runs may have, in the order of a batch's dataset."""
+    return _with_figures_of(each for each in variables.SIGNALS if isinstance(each, Variable))
+
+
+def declared_figures(system: System) -> list[Variable]:
+    """The figures that a system's runs have."""
+    found = _with_figures_of(variables.declared(system))
+    return [figure for figure in found if figure.there(system)]
+
+
+def _with_figures_of(signals: Iterable[Variable]) -> list[Variable]:
+    return [*JUDGED, *(figure for signal in signals for figure in signal.runs), *OF_MODES]

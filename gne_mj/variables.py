@@ -1,0 +1,371 @@
+"""What a run shows, each signal declared once.
+
+Trajectories, rows and summaries of batches, the live page, replays and figures all walk
+``SIGNALS``: to add a signal is to add its :class:`Variable` there (docs/developers.md).
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
+from gne_mj.loops.base import Samples
+from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.quantity import Quantity
+from gne_mj.system import System
+
+if TYPE_CHECKING:
+    import pandas
+
+Array = NDArray[Any]
+# name -> (dimensions, values, attributes), as xarray takes them
+Labelled = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
+Text = str | Callable[[System], str]
+
+AXIS = "agent or action"  # in place of the dimension of actions, see axis_of
+
+
+class Panel(NamedTuple):
+    """A panel of a batch's figure."""
+
+    title: str
+    log: bool  # the axis, where values look spaced in proportion
+    worst: Literal["min", "max"]  # of the runs
+
+
+class Column(NamedTuple):
+    """A column of a batch's table of combinations."""
+
+    name: str
+    title: str  # in the table on the terminal; empty if it is not there
+    of: Callable[["pandas.Series[float]"], float]  # of the runs' values; infinite if there is none
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """One signal of a run, or one figure that batches keep of each run.
+
+    Args:
+        name: in datasets, packs and tables.
+        dimensions: "time" first if it is sampled, "run" first if it is a figure of runs; AXIS
+            stands for one entry for each action.
+        source: the values, from :class:`Rows` or, of a figure, from
+            :class:`gne_mj.batch_variables.Runs`; their shape is that of the dimensions.
+        there: whether a system has it.
+        unit, long_name: for every reader; None writes no such attribute, "" an empty one.
+        symbol: its formula in TeX, likewise.
+        bounds: arrays by the variables' names NAME_bound and NAME_lower_bound, without the time.
+        instant: whether state and memory say it, so that a live page has it at any moment; of
+            others it has what was recorded last.
+        figure: whether figures of a trajectory draw it.
+        page: where the page has it: a "line" of a plot; "estimates", drawn over agents; "behind"
+            it, for places of bodies and margins; nowhere.
+        batch: whether batches that record rows have it in them.
+        runs: figures that batches keep of it.
+        panel: of a figure of runs, its panel in a batch's figure.
+        columns: of a figure of runs, what the table of combinations has of it.
+    """
+
+    name: str
+    dimensions: tuple[str, ...]
+    source: Callable[[Any], Array]
+    there: Callable[[System], bool] = lambda system: True
+    unit: Text | None = None
+    long_name: Text | None = None
+    symbol: str | None = None
+    bounds: Callable[[System], Mapping[str, Array]] = lambda system: {}
+    instant: bool = True
+    figure: bool = False
+    page: Literal["", "line", "estimates", "behind"] = ""
+    batch: bool = True
+    runs: tuple["Variable", ...] = ()
+    panel: Panel | None = None
+    columns: tuple[Column, ...] = ()
+
+    def dims(self, system: System) -> tuple[str, ...]:
+        """The dimensions in a system's dataset."""
+        return tuple(axis_of(system) if d == AXIS else d for d in self.dimensions)
+
+    def attributes(self, system: System) -> dict[str, str]:
+        """Units, long_name and symbol, those there are."""
+        given = {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+        return {
+            key: text(system) if callable(text) else text
+            for key, text in given.items()
+            if text is not None
+        }
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What sources are given: samples of one system.
+
+    Attributes:
+        system: with the numbers that it had.
+        time: (samples,) in s.
+        samples: at these times.
+    """
+
+    system: System
+    time: NDArray[np.float64]
+    samples: Samples
+
+    @cached_property
+    def y(self) -> NDArray[np.float64]:
+        """(samples, m) outputs, which are the actions."""
+        return self.samples.state[:, :, self.system.agents.kind.OUTPUT]
+
+
+def changed(samples: Samples, change: Callable[[Array], Array]) -> Samples:
+    """The same of every column."""
+    return Samples(*(change(getattr(samples, each.name)) for each in fields(Samples)))
+
+
+def axis_of(system: System) -> str:
+    """The dimension of actions: agents, where each has one."""
+    return "agent" if system.game.actions == system.game.agents else "action"
+
+
+def estimates_of(
+    game: Game, y: NDArray[np.float64], memory: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(samples, N, m) what agents take the actions to be, of actions (samples, m) and memories."""
+    m, owner = game.actions, game.agent_of_action
+    estimates = memory[:, : game.agents * m].reshape(len(y), game.agents, m).copy()
+    estimates[:, owner, np.arange(m)] = y  # an agent's own block is its action, not an estimate
+    return estimates
+
+
+def declared(system: System) -> list[Variable]:
+    """The variables that a system has, in the order of its dataset."""
+    found: list[Variable] = []
+    for signal in SIGNALS:
+        found += [signal] if isinstance(signal, Variable) else signal(system)
+    return [variable for variable in found if variable.there(system)]
+
+
+def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
+    """The coordinates that go with a system's variables, at times (samples,) in s."""
+    game = system.game
+    coordinates: dict[str, Any] = {
+        "time": ("time", time, {"units": "s"}),
+        "agent": ("agent", np.arange(1, game.agents + 1)),
+        "constraint_name": ("constraint", np.array(game.constraint_names)),
+        "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
+    }
+    if axis_of(system) == "action":
+        coordinates["owner"] = ("action", game.agent_of_action + 1)
+        coordinates["axis"] = ("action", np.array(game.axis_of_action))
+    return coordinates
+
+
+def check_names(system: System, variables: Iterable[Variable], others: Iterable[str] = ()) -> None:
+    """Refuse a game or agent type of which a variable has the name of another one.
+
+    Args:
+        system: whose.
+        variables: which are to be in one dataset.
+        others: names that are taken besides those of coordinates.
+
+    Raises:
+        InvalidInput: names the first such variable.
+    """
+    taken = {*coordinates_of(system, np.zeros(0)), *others}
+    for variable in variables:
+        for name in (variable.name, *variable.bounds(system)):
+            if name in taken:
+                raise InvalidInput(
+                    f"systems.{system.name}", name, "results have something else of that name;"
+                    " give the game's quantity, or the agents' state, another one",
+                )  # fmt: skip
+            taken.add(name)
+
+
+def variables_of(system: System, time: NDArray[np.float64], samples: Samples) -> Labelled:
+    """What is kept of a run's samples: (dimensions, values, attributes) by name.
+
+    Args:
+        system: what was run.
+        time: (samples,) in s.
+        samples: at these times.
+    """
+    return labelled(declared(system), Rows(system, time, samples))
+
+
+def labelled(variables: list[Variable], rows: Rows) -> Labelled:
+    """These variables and their bounds."""
+    system, found = rows.system, {}
+    for variable in variables:
+        dimensions, attributes = variable.dims(system), variable.attributes(system)
+        found[variable.name] = (dimensions, variable.source(rows), attributes)
+        units = {key: text for key, text in attributes.items() if key == "units"}
+        for name, bound in variable.bounds(system).items():
+            found[name] = (tuple(d for d in dimensions if d != "time"), bound, units)
+    return found
+
+
+# ------------------------------------------------------------------------------- the signals
+
+
+def _action_unit(system: System) -> str:
+    return system.game.action_unit
+
+
+def input_unit(system: System) -> str:
+    """The unit of inputs; the action's per second where the agent type names none."""
+    return system.agents.kind.INPUT_UNIT or f"{system.game.action_unit or 1}/s"
+
+
+def _state_units(system: System) -> str:
+    return ", ".join(unit or system.game.action_unit for _, unit in system.agents.kind.STATES)
+
+
+def equilibrium_of(system: System) -> NDArray[np.float64]:
+    """(m,) y*; not a number where it is not known."""
+    known = system.known_equilibrium
+    return np.full(system.game.actions, np.nan) if known is None else known.action
+
+
+def _states(system: System) -> Iterator[Variable]:
+    """The agents' states but the output, each by its name."""
+    kind = system.agents.kind
+    states = (_state(index, *state) for index, state in enumerate(kind.STATES))
+    return (state for index, state in enumerate(states) if index != kind.OUTPUT)
+
+
+def _state(index: int, name: str, unit: str) -> Variable:
+    return Variable(
+        name,
+        ("time", AXIS),
+        lambda rows: rows.samples.state[:, :, index],
+        unit=unit or _action_unit,
+    )
+
+
+def _quantities(system: System) -> Iterator[Variable]:
+    """What the game derives from its actions, with the bounds that it states."""
+    return (
+        _quantity(system.game.entries(quantity), quantity) for quantity in system.game.quantities
+    )
+
+
+def _quantity(entries: tuple[int, ...], quantity: Quantity) -> Variable:
+    return Variable(
+        quantity.name,
+        ("time", *((quantity.each,) if quantity.each else ())),
+        lambda rows: quantity.at(rows.y, entries),
+        unit=quantity.unit,
+        long_name=quantity.long_name,
+        symbol=quantity.symbol,
+        bounds=lambda system: quantity.bounds(entries),
+        figure=True,
+        page="line",
+    )
+
+
+def _holds_estimates(system: System) -> bool:
+    return system.law.information in ("partial", "distributed")
+
+
+def _filtered(rows: Rows) -> Array:
+    game = rows.system.game
+    return rows.samples.memory[:, game.agents * game.actions : (game.agents + 1) * game.actions]
+
+
+def _penalty(rows: Rows) -> Array:
+    assert rows.system.schedule is not None
+    return rows.system.schedule.at(rows.time)
+
+
+def _is_faulty(system: System) -> bool:
+    return bool(system.faults)
+
+
+# In the order of a dataset; a function yields what games and agent types declare of themselves
+SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
+    Variable(
+        "action", ("time", AXIS), lambda rows: rows.y,
+        unit=_action_unit, long_name=lambda system: system.game.action_name,
+        figure=True, page="line",
+        runs=(
+            Variable(
+                "initial_action", ("run", AXIS), lambda runs: runs.y[:, 0].copy(),
+                unit=_action_unit,
+            ),
+            Variable(
+                "final_action", ("run", AXIS), lambda runs: runs.y[:, -1].copy(),
+                unit=_action_unit,
+            ),
+        ),
+    ),
+    Variable(
+        "input", ("time", AXIS), lambda rows: rows.samples.input,
+        unit=input_unit, long_name="delivered input u", instant=False,
+    ),
+    Variable(
+        "state", ("time", AXIS, "component"), lambda rows: rows.samples.state,
+        unit=_state_units, page="behind", batch=False,  # whose rows have its components
+    ),
+    Variable(
+        "constraint", ("time", "constraint"), lambda rows: rows.system.game.constraints(rows.y),
+        long_name="g(y), negative inside the set", page="behind",
+    ),
+    Variable(
+        "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
+        unit=_action_unit, long_name="y*", batch=False,
+        runs=(
+            Variable(
+                "equilibrium", ("run", AXIS),
+                lambda runs: np.tile(runs.equilibrium, (len(runs.monitors), 1)),
+                unit=_action_unit, long_name="y*",
+            ),
+        ),
+    ),
+    _states,
+    _quantities,
+    Variable(
+        "memory", ("time", "memory_entry"), lambda rows: rows.samples.memory,
+        there=lambda system: system.law.information == "custom" and len(system.loop_memory) > 0,
+        long_name="the law's memory",
+    ),
+    Variable(
+        "estimate", ("time", "estimating_agent", AXIS),
+        lambda rows: estimates_of(rows.system.game, rows.y, rows.samples.memory),
+        there=_holds_estimates,
+        unit=_action_unit, long_name="what each agent takes the actions to be", page="estimates",
+    ),
+    Variable(
+        "filtered_action", ("time", AXIS), _filtered,
+        there=lambda system: system.law.information == "distributed",
+        unit=_action_unit, long_name="z",
+    ),
+    Variable(
+        "measurement", ("time", AXIS), lambda rows: rows.samples.seen, there=_is_faulty,
+        unit=_action_unit, long_name="outputs as the law read them for the input of that time",
+        instant=False,
+    ),
+    Variable(
+        "acting_input", ("time", AXIS), lambda rows: rows.samples.acts, there=_is_faulty,
+        unit=input_unit, long_name="input with the faults' pushes, as it moved the plant",
+        instant=False,
+    ),
+    Variable(
+        "configuration", ("time", "coordinate"), lambda rows: rows.samples.configuration,
+        there=lambda system: isinstance(system.agents, MjcfRobots),
+        long_name="all joints' positions, MuJoCo's qpos", page="behind", batch=False,
+    ),
+    Variable(
+        "penalty", ("time",), _penalty, there=lambda system: system.schedule is not None,
+        unit="", long_name="penalty rho",
+    ),
+    Variable(
+        "tightening", ("constraint",), lambda rows: rows.system.game.margins,
+        there=lambda system: bool(np.any(system.game.margins)),
+        long_name="t: the barrier guards g + t < 0",
+    ),
+)  # fmt: skip
