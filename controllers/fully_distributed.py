@@ -22,7 +22,13 @@ from gne_mj.controllers.estimates import (
     move_estimates,
     prepare,
 )
-from gne_mj.controllers.law import Law, check_positive, initial_estimates
+from gne_mj.controllers.law import (
+    ESTIMATES,
+    Law,
+    MemoryPart,
+    check_positive,
+    initial_estimates,
+)
 from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
@@ -46,7 +52,10 @@ class FullyDistributed(Law):
         strong=True,
         singular_perturbation=True,
     )
-    has_estimates: ClassVar[bool] = True
+    memory_parts: ClassVar[tuple[MemoryPart, ...]] = (
+        ESTIMATES,
+        MemoryPart("filtered_action", "z"),
+    )
     alone: ClassVar[bool] = True
     rosenbrock: ClassVar[bool] = True
     graph: Graph = field()  # these two hide the base class's defaults

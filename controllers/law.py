@@ -28,7 +28,7 @@ out)``                                                agents in J_i only; its sy
 
 from abc import ABC, abstractmethod
 from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,23 @@ from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph, GraphData
 
 _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
+
+
+class MemoryPart(NamedTuple):
+    """Some entries of a law's memory, as trajectories show them.
+
+    Attributes:
+        name, long_name: of the variable.
+        rows: whether it is a row of all actions for each agent, (N, m): what each takes them to
+            be, its own entries being no matter; else one row, (m,).
+    """
+
+    name: str
+    long_name: str
+    rows: bool = False
+
+
+ESTIMATES = MemoryPart("estimate", "what each agent takes the actions to be", rows=True)
 
 
 class Law(ABC):
@@ -55,7 +72,7 @@ class Law(ABC):
         coupling: c, the factor of the Laplacian of all profiles in the input; 0 without.
         time_constant: tau of the estimates in s, where the input has a Laplacian.
         epsilon: time constant of fast estimates in s; None without.
-        has_estimates: whether its memory begins with each agent's row of estimates, (N, m).
+        memory_parts: what its memory begins with, one part after the other.
         alone: in mode implicit, whether each agent solves alone because its barrier is at what it
             takes for the profile. Others may (``decentralised``), or solve all together.
         rosenbrock: whether integrator rosenbrock knows its Jacobian.
@@ -72,7 +89,7 @@ class Law(ABC):
     coupling: float = 0.0
     time_constant: float = 1.0
     epsilon: float | None = None
-    has_estimates: ClassVar[bool] = False
+    memory_parts: ClassVar[tuple[MemoryPart, ...]] = ()
     alone: ClassVar[bool] = False
     rosenbrock: ClassVar[bool] = False
     propagates: bool = True
@@ -83,6 +100,11 @@ class Law(ABC):
         """What is proven of this very law; None if nothing is."""
         found: LawTheorem | None = vars(type(self)).get("proven")
         return found
+
+    @property
+    def has_estimates(self) -> bool:
+        """Whether agents hold estimates of each other's actions."""
+        return any(part.rows for part in self.memory_parts)
 
     @property
     def implicit(self) -> bool:

@@ -26,7 +26,13 @@ from gne_mj.controllers.estimates import (
     move_estimates,
     prepare,
 )
-from gne_mj.controllers.law import Law, check_positive, initial_estimates
+from gne_mj.controllers.law import (
+    ESTIMATES,
+    Law,
+    MemoryPart,
+    check_positive,
+    initial_estimates,
+)
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.graph import Graph
@@ -49,7 +55,7 @@ class PartialInformation(Law):
         strong=True,
         at_estimates=True,
     )
-    has_estimates: ClassVar[bool] = True
+    memory_parts: ClassVar[tuple[MemoryPart, ...]] = (ESTIMATES,)
     guarded: ClassVar[bool] = True
     graph: Graph = field()  # hides the base class's default
     coupling: float = 1.0

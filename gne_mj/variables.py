@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.loops.base import Samples
@@ -268,13 +269,33 @@ def _quantity(entries: tuple[int, ...], quantity: Quantity) -> Variable:
     )
 
 
-def _holds_estimates(system: System) -> bool:
-    return system.law.information in ("partial", "distributed")
+def _memory(system: System) -> Iterator[Variable]:
+    """What the law says that its memory holds; all of it where it says nothing."""
+    game, at = system.game, 0
+    for part in system.law.memory_parts:
+        size = game.actions * (game.agents if part.rows else 1)
+        yield _estimates(part, at) if part.rows else _row(part, slice(at, at + size))
+        at += size
+    if not at and len(system.loop_memory):
+        yield Variable(
+            "memory", ("time", "memory_entry"), lambda rows: rows.samples.memory,
+            long_name="the law's memory",
+        )  # fmt: skip
 
 
-def _filtered(rows: Rows) -> Array:
-    game = rows.system.game
-    return rows.samples.memory[:, game.agents * game.actions : (game.agents + 1) * game.actions]
+def _estimates(part: MemoryPart, at: int) -> Variable:
+    return Variable(
+        part.name, ("time", "estimating_agent", AXIS),
+        lambda rows: estimates_of(rows.system.game, rows.y, rows.samples.memory[:, at:]),
+        unit=_action_unit, long_name=part.long_name, page="estimates",
+    )  # fmt: skip
+
+
+def _row(part: MemoryPart, entries: slice) -> Variable:
+    return Variable(
+        part.name, ("time", AXIS), lambda rows: rows.samples.memory[:, entries],
+        unit=_action_unit, long_name=part.long_name,
+    )  # fmt: skip
 
 
 def _penalty(rows: Rows) -> Array:
@@ -286,7 +307,7 @@ def _is_faulty(system: System) -> bool:
     return bool(system.faults)
 
 
-# In the order of a dataset; a function yields what games and agent types declare of themselves
+# In the order of a dataset; a function yields what game, agent type or law declare of themselves
 SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     Variable(
         "action", ("time", AXIS), lambda rows: rows.y,
@@ -328,22 +349,7 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     ),
     _states,
     _quantities,
-    Variable(
-        "memory", ("time", "memory_entry"), lambda rows: rows.samples.memory,
-        there=lambda system: system.law.information == "custom" and len(system.loop_memory) > 0,
-        long_name="the law's memory",
-    ),
-    Variable(
-        "estimate", ("time", "estimating_agent", AXIS),
-        lambda rows: estimates_of(rows.system.game, rows.y, rows.samples.memory),
-        there=_holds_estimates,
-        unit=_action_unit, long_name="what each agent takes the actions to be", page="estimates",
-    ),
-    Variable(
-        "filtered_action", ("time", AXIS), _filtered,
-        there=lambda system: system.law.information == "distributed",
-        unit=_action_unit, long_name="z",
-    ),
+    _memory,
     Variable(
         "measurement", ("time", AXIS), lambda rows: rows.samples.seen, there=_is_faulty,
         unit=_action_unit, long_name="outputs as the law read them for the input of that time",
