@@ -301,7 +301,7 @@ def test_the_file_has_all_inside_and_asks_for_nothing(tmp_path):
     assert "&lt;b&gt;&amp; co&lt;/b&gt;" in text
     assert "connect-src" not in text.split("</head>")[0]  # so that default-src 'none' holds for it
     assert "default-src 'none'" in text
-    assert ' src="' not in text.replace(page_file("vendor/meshcat.min.js").decode(), "")
+    assert ' src="' not in text.replace(page_file("meshcat.min.js").decode(), "")
     assert re.findall("<link [^>]*>", text) == ['<link rel="icon" href="data:,">']
     for licence in ("Robin Deits", "Leon Sorokin"):
         assert licence in text
