@@ -107,6 +107,15 @@ def test_replayed_robots_are_where_the_trajectory_has_them(page, recorded, serve
     quiet(recorded, *origins(served))
 
 
+def test_the_page_defines_one_name(page, served):
+    names = "Object.getOwnPropertyNames(window)"
+    page.goto(served.url + "uPlot-LICENSE.txt")  # of the same origin, without scripts
+    page.add_script_tag(url="meshcat.min.js")
+    before = set(page.evaluate(names))
+    opened(page, served.url)
+    assert set(page.evaluate(names)) - before == {"gne"}
+
+
 def test_the_slider_drives_scene_and_plots(page, served, paper):
     opened(page, served.url)
     page.locator("#time-slider").evaluate(

@@ -308,6 +308,18 @@ def test_the_file_has_all_inside_and_asks_for_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_the_page_is_one_script_and_one_style_besides_meshcat():
+    page = page_file("index.html").decode()
+    assert re.findall('<script[^>]* src="([^"]*)"', page) == ["meshcat.min.js", "page.js"]
+    assert re.findall('<link rel="stylesheet" href="([^"]*)"', page) == ["page.css"]
+    assert not re.search(r"@import|url\(", page_file("page.css").decode())
+    script = page_file("page.js").decode()
+    inside = re.fullmatch(r'//.*?\n"use strict";\n\(\(\) => \{\n(.*)\}\)\(\);\n', script, re.S)
+    assert inside
+    assert not re.search(r"^[^ \n]", inside[1], re.M)  # all of it is within that function
+    assert not re.search(r"\bimport\(", script)
+
+
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "run.html"
     path.write_text("old")

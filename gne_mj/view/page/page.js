@@ -1,3 +1,4 @@
+// Built by scripts/page from page/src
 "use strict";
 (() => {
   // src/dom.js
