@@ -320,6 +320,15 @@ def test_the_page_is_one_script_and_one_style_besides_meshcat():
     assert not re.search(r"\bimport\(", script)
 
 
+def test_every_element_that_scripts_look_for_is_in_the_page():
+    types = (Path(__file__).parents[1] / "page" / "src" / "types.d.ts").read_text()
+    elements = types.partition("export interface Elements {")[2].partition("}")[0]
+    looked_for = set(re.findall(r'^  "?([\w-]+)"?:', elements, re.M))
+    there = set(re.findall(r' id="([\w-]+)"', page_file("index.html").decode()))
+    assert looked_for - there == {"replay"}  # which only a file from disk has
+    assert len(looked_for) > 30
+
+
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "run.html"
     path.write_text("old")

@@ -62,10 +62,11 @@ export class Page {
 
   async startReplay() {
     try {
-      const file = this.mode === "file";
-      this.showReplay(
-        await (file ? unpack(fromBase64(byId("replay").textContent)) : fetchReplay()),
-      );
+      const pack =
+        this.mode === "file"
+          ? await unpack(fromBase64(byId("replay").textContent))
+          : await fetchReplay();
+      this.showReplay(pack);
     } catch (error) {
       warn(`The replay cannot be read: ${error.message}`);
     }

@@ -147,6 +147,6 @@ export class Toolbar {
    */
   showLegend(instant) {
     const shares = Object.values(instant?.systems ?? {}).map((own) => own.share ?? [NaN]);
-    byId("unknown").hidden = !shares.some((share) => [...share].some(Number.isNaN));
+    byId("unknown").hidden = !shares.some((share) => share.some((each) => Number.isNaN(each)));
   }
 }

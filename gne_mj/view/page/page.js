@@ -7136,7 +7136,7 @@
      */
     showLegend(instant) {
       const shares = Object.values(instant?.systems ?? {}).map((own) => own.share ?? [NaN]);
-      byId("unknown").hidden = !shares.some((share) => [...share].some(Number.isNaN));
+      byId("unknown").hidden = !shares.some((share) => share.some((each) => Number.isNaN(each)));
     }
   };
 
@@ -7558,10 +7558,8 @@
     // ---- where the data come from
     async startReplay() {
       try {
-        const file = this.mode === "file";
-        this.showReplay(
-          await (file ? unpack(fromBase64(byId("replay").textContent)) : fetchReplay())
-        );
+        const pack = this.mode === "file" ? await unpack(fromBase64(byId("replay").textContent)) : await fetchReplay();
+        this.showReplay(pack);
       } catch (error) {
         warn(`The replay cannot be read: ${error.message}`);
       }
