@@ -35,7 +35,7 @@ export class Camera {
   }
 
   followed() {
-    const { kind, system, agent } = this.follow;
+    const { kind, system, agent = 0 } = this.follow;
     if (kind === "agent") {
       const fleet = this.layout.fleets.find((each) => each.name === system);
       if (fleet) return toView(this.layout.agentAt(fleet, agent));

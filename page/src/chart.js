@@ -3,6 +3,8 @@ import uPlot from "uplot";
 import { colour } from "./theme.js";
 import { number, withUnit } from "./words.js";
 /** @import { Plot } from "./plot.js" */
+/** @import { Bound, Spec } from "./specs.js" */
+/** @import { Intervention } from "./types.d.ts" */
 
 export const MOST_CHIPS = 14; // lines, up to which each has a chip with its value
 const FONT = "12px system-ui, sans-serif";
@@ -40,7 +42,10 @@ export const optionsOf = (plot, width, height) => ({
   },
 });
 
-/** @returns {uPlot.Axis[]} */
+/**
+ * @returns {uPlot.Axis[]}
+ * @param {string} unit
+ */
 const axesOf = (unit) => {
   const axis = {
     stroke: colour("muted"),
@@ -70,7 +75,12 @@ const axesOf = (unit) => {
   ];
 };
 
-/** @returns {uPlot.Series} */
+/**
+ * @returns {uPlot.Series}
+ * @param {Plot} plot
+ * @param {string} label
+ * @param {number} k
+ */
 const seriesOf = (plot, label, k) => {
   const look = plot.lineOf(k);
   return {
@@ -83,7 +93,13 @@ const seriesOf = (plot, label, k) => {
   };
 };
 
-/** @returns {[number, number]} */
+/**
+ * @returns {[number, number]}
+ * @param {Bound[]} bounds
+ * @param {number} height of the plot, px
+ * @param {number | null} low
+ * @param {number | null} high
+ */
 const rangeY = (bounds, height, low, high) => {
   for (const { value } of bounds) {
     low = low === null ? value : Math.min(low, value);
@@ -96,6 +112,10 @@ const rangeY = (bounds, height, low, high) => {
   return [low - 0.07 * size, high + room * size * 1.2];
 };
 
+/**
+ * @param {uPlot} u
+ * @param {Plot} plot
+ */
 const drawMarks = (u, plot) => {
   const { ctx: context, bbox } = u;
   context.save();
@@ -107,6 +127,10 @@ const drawMarks = (u, plot) => {
   context.restore();
 };
 
+/**
+ * @param {uPlot} u
+ * @param {Intervention[]} interventions
+ */
 const drawInterventions = (u, interventions) => {
   const { ctx: context, bbox } = u;
   context.strokeStyle = colour("muted");
@@ -121,6 +145,10 @@ const drawInterventions = (u, interventions) => {
   }
 };
 
+/**
+ * @param {uPlot} u
+ * @param {Spec} spec
+ */
 const drawBounds = (u, { bounds, unit }) => {
   const { ctx: context, bbox } = u;
   const ratio = uPlot.pxRatio;

@@ -15,7 +15,10 @@ const RAMP = [
 const OUTSIDE = [0.86, 0.02, 0.16];
 const UNKNOWN = [0.55, 0.58, 0.62];
 
-/** Colour, three numbers from 0 to 1, of an agent that uses this share of its bound. */
+/**
+ * Colour, three numbers from 0 to 1, of an agent that uses this share of its bound.
+ * @param {number | null} share
+ */
 export const ramp = (share) => {
   if (share === null || Number.isNaN(share)) return UNKNOWN;
   if (share > 1) return OUTSIDE;
@@ -25,6 +28,7 @@ export const ramp = (share) => {
   return a.map((v, k) => v + ((b[k] - v) * (share - from)) / (to - from));
 };
 
+/** @param {number[]} rgb */
 export const css = (rgb) => `rgb(${rgb.map((v) => Math.round(255 * v)).join(", ")})`;
 
 export const rampGradient = () =>
@@ -37,7 +41,10 @@ const LINES = {
 };
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
 
-/** Colour and dash of the k-th line of a plot. */
+/**
+ * Colour and dash of the k-th line of a plot.
+ * @param {number} k
+ */
 export const line = (k) => {
   const colours = LINES[theme()];
   return {

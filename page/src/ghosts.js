@@ -4,7 +4,7 @@ import { THREE } from "./meshcat.js";
 import { colour } from "./theme.js";
 import { matrixIn } from "./viewer.js";
 /** @import { Scene } from "./scene.js" */
-/** @import { Agent, Instant } from "./types.d.ts" */
+/** @import { Agent, Instant, Numbers, System } from "./types.d.ts" */
 
 const EDGES = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5));
 const SECOND = 1;
@@ -48,6 +48,11 @@ export class Ghosts {
     else this.shadows(system, shown.agent, row, action);
   }
 
+  /**
+   * @param {System} system
+   * @param {number} holder who has the estimates
+   * @param {Numbers} row of estimates
+   */
   outlines(system, holder, row) {
     const bars = this.scene.layout.barsOf(system);
     system.action.owner.forEach((owner, k) => {
@@ -68,6 +73,12 @@ export class Ghosts {
     return lines;
   }
 
+  /**
+   * @param {System} system
+   * @param {number} holder
+   * @param {Numbers} row
+   * @param {Numbers} action
+   */
   shadows(system, holder, row, action) {
     for (let agent = 0; agent < system.agents; agent++) {
       if (agent === holder) continue;
@@ -87,6 +98,12 @@ export class Ghosts {
     }
   }
 
+  /**
+   * @param {System} system
+   * @param {number} agent
+   * @param {Numbers} row
+   * @param {Numbers} action
+   */
   ahead(system, agent, row, action) {
     const ahead = [0, 0, 0];
     system.action.owner.forEach((owner, k) => {

@@ -52,7 +52,11 @@ export const warn = (text) => {
   byId("waiting").hidden = true;
 };
 
-/** Tells a screen reader of changes of status; margins change too often for that. */
+/**
+ * Tells a screen reader of changes of status; margins change too often for that.
+ * @param {System[]} systems
+ * @param {Source} source
+ */
 const announce = (systems, source) => {
   const words = systems.map(
     (system) => `${system.name}: ${status(source.stateOf(system).status).words}`,

@@ -1,6 +1,6 @@
 // What came in live.
 import { orNull, partsOf } from "./instant.js";
-/** @import { Instant, Pack, System } from "./types.d.ts" */
+/** @import { Instant, Numbers, Pack, System } from "./types.d.ts" */
 
 /** Every second sample is dropped when there are many. */
 export class History {
@@ -49,6 +49,10 @@ export class History {
     this.thin();
   }
 
+  /**
+   * @param {string} name
+   * @param {Numbers | number[]} values
+   */
   notePeak(name, values) {
     let most = this.peaks[name] || 0;
     for (const value of values) if (Math.abs(value) > most) most = Math.abs(value);
@@ -72,6 +76,10 @@ export class History {
     if (this.time.length > this.most) this.thin();
   }
 
+  /**
+   * @param {string} name
+   * @param {Numbers | number[]} values
+   */
   append(name, values) {
     const columns = this.columns[name];
     for (let k = 0; k < Math.max(values.length, columns.length); k++) {

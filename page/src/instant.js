@@ -1,7 +1,10 @@
 // One simulated instant.
 /** @import { Instant, Pack, System } from "./types.d.ts" */
 
-/** Arrays of a system that an instant has, by their short names. */
+/**
+ * Arrays of a system that an instant has, by their short names.
+ * @param {System} system
+ */
 export const partsOf = (system) => [
   "action",
   ...system.quantities.map((quantity) => `quantity/${quantity.name}`),

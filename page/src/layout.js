@@ -41,7 +41,11 @@ export class Layout {
     if (this.box) this.noteSpill(this.box, instant.time);
   }
 
-  /** Where an agent of a fleet is. */
+  /**
+   * Where an agent of a fleet is.
+   * @param {System} system
+   * @param {number} agent
+   */
   agentAt(system, agent) {
     const p = 8 * system.anchors[agent];
     return this.poses.slice(p, p + 3);
@@ -80,7 +84,11 @@ export class Layout {
     return Number.isFinite(low[0]) ? { low, high } : null;
   }
 
-  /** What has swung out is forgotten slowly: the view must not breathe. */
+  /**
+   * What has swung out is forgotten slowly: the view must not breathe.
+   * @param {{low: number[], high: number[]}} box
+   * @param {number} time s
+   */
   noteSpill({ low, high }, time) {
     if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
     this.spillTime = time;

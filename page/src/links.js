@@ -3,6 +3,8 @@ import { colour, reducedMotion } from "./theme.js";
 /** @import { Scene } from "./scene.js" */
 /** @import { Numbers, System } from "./types.d.ts" */
 
+/** @typedef {{system: System, from: number, to: number, lost: boolean, born: number}} Pulse */
+
 const TRAVEL = 650; // ms a message is seen on its way
 const REST = 400; // ms between two of one link
 const FLOW = 1800; // ms between two of one link, where messages flow continuously
@@ -27,7 +29,7 @@ export class Links {
     this.context = context;
     this.scene = scene;
     this.shown = true;
-    /** @type {{system: System, from: number, to: number, lost: boolean, born: number}[]} */
+    /** @type {Pulse[]} */
     this.pulses = []; // messages on their way, between agents from 0
     this.lastPulse = new Map(); // when each link had one
     this.heads = new Map(); // where links of each agent begin
@@ -74,6 +76,13 @@ export class Links {
     return this.shown && !reducedMotion();
   }
 
+  /**
+   * @param {System} system
+   * @param {number} link
+   * @param {boolean} lost
+   * @param {number} now ms
+   * @param {number} rest ms since the one before
+   */
   pulse(system, link, lost, now, rest) {
     const key = `${system.name}/${link}`;
     if (now - (this.lastPulse.get(key) ?? -Infinity) < rest) return;
@@ -99,12 +108,21 @@ export class Links {
     return ends.includes(null) ? null : ends;
   }
 
+  /**
+   * @param {System} system
+   * @param {number} a
+   * @param {number} b
+   */
   straight(system, a, b) {
     const [from, to] = [this.headAt(system, a), this.headAt(system, b)];
     return from && to && [from, { x: (from.x + to.x) / 2, y: (from.y + to.y) / 2 }, to];
   }
 
-  /** Where the links of an agent begin on the screen; once a picture for each. */
+  /**
+   * Where the links of an agent begin on the screen; once a picture for each.
+   * @param {System} system
+   * @param {number} agent
+   */
   headAt(system, agent) {
     const key = `${system.name}/${agent}`;
     const { camera, layout } = this.scene;
@@ -124,6 +142,7 @@ export class Links {
     for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
   }
 
+  /** @param {System} system */
   edges(system) {
     const { context } = this;
     const dense = system.edges.length > 60;
@@ -144,6 +163,10 @@ export class Links {
     context.globalAlpha = 1;
   }
 
+  /**
+   * @param {Pulse} pulse
+   * @param {number} age in times that a message is seen
+   */
   drawPulse({ system, from, to, lost }, age) {
     const { context } = this;
     const curve = this.curve(system, from, to);

@@ -111,6 +111,10 @@ export class Overlay {
     );
   }
 
+  /**
+   * @param {System} system
+   * @param {Instant} instant
+   */
   labels(system, instant) {
     const shares = instant.systems[system.name].share;
     const share = (agent) => (shares ? shares[agent] : NaN);
@@ -121,11 +125,20 @@ export class Overlay {
       this.label(system, agent, share(agent));
   }
 
+  /**
+   * @param {System} system
+   * @param {number} agent
+   */
   isHighlighted(system, agent) {
     const which = this.highlighted;
     return which?.system === system.name && which?.agent === agent;
   }
 
+  /**
+   * @param {System} system
+   * @param {number} agent
+   * @param {number} share
+   */
   label(system, agent, share) {
     const [x, y, z] = this.scene.layout.agentAt(system, agent);
     const p = this.scene.camera.project([x, y, z + system.height]);
@@ -188,6 +201,7 @@ export class Overlay {
     context.setLineDash([]);
   }
 
+  /** @param {System} system */
   barTexts(system) {
     const bars = this.scene.layout.barsOf(system);
     for (const text of [bars.title(), ...bars.gaugeTexts()]) this.text(text);

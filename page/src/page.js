@@ -163,7 +163,10 @@ export class Page {
     this.toolbar.setMeta(meta);
   }
 
-  /** Exits and interventions of a replay, marked along the slider. */
+  /**
+   * Exits and interventions of a replay, marked along the slider.
+   * @param {Playback} playback
+   */
   markOutcome({ exits, interventions, end }) {
     const marks = Object.entries(exits).map(([name, time]) => ({
       time,

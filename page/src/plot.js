@@ -9,7 +9,10 @@ import { decimals, fixed } from "./words.js";
 /** @import { Spec } from "./specs.js" */
 /** @import { Agent } from "./types.d.ts" */
 
-/** A little TeX as text with subscripts: "y_i - y_{i-1}"; null if it holds more than that. */
+/**
+ * A little TeX as text with subscripts: "y_i - y_{i-1}"; null if it holds more than that.
+ * @param {string} tex
+ */
 const symbolOf = (tex) => {
   const plain = tex
     .replace(/\\(lVert|rVert|Vert|\|)/g, "‖")
@@ -63,6 +66,10 @@ class TimeLine {
     this.x = NaN;
   }
 
+  /**
+   * @param {uPlot} u
+   * @param {number} time
+   */
   place(u, time) {
     const x = Math.round(u.valToPos(time, "x"));
     if (this.x === x) return; // painting anew costs more than all else here
@@ -175,9 +182,13 @@ export class Plot {
     return [store.time, ...this.spec.columns.map((k) => store.column(this.spec.array, k))];
   }
 
-  /** The mouse is somewhere over this plot, or over one beside it. */
+  /**
+   * The mouse is somewhere over this plot, or over one beside it.
+   * @param {uPlot} u
+   */
   hover(u) {
-    this.hovered = u.cursor.left >= 0 ? u.cursor.idx : null;
+    const { idx = null, left = -1 } = u.cursor;
+    this.hovered = left >= 0 ? idx : null;
     this.writeValues();
   }
 

@@ -2,7 +2,16 @@
 import { orNull, partsOf } from "./instant.js";
 /** @import { Instant, Pack, Scene } from "./types.d.ts" */
 
-/** Rotations a and b mixed: normalised, the short way round; written to out at k. */
+/** @typedef {{i: number, f: number}} At f of the way from sample i to the next one */
+
+/**
+ * Rotations a and b mixed: normalised, the short way round; written to out at k.
+ * @param {Float64Array} a
+ * @param {Float64Array} b
+ * @param {number} f from 0 to 1
+ * @param {Float64Array} out
+ * @param {number} k
+ */
 const mixQuaternion = (a, b, f, out, k) => {
   let dot = 0;
   for (let c = k; c < k + 4; c++) dot += a[c] * b[c];
@@ -34,7 +43,10 @@ export class Replay {
     return this.time[this.time.length - 1];
   }
 
-  /** {i, f}: f of the way from sample i to the next one. */
+  /**
+   * @param {number} t
+   * @returns {At}
+   */
   at(t) {
     const time = this.time;
     const last = time.length - 1;
@@ -49,6 +61,10 @@ export class Replay {
     return { i: low, f: (t - time[low]) / (time[low + 1] - time[low]) };
   }
 
+  /**
+   * @param {number} i
+   * @param {Float64Array} out
+   */
   fillPoses(i, out) {
     const columns = this.arrays.pose_columns?.data || [];
     const values = this.arrays.pose_values?.data;
@@ -57,6 +73,7 @@ export class Replay {
     return out;
   }
 
+  /** @param {At} at */
   poses({ i, f }) {
     const a = this.fillPoses(i, this.before);
     if (f === 0) return a;
@@ -72,7 +89,11 @@ export class Replay {
     return out;
   }
 
-  /** Values of one array, of any width, at an instant. */
+  /**
+   * Values of one array, of any width, at an instant.
+   * @param {string} name
+   * @param {At} at
+   */
   row(name, { i, f }) {
     const array = this.arrays[name];
     if (!array) return undefined;
@@ -99,9 +120,14 @@ export class Replay {
     return instant;
   }
 
-  /** (links x 2) messages passed and lost in (from, to], or undefined. */
-  messagesBetween(system, from, to) {
-    const array = this.arrays[`${system.name}/messages`];
+  /**
+   * (links x 2) messages passed and lost in (from, to], or undefined.
+   * @param {string} name of the system
+   * @param {number} from
+   * @param {number} to
+   */
+  messagesBetween(name, from, to) {
+    const array = this.arrays[`${name}/messages`];
     if (!array || !(to > from)) return undefined;
     const width = array.data.length / this.time.length;
     const sum = new Float32Array(width);
@@ -110,7 +136,11 @@ export class Replay {
     return sum;
   }
 
-  /** Column k of an array, over all samples. */
+  /**
+   * Column k of an array, over all samples.
+   * @param {string} name
+   * @param {number} k
+   */
   column(name, k) {
     const array = this.arrays[name];
     if (!array) return this.time.map(() => null);
@@ -118,6 +148,7 @@ export class Replay {
     return this.time.map((_, i) => orNull(array.data[i * width + k]));
   }
 
+  /** @param {string} name */
   greatest(name) {
     const data = this.arrays[name]?.data || [];
     let most = 0;

@@ -97,7 +97,10 @@ export class Scene {
     this.stale = true;
   }
 
-  /** Finds the objects of the scene, again when some have come or are missing. */
+  /**
+   * Finds the objects of the scene, again when some have come or are missing.
+   * @param {Meta} meta
+   */
   resolve(meta) {
     const now = Date.now();
     if (!this.stale && (this.complete || now < this.nextLook)) return;
@@ -158,6 +161,7 @@ export class Scene {
    * @param {Store} store
    */
   apply(instant, store) {
+    if (!this.meta) return;
     this.resolve(this.meta);
     this.instant = instant;
     this.applyPoses(instant.poses);
@@ -207,7 +211,11 @@ export class Scene {
     this.floorKnown = true;
   }
 
-  /** Bars stand behind the fleets. */
+  /**
+   * Bars stand behind the fleets.
+   * @param {Instant} instant
+   * @param {Store} store
+   */
   placeBars(instant, store) {
     const { box, floor } = this.layout;
     let behind = box ? box.high[1] + 2.4 : 0;

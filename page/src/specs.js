@@ -23,7 +23,10 @@ const MOST_LINES = 40;
  * @property {Bound[]} bounds
  */
 
-/** Labels without what all of them say: "gap of agents 1 and 2" as "1–2". */
+/**
+ * Labels without what all of them say: "gap of agents 1 and 2" as "1–2".
+ * @param {string[]} labels
+ */
 const shortOf = (labels) => {
   if (labels.length < 2) return labels;
   const [first] = labels;

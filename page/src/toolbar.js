@@ -5,9 +5,16 @@ import { byId, element, press } from "./dom.js";
 /** @import { Scene as Drawn } from "./scene.js" */
 /** @import { Agent, Instant, Scene, System } from "./types.d.ts" */
 
+/**
+ * @param {System} system
+ * @param {number} agent
+ */
 const nameOf = (system, agent) => `${system.agent_name} ${agent + 1}`;
 
-/** An option for each agent of a system; the value is an Agent as JSON. */
+/**
+ * An option for each agent of a system; the value is an Agent as JSON.
+ * @param {System} system
+ */
 const optionsOf = (system) =>
   [...Array(system.agents).keys()].map((agent) =>
     element("option", {

@@ -66,7 +66,11 @@ export class Tuning {
     );
   }
 
-  /** Buttons for each agent. */
+  /**
+   * Buttons for each agent.
+   * @param {Push} push
+   * @param {System} system
+   */
   pushList(push, { agents, agent_name: noun }) {
     const list = element("div", { class: "push-list" });
     for (let agent = 1; agent <= agents; agent++) {
@@ -77,7 +81,11 @@ export class Tuning {
     return list;
   }
 
-  /** Buttons for the agent that is chosen, when agents are many. */
+  /**
+   * Buttons for the agent that is chosen, when agents are many.
+   * @param {Push} push
+   * @param {System} system
+   */
   pushChoice(push, { agents, agent_name: noun }) {
     const select = element("select", { "aria-label": `${noun} to push` });
     for (let agent = 1; agent <= agents; agent++)

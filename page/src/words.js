@@ -1,6 +1,9 @@
 // Numbers and states in words.
 
-/** A number in few characters: three digits, a real minus sign. */
+/**
+ * A number in few characters: three digits, a real minus sign.
+ * @param {number | null | undefined} value
+ */
 export const number = (value, digits = 3) => {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
@@ -10,6 +13,10 @@ export const number = (value, digits = 3) => {
   return text.replace("-", "−").replace("e+", "e");
 };
 
+/**
+ * @param {number | null} value
+ * @param {number} decimals
+ */
 export const fixed = (value, decimals) =>
   value === null || Number.isNaN(value)
     ? "–"
@@ -22,7 +29,11 @@ export const fixed = (value, decimals) =>
 export const decimals = (greatest) =>
   greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
 
-/** "0.42 m/s" or "0.42" */
+/**
+ * "0.42 m/s" or "0.42"
+ * @param {number | null} value
+ * @param {string} unit
+ */
 export const withUnit = (value, unit) => number(value) + (unit ? ` ${unit}` : "");
 
 const SYMBOLS = { ok: "✓", going: "▸", bad: "⚠", unknown: "?" };
@@ -40,4 +51,5 @@ export const status = (word) => {
   return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
 };
 
+/** @param {string} word */
 export const outside = (word) => status(word).kind === "bad";

@@ -303,6 +303,10 @@
       this.time = Array.from(time);
       this.thin();
     }
+    /**
+     * @param {string} name
+     * @param {Numbers | number[]} values
+     */
     notePeak(name, values) {
       let most = this.peaks[name] || 0;
       for (const value of values) if (Math.abs(value) > most) most = Math.abs(value);
@@ -324,6 +328,10 @@
       this.time.push(instant.time);
       if (this.time.length > this.most) this.thin();
     }
+    /**
+     * @param {string} name
+     * @param {Numbers | number[]} values
+     */
     append(name, values) {
       const columns = this.columns[name];
       for (let k = 0; k < Math.max(values.length, columns.length); k++) {
@@ -670,6 +678,13 @@
     get pulsing() {
       return this.shown && !reducedMotion();
     }
+    /**
+     * @param {System} system
+     * @param {number} link
+     * @param {boolean} lost
+     * @param {number} now ms
+     * @param {number} rest ms since the one before
+     */
     pulse(system, link, lost, now, rest) {
       const key = `${system.name}/${link}`;
       if (now - (this.lastPulse.get(key) ?? -Infinity) < rest) return;
@@ -693,11 +708,20 @@
       const ends = [p, middle, q].map((point) => camera.project(point));
       return ends.includes(null) ? null : ends;
     }
+    /**
+     * @param {System} system
+     * @param {number} a
+     * @param {number} b
+     */
     straight(system, a, b) {
       const [from, to] = [this.headAt(system, a), this.headAt(system, b)];
       return from && to && [from, { x: (from.x + to.x) / 2, y: (from.y + to.y) / 2 }, to];
     }
-    /** Where the links of an agent begin on the screen; once a picture for each. */
+    /**
+     * Where the links of an agent begin on the screen; once a picture for each.
+     * @param {System} system
+     * @param {number} agent
+     */
     headAt(system, agent) {
       const key = `${system.name}/${agent}`;
       const { camera, layout } = this.scene;
@@ -715,6 +739,7 @@
       this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
       for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
     }
+    /** @param {System} system */
     edges(system) {
       const { context } = this;
       const dense = system.edges.length > 60;
@@ -734,6 +759,10 @@
       context.setLineDash([]);
       context.globalAlpha = 1;
     }
+    /**
+     * @param {Pulse} pulse
+     * @param {number} age in times that a message is seen
+     */
     drawPulse({ system, from, to, lost }, age) {
       const { context } = this;
       const curve = this.curve(system, from, to);
@@ -843,6 +872,10 @@
         (t) => box.x < t.x + t.w && t.x < box.x + box.w && box.y < t.y + t.h && t.y < box.y + box.h
       );
     }
+    /**
+     * @param {System} system
+     * @param {Instant} instant
+     */
     labels(system, instant) {
       const shares = instant.systems[system.name].share;
       const share = (agent) => shares ? shares[agent] : NaN;
@@ -852,10 +885,19 @@
       for (const agent of [...urgent, ...order.filter((each) => !first(each))])
         this.label(system, agent, share(agent));
     }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     */
     isHighlighted(system, agent) {
       const which = this.highlighted;
       return which?.system === system.name && which?.agent === agent;
     }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @param {number} share
+     */
     label(system, agent, share) {
       const [x, y, z] = this.scene.layout.agentAt(system, agent);
       const p = this.scene.camera.project([x, y, z + system.height]);
@@ -914,6 +956,7 @@
       context.stroke();
       context.setLineDash([]);
     }
+    /** @param {System} system */
     barTexts(system) {
       const bars2 = this.scene.layout.barsOf(system);
       for (const text of [bars2.title(), ...bars2.gaugeTexts()]) this.text(text);
@@ -1001,7 +1044,10 @@
     get end() {
       return this.time[this.time.length - 1];
     }
-    /** {i, f}: f of the way from sample i to the next one. */
+    /**
+     * @param {number} t
+     * @returns {At}
+     */
     at(t) {
       const time = this.time;
       const last = time.length - 1;
@@ -1015,6 +1061,10 @@
       }
       return { i: low, f: (t - time[low]) / (time[low + 1] - time[low]) };
     }
+    /**
+     * @param {number} i
+     * @param {Float64Array} out
+     */
     fillPoses(i, out) {
       const columns = this.arrays.pose_columns?.data || [];
       const values = this.arrays.pose_values?.data;
@@ -1022,6 +1072,7 @@
       for (let v = 0; v < columns.length; v++) out[columns[v]] = values[v * T + i];
       return out;
     }
+    /** @param {At} at */
     poses({ i, f }) {
       const a = this.fillPoses(i, this.before);
       if (f === 0) return a;
@@ -1035,7 +1086,11 @@
       }
       return out;
     }
-    /** Values of one array, of any width, at an instant. */
+    /**
+     * Values of one array, of any width, at an instant.
+     * @param {string} name
+     * @param {At} at
+     */
     row(name, { i, f }) {
       const array = this.arrays[name];
       if (!array) return void 0;
@@ -1059,9 +1114,14 @@
       }
       return instant;
     }
-    /** (links x 2) messages passed and lost in (from, to], or undefined. */
-    messagesBetween(system, from, to) {
-      const array = this.arrays[`${system.name}/messages`];
+    /**
+     * (links x 2) messages passed and lost in (from, to], or undefined.
+     * @param {string} name of the system
+     * @param {number} from
+     * @param {number} to
+     */
+    messagesBetween(name, from, to) {
+      const array = this.arrays[`${name}/messages`];
       if (!array || !(to > from)) return void 0;
       const width = array.data.length / this.time.length;
       const sum = new Float32Array(width);
@@ -1069,13 +1129,18 @@
         for (let k = 0; k < width; k++) sum[k] += array.data[i * width + k];
       return sum;
     }
-    /** Column k of an array, over all samples. */
+    /**
+     * Column k of an array, over all samples.
+     * @param {string} name
+     * @param {number} k
+     */
     column(name, k) {
       const array = this.arrays[name];
       if (!array) return this.time.map(() => null);
       const width = array.data.length / this.time.length;
       return this.time.map((_2, i) => orNull(array.data[i * width + k]));
     }
+    /** @param {string} name */
     greatest(name) {
       const data = this.arrays[name]?.data || [];
       let most = 0;
@@ -5635,6 +5700,10 @@
       this.root = root;
       this.x = NaN;
     }
+    /**
+     * @param {uPlot} u
+     * @param {number} time
+     */
     place(u, time) {
       const x = Math.round(u.valToPos(time, "x"));
       if (this.x === x) return;
@@ -5735,9 +5804,13 @@
       const { store } = this.plots.source;
       return [store.time, ...this.spec.columns.map((k) => store.column(this.spec.array, k))];
     }
-    /** The mouse is somewhere over this plot, or over one beside it. */
+    /**
+     * The mouse is somewhere over this plot, or over one beside it.
+     * @param {uPlot} u
+     */
     hover(u) {
-      this.hovered = u.cursor.left >= 0 ? u.cursor.idx : null;
+      const { idx = null, left = -1 } = u.cursor;
+      this.hovered = left >= 0 ? idx : null;
       this.writeValues();
     }
     focusedByMouse(k, how) {
@@ -6401,7 +6474,7 @@
       this.followPoint = new THREE.Vector3();
     }
     followed() {
-      const { kind, system, agent } = this.follow;
+      const { kind, system, agent = 0 } = this.follow;
       if (kind === "agent") {
         const fleet = this.layout.fleets.find((each) => each.name === system);
         if (fleet) return toView(this.layout.agentAt(fleet, agent));
@@ -6557,6 +6630,11 @@
       if (system.drawn_as === "bars") this.outlines(system, shown.agent, row);
       else this.shadows(system, shown.agent, row, action);
     }
+    /**
+     * @param {System} system
+     * @param {number} holder who has the estimates
+     * @param {Numbers} row of estimates
+     */
     outlines(system, holder, row) {
       const bars2 = this.scene.layout.barsOf(system);
       system.action.owner.forEach((owner, k) => {
@@ -6575,6 +6653,12 @@
       this.group.add(lines);
       return lines;
     }
+    /**
+     * @param {System} system
+     * @param {number} holder
+     * @param {Numbers} row
+     * @param {Numbers} action
+     */
     shadows(system, holder, row, action) {
       for (let agent = 0; agent < system.agents; agent++) {
         if (agent === holder) continue;
@@ -6592,6 +6676,12 @@
         });
       }
     }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @param {Numbers} row
+     * @param {Numbers} action
+     */
     ahead(system, agent, row, action) {
       const ahead = [0, 0, 0];
       system.action.owner.forEach((owner, k) => {
@@ -6721,7 +6811,11 @@
       this.box = this.boxOf();
       if (this.box) this.noteSpill(this.box, instant.time);
     }
-    /** Where an agent of a fleet is. */
+    /**
+     * Where an agent of a fleet is.
+     * @param {System} system
+     * @param {number} agent
+     */
     agentAt(system, agent) {
       const p = 8 * system.anchors[agent];
       return this.poses.slice(p, p + 3);
@@ -6759,7 +6853,11 @@
           }
       return Number.isFinite(low[0]) ? { low, high } : null;
     }
-    /** What has swung out is forgotten slowly: the view must not breathe. */
+    /**
+     * What has swung out is forgotten slowly: the view must not breathe.
+     * @param {{low: number[], high: number[]}} box
+     * @param {number} time s
+     */
     noteSpill({ low, high }, time) {
       if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
       this.spillTime = time;
@@ -6881,7 +6979,10 @@
       this.floorKnown = false;
       this.stale = true;
     }
-    /** Finds the objects of the scene, again when some have come or are missing. */
+    /**
+     * Finds the objects of the scene, again when some have come or are missing.
+     * @param {Meta} meta
+     */
     resolve(meta) {
       const now = Date.now();
       if (!this.stale && (this.complete || now < this.nextLook)) return;
@@ -6936,6 +7037,7 @@
      * @param {Store} store
      */
     apply(instant, store) {
+      if (!this.meta) return;
       this.resolve(this.meta);
       this.instant = instant;
       this.applyPoses(instant.poses);
@@ -6981,7 +7083,11 @@
       if (Number.isFinite(box.min.y)) this.layout.floor = Math.min(0, box.min.y);
       this.floorKnown = true;
     }
-    /** Bars stand behind the fleets. */
+    /**
+     * Bars stand behind the fleets.
+     * @param {Instant} instant
+     * @param {Store} store
+     */
     placeBars(instant, store) {
       const { box, floor: floor2 } = this.layout;
       let behind = box ? box.high[1] + 2.4 : 0;
@@ -7370,7 +7476,11 @@
         system.agents <= MOST_PUSHED ? this.pushList(push, system) : this.pushChoice(push, system)
       );
     }
-    /** Buttons for each agent. */
+    /**
+     * Buttons for each agent.
+     * @param {Push} push
+     * @param {System} system
+     */
     pushList(push, { agents, agent_name: noun }) {
       const list = element("div", { class: "push-list" });
       for (let agent = 1; agent <= agents; agent++) {
@@ -7380,7 +7490,11 @@
       }
       return list;
     }
-    /** Buttons for the agent that is chosen, when agents are many. */
+    /**
+     * Buttons for the agent that is chosen, when agents are many.
+     * @param {Push} push
+     * @param {System} system
+     */
     pushChoice(push, { agents, agent_name: noun }) {
       const select = element("select", { "aria-label": `${noun} to push` });
       for (let agent = 1; agent <= agents; agent++)
@@ -7649,7 +7763,10 @@
       this.plots.setScene(meta, source);
       this.toolbar.setMeta(meta);
     }
-    /** Exits and interventions of a replay, marked along the slider. */
+    /**
+     * Exits and interventions of a replay, marked along the slider.
+     * @param {Playback} playback
+     */
     markOutcome({ exits, interventions, end }) {
       const marks = Object.entries(exits).map(([name, time]) => ({
         time,
