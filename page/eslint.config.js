@@ -2,7 +2,7 @@ import js from "@eslint/js";
 
 // What browsers have and the page uses; any other name is one that was not imported.
 const BROWSER = [
-  "Blob", "DecompressionStream", "HTMLInputElement", "ResizeObserver", "Response", "TextDecoder",
+  "Blob", "DecompressionStream", "Element", "HTMLInputElement", "ResizeObserver", "Response", "TextDecoder",
   "URL", "WebSocket", "addEventListener", "atob", "clearTimeout", "devicePixelRatio", "document",
   "fetch", "getComputedStyle", "innerHeight", "innerWidth", "localStorage", "location",
   "matchMedia", "performance", "requestAnimationFrame", "setTimeout", "window",
@@ -19,7 +19,7 @@ export default [
     rules: {
       complexity: ["error", 12],
       eqeqeq: "error",
-      "max-lines": ["error", 300],
+      "max-lines": ["error", 320],
       "max-lines-per-function": ["error", 60],
       "no-shadow": "error",
       "no-unused-vars": ["error", { argsIgnorePattern: "^_" }],

@@ -3,7 +3,7 @@ import { ramp } from "./colours.js";
 import { THREE } from "./meshcat.js";
 import { colour } from "./theme.js";
 import { withUnit } from "./words.js";
-/** @import { Instant, Point, Quantity, Store, System, Text } from "./types.d.ts" */
+/** @import { Instant, Numbers, Point, Quantity, Store, System, Text, Three } from "./types.d.ts" */
 
 const PITCH = 0.62; // m between bars, at scale 1
 const WIDTH = 0.4;
@@ -12,6 +12,7 @@ const TALL = 1.9; // m, of the greatest action and of a bound
 const BOX = new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5);
 const EDGES = new THREE.EdgesGeometry(BOX);
 
+/** @param {number} color */
 const mesh = (color, opacity = 1) =>
   new THREE.Mesh(
     BOX,
@@ -23,13 +24,17 @@ const mesh = (color, opacity = 1) =>
     }),
   );
 
+/**
+ * @param {Three} object
+ * @param {number} height
+ */
 const setHeight = (object, height) => {
   object.scale.z = Math.abs(height) < 1e-4 ? 1e-4 : height;
 };
 
 export class Bars {
   /**
-   * @param {any} parent three.js's
+   * @param {Three} parent
    * @param {System} system
    */
   constructor(parent, system) {
@@ -60,12 +65,16 @@ export class Bars {
     );
   }
 
-  /** Where the k-th bar stands, from the middle of the group. */
+  /**
+   * Where the k-th bar stands, from the middle of the group.
+   * @param {number} k
+   */
   spot(k) {
     const row = Math.floor(k / this.perRow);
     return [PITCH * ((k % this.perRow) + 0.5) - this.width / 2, PITCH * row];
   }
 
+  /** @param {number} k */
   addBar(k) {
     const bar = mesh(0x888888);
     const [x, y] = this.spot(k);
@@ -81,14 +90,14 @@ export class Bars {
    */
   addGauge(quantity, k) {
     const x = PITCH * this.perRow + GAUGE * (k + 0.5) + 0.1 - this.width / 2;
-    const place = (object, width, z) => {
+    const place = (/** @type {Three} */ object, /** @type {number} */ width, z = 0) => {
       object.position.set(x, 0, z);
       object.scale.set(width, width, 1);
       this.group.add(object);
       return object;
     };
-    const bar = place(mesh(0x888888), 0.7, 0);
-    const frame = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 0.72, 0);
+    const bar = place(mesh(0x888888), 0.7);
+    const frame = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 0.72);
     setHeight(frame, TALL);
     const plate = place(mesh(0xffffff, 0.55), 1.15, TALL);
     setHeight(plate, 0.03);
@@ -140,6 +149,10 @@ export class Bars {
     for (const gauge of this.gauges) this.updateGauge(gauge, own);
   }
 
+  /**
+   * @param {ReturnType<Bars["addGauge"]>} gauge
+   * @param {Record<string, Numbers | undefined>} own arrays of the system
+   */
   updateGauge(gauge, own) {
     gauge.value = own[`quantity/${gauge.quantity.name}`]?.[0] ?? NaN;
     gauge.share = gauge.value / gauge.limit;
@@ -147,6 +160,7 @@ export class Bars {
     gauge.bar.material.color.setRGB(...ramp(gauge.share));
   }
 
+  /** @param {number} value */
   heightOf(value) {
     return Number.isFinite(value) ? (TALL * value) / this.reference : 0;
   }
@@ -154,21 +168,27 @@ export class Bars {
   /**
    * A point of the group, in MuJoCo's coordinates.
    * @returns {Point}
+   * @param {number} x
+   * @param {number} y
+   * @param {number} z
    */
   point(x, y, z) {
     const [ox, oy, oz] = this.origin;
     return [ox + this.scale * x, oy + this.scale * y, oz + 0.035 + this.scale * z];
   }
 
+  /** @param {number} k */
   top(k) {
     const [x, y] = this.spot(k);
     return this.point(x, y, Math.max(0, this.heightOf(this.values[k])));
   }
 
+  /** @param {number} agent */
   topOfAgent(agent) {
     return this.top(this.system.action.owner.indexOf(agent + 1));
   }
 
+  /** @param {number} k */
   foot(k) {
     const [x, y] = this.spot(k);
     return this.point(x, y - WIDTH / 2, 0);

@@ -1,11 +1,15 @@
 // Many robots: equal shapes are drawn together. A hundred robots are a thousand meshes, and without
 // a graphics card it is the number of drawing calls that counts.
 import { THREE } from "./meshcat.js";
+/** @import { Three } from "./types.d.ts" */
 
 const FEW = 150; // meshes, up to which they are drawn one by one
 const HIDDEN = new THREE.Matrix4().makeScale(0, 0, 0);
 
-/** A number that tells apart geometries without parameters. */
+/**
+ * A number that tells apart geometries without parameters.
+ * @param {Three} geometry
+ */
 const checksum = (geometry) => {
   const values = geometry.attributes.position?.array || [];
   let sum = 0;
@@ -13,6 +17,7 @@ const checksum = (geometry) => {
   return `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
 };
 
+/** @param {Three} mesh */
 const signature = ({ geometry, material: m }) => {
   const shape = geometry.parameters ? JSON.stringify(geometry.parameters) : checksum(geometry);
   return [
@@ -27,6 +32,7 @@ const signature = ({ geometry, material: m }) => {
   ].join("|");
 };
 
+/** @param {Three} mesh */
 const batchable = (mesh) =>
   mesh.isMesh &&
   !mesh.isInstancedMesh &&
@@ -34,7 +40,11 @@ const batchable = (mesh) =>
   !mesh.material.map &&
   !mesh.material.vertexColors;
 
-/** Far away nobody counts the corners of a ball. */
+/**
+ * Far away nobody counts the corners of a ball.
+ * @param {Three} geometry
+ * @param {number} count of its copies
+ */
 const coarser = (geometry, count) => {
   const p = geometry.parameters;
   const around = count > 100 ? 10 : 14;
@@ -52,14 +62,16 @@ const coarser = (geometry, count) => {
 };
 
 export class Batches {
+  /** @param {Three} scene */
   constructor(scene) {
-    this.scene = scene; // three.js's
+    this.scene = scene;
     this.group = new THREE.Group();
     // instances are placed in the world, whatever the scene's rotation is
     scene.updateMatrix();
     this.group.matrixAutoUpdate = false;
     this.group.matrix.copy(scene.matrix).invert();
     scene.add(this.group);
+    /** @type {{instanced: Three, meshes: Three[]}[]} */
     this.all = [];
   }
 
@@ -72,13 +84,16 @@ export class Batches {
     this.all = [];
   }
 
-  /** Batches the meshes below these objects, if they are many. */
+  /**
+   * Batches the meshes below these objects, if they are many.
+   * @param {Three[]} roots
+   */
   build(roots) {
     this.clear();
     const groups = new Map();
     let count = 0;
     for (const root of roots)
-      root?.traverse((mesh) => {
+      root?.traverse((/** @type {Three} */ mesh) => {
         if (!batchable(mesh)) return;
         const key = signature(mesh);
         if (!groups.has(key)) groups.set(key, []);
@@ -89,6 +104,7 @@ export class Batches {
     for (const meshes of groups.values()) if (meshes.length > 4) this.add(meshes);
   }
 
+  /** @param {Three[]} meshes */
   add(meshes) {
     const material = meshes[0].material.clone();
     material.color.setRGB(1, 1, 1); // colours are the instances' own
@@ -113,6 +129,7 @@ export class Batches {
     }
   }
 
+  /** @param {Three} mesh */
   visible(mesh) {
     for (let at = mesh; at; at = at.parent) if (!at.visible) return false;
     return true;

@@ -2,11 +2,11 @@
 import { THREE } from "./meshcat.js";
 import { DEGREE, toView } from "./viewer.js";
 /** @import { Layout } from "./layout.js" */
-/** @import { Follow } from "./types.d.ts" */
+/** @import { Follow, Three } from "./types.d.ts" */
 
 export class Camera {
   /**
-   * @param {any} viewer meshcat's
+   * @param {Three} viewer meshcat's
    * @param {HTMLElement} pane
    * @param {Layout} layout
    */
@@ -43,7 +43,11 @@ export class Camera {
     return this.layout.middle();
   }
 
-  /** Distance from the target at which all points are in view from a direction. */
+  /**
+   * Distance from the target at which all points are in view from a direction.
+   * @param {Three} direction
+   * @param {Three} target
+   */
   fitDistance(direction, target) {
     const view = new THREE.Matrix4().lookAt(
       direction,
@@ -94,6 +98,11 @@ export class Camera {
     this.placed = true;
   }
 
+  /**
+   * @param {Three} target
+   * @param {Three} direction
+   * @param {number} distance
+   */
   look(target, direction, distance) {
     this.controls.target.copy(target);
     this.lens.position.copy(target).addScaledVector(direction, distance);
@@ -137,7 +146,11 @@ export class Camera {
     this.fit();
   }
 
-  /** Turns about the target (degrees) and zooms (factor), for the keyboard. */
+  /**
+   * Turns about the target (degrees) and zooms (factor), for the keyboard.
+   * @param {number} turn
+   * @param {number} factor
+   */
   nudge(turn, factor) {
     const { direction, distance } = this.arm();
     direction.applyAxisAngle(new THREE.Vector3(0, 1, 0), turn * DEGREE);

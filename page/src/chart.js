@@ -38,7 +38,8 @@ export const optionsOf = (plot, width, height) => ({
     drawAxes: [(u) => drawMarks(u, plot)],
     draw: [() => plot.setTime(plot.plots.now)], // the axis is another one only by now
     setCursor: [(u) => plot.hover(u)],
-    setSeries: [(_, k, how) => plot.focusedByMouse(k, how)],
+    // uPlot's types do not know what it tells here
+    setSeries: [(_, k, how) => plot.focusedByMouse(k, /** @type {any} */ (how))],
   },
 });
 

@@ -29,5 +29,9 @@ export const element = (tag, attributes = {}, ...children) => {
   return made;
 };
 
-/** Says whether a toggle button is pressed. */
+/**
+ * Says whether a toggle button is pressed.
+ * @param {HTMLElement} button
+ * @param {boolean} pressed
+ */
 export const press = (button, pressed) => button.setAttribute("aria-pressed", String(pressed));

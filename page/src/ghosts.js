@@ -4,10 +4,11 @@ import { THREE } from "./meshcat.js";
 import { colour } from "./theme.js";
 import { matrixIn } from "./viewer.js";
 /** @import { Scene } from "./scene.js" */
-/** @import { Agent, Instant, Numbers, System } from "./types.d.ts" */
+/** @import { Agent, Instant, Numbers, System, Three } from "./types.d.ts" */
 
 const EDGES = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5));
 const SECOND = 1;
+/** @type {Record<string, number>} */
 const DIRECTIONS = { "": 0, x: 0, y: 1, z: 2 };
 
 export class Ghosts {
@@ -18,7 +19,8 @@ export class Ghosts {
     scene.viewer.scene.add(this.group);
     /** @type {Agent | null} */
     this.shown = null; // whose estimates
-    this.copies = new Map();
+    /** @type {Map<number, Three[]>} */
+    this.copies = new Map(); // by agent, or by bar
   }
 
   /** Makes the copies anew when they are next needed. */
@@ -57,13 +59,23 @@ export class Ghosts {
     const bars = this.scene.layout.barsOf(system);
     system.action.owner.forEach((owner, k) => {
       if (owner === holder + 1) return;
-      if (!this.copies.has(k)) this.copies.set(k, [this.outline()]);
-      const [outline] = this.copies.get(k);
+      const [outline] = this.copiesOf(k, () => [this.outline()]);
       const [x, y] = bars.spot(k);
       outline.position.set(...bars.point(x, y, 0));
       const height = bars.scale * bars.heightOf(row[k]);
       outline.scale.set(0.5 * bars.scale, 0.5 * bars.scale, height || 1e-4);
     });
+  }
+
+  /**
+   * What stands for an agent or a bar, made when it is first needed.
+   * @param {number} k
+   * @param {() => Three[]} make
+   */
+  copiesOf(k, make) {
+    const copies = this.copies.get(k) ?? make();
+    this.copies.set(k, copies);
+    return copies;
   }
 
   outline() {
@@ -84,12 +96,8 @@ export class Ghosts {
       if (agent === holder) continue;
       const ahead = this.ahead(system, agent, row, action);
       const sources = this.scene.tinted.get(system.name)?.[agent] ?? [];
-      if (!this.copies.has(agent))
-        this.copies.set(
-          agent,
-          sources.map((mesh) => this.copy(mesh)),
-        );
-      this.copies.get(agent).forEach((copy, k) => {
+      const copies = this.copiesOf(agent, () => sources.map((mesh) => this.copy(mesh)));
+      copies.forEach((copy, k) => {
         copy.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
         ahead.forEach((v, axis) => (copy.matrix.elements[12 + axis] += v));
         // where nothing is mistaken the copy would only flicker in the robot's surface
@@ -114,6 +122,7 @@ export class Ghosts {
     return ahead;
   }
 
+  /** @param {Three} mesh */
   copy(mesh) {
     const material = new THREE.MeshPhongMaterial({
       color: colour("ghost"),

@@ -1,5 +1,6 @@
 // The ground: a grid about a pixel wide at any distance, and the lane of robots in a row.
 import { THREE } from "./meshcat.js";
+/** @import { Three } from "./types.d.ts" */
 
 const VERTEX = `
   varying vec2 at;
@@ -30,8 +31,9 @@ const FRAGMENT = `
   }`;
 
 export class Ground {
+  /** @param {Three} scene */
   constructor(scene) {
-    const uniform = (value) => ({ value });
+    const uniform = (/** @type {any} */ value) => ({ value });
     this.uniforms = {
       size: uniform(1),
       colour: uniform(new THREE.Color()),
@@ -59,13 +61,19 @@ export class Ground {
     this.major = 10; // m between the stronger lines
   }
 
-  /** Follows the point that the camera looks at, in whole squares, so that lines stand still. */
+  /**
+   * Follows the point that the camera looks at, in whole squares, so that lines stand still.
+   * @param {number[]} target
+   * @param {number} distance
+   * @param {number} floor
+   * @param {number | null} lane
+   */
   place(target, distance, floor, lane) {
     const u = this.uniforms;
     const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
     this.major = 10 * minor;
     const { major } = this;
-    const snap = (v) => Math.round(v / major) * major;
+    const snap = (/** @type {number} */ v) => Math.round(v / major) * major;
     const reach = Math.max(8, 4 * distance);
     const origin = [snap(target[0]), snap(target[1])];
     this.mesh.position.set(origin[0], origin[1], floor - 0.02); // below a model's own floor

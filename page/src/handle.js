@@ -13,14 +13,14 @@ export const handleOf = (page) => ({
   /** Simulated time that is shown, s. */
   time: () => page.source?.time ?? 0,
   /** Shows a time of a replay, at once. */
-  seek(time) {
+  seek(/** @type {number} */ time) {
     page.seek(time);
     if (page.source) page.draw(page.source, performance.now());
   },
   /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
-  position: (path) => page.scene.position(path),
+  position: (/** @type {string} */ path) => page.scene.position(path),
   /** CSS colour of an agent (from 0) as it is drawn. */
-  tint: (agent, system) => tintOf(page, agent, system),
+  tint: (/** @type {number} */ agent, /** @type {string} */ system) => tintOf(page, agent, system),
   /** What is plotted. */
   get plots() {
     return page.plots.describe();
@@ -32,6 +32,11 @@ export const handleOf = (page) => ({
   state: () => stateOf(page),
 });
 
+/**
+ * @param {Page} page
+ * @param {number} agent
+ * @param {string} name of the system
+ */
 const tintOf = ({ scene }, agent, name) => {
   const bars = scene.bars.find(({ system }) => system.name === name);
   const drawn = bars

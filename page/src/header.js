@@ -4,6 +4,9 @@ import { fixed, number, outside, status } from "./words.js";
 /** @import { Scene, Source, State, System } from "./types.d.ts" */
 
 export class Header {
+  chipKey = ""; // of what the chips say
+  bannerText = "";
+
   /**
    * @param {Scene} meta
    * @param {Source} source
@@ -45,7 +48,10 @@ export class Header {
   }
 }
 
-/** A sentence in the banner, in place of a scene. */
+/**
+ * A sentence in the banner, in place of a scene.
+ * @param {string} text
+ */
 export const warn = (text) => {
   byId("banner-text").textContent = text;
   byId("banner").hidden = false;
@@ -92,7 +98,10 @@ const chipOf = (system, state, of) => {
   );
 };
 
-/** @param {State} state */
+/**
+ * @param {State} state
+ * @param {string} of what it is
+ */
 const marginText = ({ margin, margin_name: name, margin_time: time }, of) => {
   if (typeof margin !== "number") return "no margin known";
   const when = typeof time === "number" ? ` at ${fixed(time, time < 10 ? 2 : 1)} s` : "";

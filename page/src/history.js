@@ -92,6 +92,7 @@ export class History {
 
   thin() {
     while (this.time.length > this.most) {
+      /** @type {<T>(values: T[]) => T[]} */
       const keep = (values) => values.filter((_, i) => i % 2 === 0);
       this.time = keep(this.time);
       for (const name of this.names) this.columns[name] = this.columns[name].map(keep);
@@ -99,10 +100,15 @@ export class History {
     }
   }
 
+  /**
+   * @param {string} name
+   * @param {number} k
+   */
   column(name, k) {
     return this.columns[name][k] || this.time.map(() => null);
   }
 
+  /** @param {string} name */
   greatest(name) {
     return this.peaks[name] || 0;
   }

@@ -13,8 +13,12 @@ export const partsOf = (system) => [
   "estimate",
 ];
 
-/** NaN is a gap in a line. */
-export const orNull = (value) => (Number.isFinite(value) ? value : null);
+/**
+ * NaN is a gap in a line.
+ * @param {number | undefined} value
+ * @returns {number | null}
+ */
+export const orNull = (value) => (value !== undefined && Number.isFinite(value) ? value : null);
 
 /**
  * An instant out of a live frame.
@@ -26,6 +30,7 @@ export const instantOfFrame = (pack, systems) => {
   /** @type {Instant} */
   const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
   for (const system of systems) {
+    /** @type {Instant["systems"][string]} */
     const own = (instant.systems[system.name] = {});
     for (const part of [...partsOf(system), "messages"])
       own[part] = pack.arrays[`${system.name}/${part}`]?.data;

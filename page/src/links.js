@@ -11,7 +11,11 @@ const FLOW = 1800; // ms between two of one link, where messages flow continuous
 const MANY = 160; // links, from which on only some of them show messages
 const DENSE = 300; // edges, from which on they are straight
 
-/** A point of a curve, from its start (0) to its end (1). */
+/**
+ * A point of a curve, from its start (0) to its end (1).
+ * @param {{x: number, y: number}[]} curve its two ends, with the point that bends it between
+ * @param {number} t
+ */
 const along = ([a, c, b], t) => {
   const u = 1 - t;
   return {
@@ -58,11 +62,19 @@ export class Links {
 
   /**
    * A slow steady flow, where messages have no instants.
+   * @param {System[]} systems
+   * @param {number} now
+   */
+  flow(systems, now) {
+    if (!this.pulsing) return;
+    for (const system of systems) if (system.message_period === null) this.flowIn(system, now);
+  }
+
+  /**
    * @param {System} system
    * @param {number} now
    */
-  flow(system, now) {
-    if (!this.pulsing || system.message_period !== null) return;
+  flowIn(system, now) {
     const every = Math.max(1, Math.ceil(system.links.length / MANY));
     for (let link = 0; link < system.links.length; link += every) {
       const key = `${system.name}/${link}`;
@@ -179,7 +191,12 @@ export class Links {
     context.fill();
   }
 
-  /** A message that is lost. */
+  /**
+   * A message that is lost.
+   * @param {number} x
+   * @param {number} y
+   * @param {number} alpha
+   */
   cross(x, y, alpha) {
     const { context } = this;
     context.globalAlpha = alpha;

@@ -5,7 +5,8 @@ import { notify } from "./notices.js";
 import { fetchReplay } from "./pack.js";
 import { Socket } from "./socket.js";
 import { number, outside } from "./words.js";
-/** @import { Frame, Instant, Intervention, Numbers, Pack, Scene, Source, State, System } from "./types.d.ts" */
+/** @import { Frame, Instant, Intervention, Numbers, Pack, Scene } from "./types.d.ts" */
+/** @import { Source, State, System } from "./types.d.ts" */
 
 /**
  * @typedef {object} Listener what is told of a simulation
@@ -66,6 +67,7 @@ export class Live {
 
   // ---- what the simulation is asked for
 
+  /** @param {object} message */
   send(message) {
     this.socket.send(message);
   }
@@ -74,6 +76,7 @@ export class Live {
     this.send({ do: this.playing ? "pause" : "play" });
   }
 
+  /** @param {number} direction */
   step(direction) {
     if (direction > 0) this.send({ do: "step" });
   }
@@ -82,6 +85,7 @@ export class Live {
     this.send({ do: "restart" });
   }
 
+  /** @param {number | null} value */
   setSpeed(value) {
     this.send({ do: "speed", value });
   }
@@ -98,6 +102,7 @@ export class Live {
     this.listener.opened();
   }
 
+  /** @param {string} why */
   lost(why) {
     this.connected = this.playing = false;
     this.listener.lost(why);
@@ -180,6 +185,7 @@ export class Live {
     this.listener.resumed();
   }
 
+  /** @param {any} message */
   hear(message) {
     if (message.kind === "notice") notify(message.text, message.level);
     else if (message.kind === "controls") this.listener.controls(message.values);

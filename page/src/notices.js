@@ -3,7 +3,10 @@ import { byId, element } from "./dom.js";
 
 const MOST = 3; // at once
 
-/** Errors stay longer and are announced at once. */
+/**
+ * Errors stay longer and are announced at once.
+ * @param {string} text
+ */
 export const notify = (text, level = "info") => {
   const error = level === "error";
   const notice = element(

@@ -7,10 +7,14 @@ import { decimals, fixed, number } from "./words.js";
 /** @import { Agent, Instant, Scene as Meta, System, Text } from "./types.d.ts" */
 
 /** @typedef {{x: number, y: number, w: number, h: number}} Box in CSS pixels */
+/** @typedef {Box & {wide: number, text: string}} Pill of an agent's number, so wide, and a text */
 
-/** Agents in the order in which they get a label when there is no room for all: 1, 9, 5, ... */
+/**
+ * Agents in the order in which they get a label when there is no room for all: 1, 9, 5, ...
+ * @param {number} n
+ */
 const labelOrder = (n) => {
-  const zeros = (k) => (k === 0 ? 32 : Math.log2(k & -k));
+  const zeros = (/** @type {number} */ k) => (k === 0 ? 32 : Math.log2(k & -k));
   return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
 };
 
@@ -117,8 +121,9 @@ export class Overlay {
    */
   labels(system, instant) {
     const shares = instant.systems[system.name].share;
-    const share = (agent) => (shares ? shares[agent] : NaN);
-    const first = (agent) => this.isHighlighted(system, agent) || share(agent) > 1;
+    const share = (/** @type {number} */ agent) => (shares ? shares[agent] : NaN);
+    const first = (/** @type {number} */ agent) =>
+      this.isHighlighted(system, agent) || share(agent) > 1;
     const order = this.orders.get(system.name) ?? [];
     const urgent = order.filter(first);
     for (const agent of [...urgent, ...order.filter((each) => !first(each))])
@@ -147,7 +152,8 @@ export class Overlay {
     const name = String(agent + 1);
     const out = share > 1;
     const digits = out && share < 1.1 ? 1 : 0; // not "100 %" of what is outside
-    const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : out ? "outside" : "";
+    const used = out ? "outside" : "";
+    const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
     for (const text of percent ? [percent, ""] : [""]) {
       const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
       if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
@@ -156,6 +162,11 @@ export class Overlay {
     }
   }
 
+  /**
+   * @param {{x: number, y: number}} p
+   * @param {string} name
+   * @param {string} text
+   */
   pillBox(p, name, text) {
     const context = this.context;
     context.font = "600 13px system-ui, sans-serif";
@@ -166,6 +177,10 @@ export class Overlay {
     return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text };
   }
 
+  /**
+   * @param {Pill} box
+   * @param {{name: string, system: System, agent: number, out: boolean}} about
+   */
   pill(box, { name, system, agent, out }) {
     const context = this.context;
     const chosen = this.isHighlighted(system, agent);
@@ -187,7 +202,11 @@ export class Overlay {
     if (system.agents <= 14 && !out) this.swatch(box, agent);
   }
 
-  /** The look of the agent's line in the plots, under its label. */
+  /**
+   * The look of the agent's line in the plots, under its label.
+   * @param {Box} box
+   * @param {number} agent
+   */
   swatch(box, agent) {
     const context = this.context;
     const look = line(agent);
@@ -243,7 +262,12 @@ export class Overlay {
     this.haloed(text, left, p.y + shift);
   }
 
-  /** Text that can be read on anything. */
+  /**
+   * Text that can be read on anything.
+   * @param {string} text
+   * @param {number} x
+   * @param {number} y
+   */
   haloed(text, x, y) {
     const context = this.context;
     context.lineWidth = 3;
@@ -253,7 +277,11 @@ export class Overlay {
     context.fillText(text, x, y);
   }
 
-  /** The agent whose label or head is near a point of the pane. */
+  /**
+   * The agent whose label or head is near a point of the pane.
+   * @param {number} x
+   * @param {number} y
+   */
   agentNear(x, y) {
     /** @type {Agent | null} */
     let best = null;

@@ -75,9 +75,10 @@ export class Page {
   /** @param {Pack} pack */
   showReplay(pack) {
     const { command_lengths: lengths = [] } = /** @type {Meta} */ (pack.meta);
+    const commands = /** @type {Uint8Array} */ (pack.arrays.commands?.data);
     let at = 0;
     for (const length of lengths) {
-      this.scene.command(pack.arrays.commands.data.slice(at, at + length));
+      this.scene.command(commands.slice(at, at + length));
       at += length;
     }
     const playback = new Playback(pack, { messages: this.messages });
@@ -113,6 +114,7 @@ export class Page {
     byId("lost").hidden = true;
   }
 
+  /** @param {string} why */
   lost(why) {
     byId("lost").hidden = false;
     byId("lost-text").textContent = why;
@@ -183,6 +185,10 @@ export class Page {
     this.slowDue = 0;
   }
 
+  /**
+   * @param {number} direction
+   * @param {boolean} second
+   */
   step(direction, second) {
     this.source?.step(direction, second);
   }
@@ -192,11 +198,13 @@ export class Page {
     (this.live ?? this.playback)?.restart();
   }
 
+  /** @param {number | null} speed */
   setSpeed(speed) {
     this.source?.setSpeed(speed);
     this.slowDue = 0;
   }
 
+  /** @param {number} time */
   seek(time) {
     this.source?.seek(time);
   }
@@ -233,11 +241,15 @@ export class Page {
     this.watchPace(passed, source?.playing ?? false);
     source?.advance(passed);
     if (!this.meta || !source) return;
-    if (source.playing) for (const system of this.meta.systems) this.overlay.links.flow(system, now);
+    if (source.playing) this.overlay.links.flow(this.meta.systems, now);
     this.draw(source, now);
     if (now >= this.slowDue) this.slow(this.meta, source, now);
   }
 
+  /**
+   * @param {number} passed s
+   * @param {boolean} playing
+   */
   watchPace(passed, playing) {
     if (!playing) {
       this.usual = PICTURE;

@@ -50,6 +50,10 @@ export class Playback {
     this.playing = !this.playing;
   }
 
+  /**
+   * @param {number} direction
+   * @param {boolean} second
+   */
   step(direction, second) {
     this.playing = false;
     if (second) return this.seek(this.time + direction);
@@ -63,11 +67,15 @@ export class Playback {
     this.seek(this.start);
   }
 
+  /** @param {number | null} speed */
   setSpeed(speed) {
     this.speed = speed;
   }
 
-  /** Shows a time; messages since the time before pass if it is a step on. */
+  /**
+   * Shows a time; messages since the time before pass if it is a step on.
+   * @param {number} time
+   */
   seek(time, withMessages = false) {
     const before = this.time;
     this.time = Math.min(Math.max(time, this.start), this.end);

@@ -46,7 +46,10 @@ const exitLine = () =>
     element("span", { text: "left the set" }),
   );
 
-/** A short piece of a line as it is drawn in the plot. */
+/**
+ * A short piece of a line as it is drawn in the plot.
+ * @param {{colour: string, dash: number[]}} look
+ */
 const swatchOf = (look) => {
   const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
   const context = /** @type {CanvasRenderingContext2D} */ (made.getContext("2d"));
@@ -109,14 +112,20 @@ export class Plot {
     if (!this.values.length) this.chips.append(this.readout);
   }
 
-  /** Colour and dash of the k-th line. */
+  /**
+   * Colour and dash of the k-th line.
+   * @param {number} k
+   */
   lineOf(k) {
     const { spec } = this;
     if (spec.total === 1) return { colour: colour("text"), dash: [] };
     return line(spec.agents[k] ?? spec.columns[k]);
   }
 
-  /** The chip of the k-th line; returns where its value is written. */
+  /**
+   * The chip of the k-th line; returns where its value is written.
+   * @param {number} k
+   */
   addChip(k) {
     const { spec } = this;
     const value = element("span", { class: "chip-value" });
@@ -147,6 +156,7 @@ export class Plot {
     this.plots.callbacks.highlight(which, this);
   }
 
+  /** @param {number | null} k */
   focus(k) {
     if (this.focused === k) return;
     this.focused = k;
@@ -154,6 +164,7 @@ export class Plot {
     this.uplot?.setSeries(k === null ? /** @type {any} */ (null) : k + 1, { focus: true });
   }
 
+  /** @param {number | null} k */
   markChip(k) {
     this.values.forEach((value, each) =>
       value.parentElement?.classList.toggle("chosen", each === k),
@@ -169,6 +180,10 @@ export class Plot {
 
   // ---- uPlot
 
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
   setSize(width, height) {
     if (this.uplot) return this.uplot.setSize({ width, height });
     this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
@@ -192,6 +207,10 @@ export class Plot {
     this.writeValues();
   }
 
+  /**
+   * @param {number | null} k
+   * @param {{focus?: boolean}} how
+   */
   focusedByMouse(k, how) {
     if (how?.focus === undefined || this.uplot?.cursor.left === undefined) return;
     if (!this.mouseInside) return;
@@ -208,7 +227,7 @@ export class Plot {
    */
   listen(u, over) {
     let dragging = false;
-    const seek = (event) => {
+    const seek = (/** @type {MouseEvent} */ event) => {
       const left = event.clientX - over.getBoundingClientRect().left;
       this.plots.callbacks.seek(u.posToVal(left, "x"));
     };
@@ -233,6 +252,7 @@ export class Plot {
     this.writeValues();
   }
 
+  /** @param {number} t */
   setTime(t) {
     if (!this.uplot) return;
     this.timeLine.place(this.uplot, t);
@@ -252,7 +272,7 @@ export class Plot {
     const i = this.hovered ?? u.valToIdx(this.plots.now);
     const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
     this.note.textContent = [this.several, hover].filter(Boolean).join(" · ");
-    const value = (k) => fixed(u.data[k + 1][i] ?? null, digits);
+    const value = (/** @type {number} */ k) => fixed(u.data[k + 1][i] ?? null, digits);
     this.values.forEach((place, k) => (place.textContent = value(k)));
     if (this.values.length) return;
     const { spec, focused: k } = this;

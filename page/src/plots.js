@@ -3,6 +3,7 @@ import { Plot } from "./plot.js";
 import { specsOf } from "./specs.js";
 /** @import { Agent, Scene, Source } from "./types.d.ts" */
 
+/** @param {number} t */
 const niceSpan = (t) => {
   const ten = 10 ** Math.floor(Math.log10(t));
   return ten * ([1, 1.5, 2, 3, 5, 7.5].find((step) => step * ten >= t) ?? 10);
@@ -11,7 +12,9 @@ const niceSpan = (t) => {
 export class Plots {
   /**
    * @param {HTMLElement} column where they are put
-   * @param {{seek: (t: number) => void, highlight: (which: Agent | null, plot: Plot) => void}} callbacks
+   * @param {object} callbacks
+   * @param {(time: number) => void} callbacks.seek
+   * @param {(which: Agent | null, plot: Plot) => void} callbacks.highlight
    */
   constructor(column, callbacks) {
     this.column = column;
@@ -84,6 +87,7 @@ export class Plots {
     for (const plot of this.plots) plot.refresh();
   }
 
+  /** @param {number} t */
   setTime(t) {
     this.now = t;
     for (const plot of this.plots) plot.setTime(t);
@@ -93,6 +97,10 @@ export class Plots {
     for (const plot of this.plots) plot.writeValues();
   }
 
+  /**
+   * @param {Agent | null} which
+   * @param {Plot} [except]
+   */
   highlight(which, except) {
     for (const plot of this.plots) if (plot !== except) plot.highlight(which);
   }

@@ -114,6 +114,7 @@ export class Replay {
     /** @type {Instant} */
     const instant = { time, poses: this.poses(at), systems: {} };
     for (const system of this.meta.systems) {
+      /** @type {Instant["systems"][string]} */
       const own = (instant.systems[system.name] = {});
       for (const part of partsOf(system)) own[part] = this.row(`${system.name}/${part}`, at);
     }

@@ -9,7 +9,7 @@ import { Layout } from "./layout.js";
 import { THREE } from "./meshcat.js";
 import { colour, theme } from "./theme.js";
 import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
-/** @import { Instant, Numbers, Scene as Meta, Store, System } from "./types.d.ts" */
+/** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 
@@ -24,11 +24,11 @@ export class Scene {
     this.ghosts = new Ghosts(this);
     /** @type {Bars[]} */
     this.bars = [];
-    /** @type {any[]} */
+    /** @type {Three[]} */
     this.objects = []; // what has a pose
-    /** @type {Map<string, any[][]>} */
+    /** @type {Map<string, Three[][]>} */
     this.tinted = new Map(); // meshes of each agent that take its colour, by system
-    /** @type {any[]} */
+    /** @type {Three[]} */
     this.statics = []; // meshes of what never moves: a model's floor, walls
     /** @type {Meta | null} */
     this.meta = null;
@@ -63,7 +63,10 @@ export class Scene {
     this.viewer.set_dirty();
   }
 
-  /** One of meshcat's commands. */
+  /**
+   * One of meshcat's commands.
+   * @param {Uint8Array} bytes
+   */
   command(bytes) {
     this.viewer.handle_command_bytearray(bytes);
     this.stale = true;
@@ -117,8 +120,9 @@ export class Scene {
 
   staticMeshes() {
     const moving = new Set(this.objects);
+    /** @type {Three[]} */
     const found = [];
-    const collect = (object) => {
+    const collect = (/** @type {Three} */ object) => {
       if (moving.has(object)) return;
       if (object.isMesh && object.material.color) found.push(object);
       object.children.forEach(collect);
@@ -139,16 +143,20 @@ export class Scene {
   /** @param {System} system */
   tintedOf(system) {
     return system.tints.map((paths) => {
+      /** @type {Three[]} */
       const meshes = [];
       for (const path of paths)
-        nodeAt(this.viewer, path)?.object.traverse((object) => {
+        nodeAt(this.viewer, path)?.object.traverse((/** @type {Three} */ object) => {
           if (object.material?.color) meshes.push(object);
         });
       return meshes;
     });
   }
 
-  /** Where an item is, in MuJoCo's coordinates; null if there is none at this path. */
+  /**
+   * Where an item is, in MuJoCo's coordinates; null if there is none at this path.
+   * @param {string} path
+   */
   position(path) {
     const node = nodeAt(this.viewer, path);
     return node ? matrixIn(this.viewer, node.object).elements.slice(12, 15) : null;
@@ -230,7 +238,10 @@ export class Scene {
 
   // ---- pictures
 
-  /** Fewer pixels while a slow machine plays (without a graphics card); all of them at rest. */
+  /**
+   * Fewer pixels while a slow machine plays (without a graphics card); all of them at rest.
+   * @param {number} quality
+   */
   setQuality(quality) {
     if (quality === this.quality) return;
     this.quality = quality;

@@ -6,12 +6,16 @@ import { withUnit } from "./words.js";
 const PER_SECOND = 12; // values sent while a slider is dragged
 const ECHO = 400; // ms within which the simulation's answer must not pull it back under the hand
 
-/** Calls at most so many times per second; the last value is never dropped. */
+/**
+ * Calls at most so many times per second; the last value is never dropped.
+ * @param {number} perSecond
+ * @param {(value: number) => void} call
+ */
 const atMost = (perSecond, call) => {
   /** @type {number | null} */
   let waiting = null;
-  let latest;
-  return (value) => {
+  let latest = NaN;
+  return (/** @type {number} */ value) => {
     latest = value;
     waiting ??= setTimeout(() => {
       waiting = null;
@@ -78,13 +82,17 @@ export class Slider {
     return this.control.scale === "log" && this.control.min > 0;
   }
 
-  /** Where a value is along the slider, from 0 to 1. */
+  /**
+   * Where a value is along the slider, from 0 to 1.
+   * @param {number} value
+   */
   placeOf(value) {
     const { min, max } = this.control;
     if (this.logarithmic) return Math.log(value / min) / Math.log(max / min);
     return (value - min) / (max - min);
   }
 
+  /** @param {number} place */
   valueAt(place) {
     const { min, max } = this.control;
     return this.logarithmic ? min * (max / min) ** place : min + (max - min) * place;
@@ -98,7 +106,10 @@ export class Slider {
     if (!this.typing) this.number.value = String(Number(this.value.toPrecision(3)));
   }
 
-  /** The simulation's value, shown when no hand is on the slider. */
+  /**
+   * The simulation's value, shown when no hand is on the slider.
+   * @param {number} value
+   */
   follow(value) {
     this.value = value;
     clearTimeout(this.told);

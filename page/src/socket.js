@@ -1,11 +1,19 @@
 // The wire to a running simulation.
 import { decodePack, isPack } from "./pack.js";
+/** @import { Pack } from "./types.d.ts" */
 
 const AGAIN = 2000; // ms until the next try
 const FULL = 1013; // the server's code for a browser too many
 
 export class Socket {
-  /** callbacks: pack(pack), command(bytes), message(object), opened(), lost(why). */
+  /**
+   * @param {object} callbacks
+   * @param {() => void} callbacks.opened
+   * @param {(why: string) => void} callbacks.lost
+   * @param {(bytes: Uint8Array) => void} callbacks.command one of meshcat's
+   * @param {(pack: Pack) => void} callbacks.pack
+   * @param {(message: any) => void} callbacks.message from JSON
+   */
   constructor(callbacks) {
     this.callbacks = callbacks;
     this.socket = this.connect();
@@ -29,6 +37,7 @@ export class Socket {
     return socket;
   }
 
+  /** @param {string | ArrayBuffer} data */
   receive(data) {
     if (typeof data === "string") return this.callbacks.message(JSON.parse(data));
     const bytes = new Uint8Array(data);
@@ -43,6 +52,7 @@ export class Socket {
     return this.socket.readyState === WebSocket.OPEN;
   }
 
+  /** @param {object} message */
   send(message) {
     if (this.open) this.socket.send(JSON.stringify(message));
   }

@@ -110,7 +110,11 @@ const boundsOf = ({ bound, lower_bound, labels }) => {
     .sort((a, b) => a.value - b.value);
 };
 
-/** At most `most` of n indices, evenly chosen. */
+/**
+ * At most `most` of n indices, evenly chosen.
+ * @param {number} n
+ * @param {number} most
+ */
 const evenly = (n, most) => {
   if (n <= most) return [...Array(n).keys()];
   return [...Array(most).keys()].map((k) => Math.round((k * (n - 1)) / (most - 1)));
@@ -123,6 +127,7 @@ const evenly = (n, most) => {
 const thinned = (spec) => {
   const total = spec.columns.length;
   const chosen = evenly(total, MOST_LINES);
+  /** @type {<T>(values: T[]) => T[]} */
   const pick = (values) => chosen.map((k) => values[k]);
   return {
     ...spec,

@@ -14,6 +14,7 @@ const remembered = () => {
 /** @returns {"dark" | "light"} */
 export const theme = () => (document.documentElement.dataset.theme === "dark" ? "dark" : "light");
 
+/** @param {string} name */
 export const setTheme = (name, remember = true) => {
   document.documentElement.dataset.theme = name;
   colours.clear();
@@ -25,7 +26,10 @@ export const setTheme = (name, remember = true) => {
   }
 };
 
-/** A colour of the theme, by the name of its CSS variable. */
+/**
+ * A colour of the theme, by the name of its CSS variable.
+ * @param {string} name
+ */
 export const colour = (name) => {
   if (!colours.has(name)) {
     const style = getComputedStyle(document.documentElement);

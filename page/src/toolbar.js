@@ -78,13 +78,12 @@ export class Toolbar {
   // ---- what the camera follows
 
   fillFollow() {
-    const option = (value, text) => element("option", { value, text });
     const fleets = this.systems.filter((system) => system.drawn_as === "fleet");
     byId("follow-label").hidden = fleets.length === 0;
     byId("follow").replaceChildren(
-      option("fleet", "all"),
+      element("option", { value: "fleet", text: "all" }),
       ...fleets.flatMap(optionsOf),
-      option("none", "nothing"),
+      element("option", { value: "none", text: "nothing" }),
     );
   }
 

@@ -5,9 +5,12 @@ import { byId, element } from "./dom.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 
+/** @param {number | null} speed */
 const speedName = (speed) => (speed === null ? "max" : `×${speed}`);
 
 export class Transport {
+  speedKey = ""; // of what the menu of speeds has
+
   /** @param {Page} page which is driven */
   constructor(page) {
     this.play = byId("play");

@@ -21,7 +21,7 @@ export class Tuning {
     panel.hidden = controls.length + pushes.length === 0;
     panel.open = innerWidth > 1000 && innerHeight > 600; // else the view needs the room
     const rows = systems.map((system) => {
-      const own = (each) => each.system === system.name;
+      const own = (/** @type {{system: string}} */ each) => each.system === system.name;
       return this.row(system, controls.filter(own), pushes.filter(own));
     });
     body.replaceChildren(...rows.filter((row) => row !== null));
@@ -100,7 +100,7 @@ export class Tuning {
    * @param {string} whom in words
    */
   arrows({ system, axes, force }, agentOf, whom) {
-    const arrow = (axis, k, sign) => {
+    const arrow = (/** @type {string} */ axis, /** @type {number} */ k, sign = 1) => {
       const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
       return element("button", {
         type: "button",
@@ -115,7 +115,10 @@ export class Tuning {
     return axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow(axis, k, sign)));
   }
 
-  /** The simulation's values. */
+  /**
+   * The simulation's values.
+   * @param {Record<string, number>} values
+   */
   follow(values) {
     for (const [key, value] of Object.entries(values)) this.sliders.get(key)?.follow(value);
   }

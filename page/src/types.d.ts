@@ -1,6 +1,9 @@
 // What Python sends (gne_mj/view: scene.py, stage.py, replay.py, session.py, controls.py), and what
 // modules of the page expect of each other.
 
+/** An object of three.js, which comes inside meshcat's bundle and has no types. */
+export type Three = any;
+
 export type Numbers = Float64Array | Float32Array | Int32Array | Uint8Array;
 
 export interface Pack {

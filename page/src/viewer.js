@@ -1,6 +1,7 @@
 // meshcat's viewer, as this page needs it. Points are [x, y, z] in MuJoCo's coordinates (z up);
 // meshcat turns its whole scene, so three.js sees (x, z, -y).
 import { THREE, Viewer } from "./meshcat.js";
+/** @import { Three } from "./types.d.ts" */
 
 const OWN = ["Background", "Cameras", "Lights", "Grid", "Axes"]; // meshcat's own objects
 export const DEGREE = Math.PI / 180;
@@ -32,11 +33,15 @@ const folder = () => ({
   remove() {},
 });
 
-/** A viewer in a pane; `changed` is called whenever an object has come. */
+/**
+ * A viewer in a pane; `changed` is called whenever an object has come.
+ * @param {HTMLElement} pane
+ * @param {() => void} changed
+ */
 export const viewerIn = (pane, changed) => {
   const viewer = new Viewer(pane, false);
   const set = viewer.set_object.bind(viewer);
-  viewer.set_object = (path, object) => {
+  viewer.set_object = (/** @type {string[]} */ path, /** @type {Three} */ object) => {
     set(path, object);
     changed(); // one with a texture comes only when its image is loaded
   };
@@ -55,6 +60,7 @@ export const viewerIn = (pane, changed) => {
   return viewer;
 };
 
+/** @param {Three} scene */
 const light = (scene) => {
   const sky = new THREE.HemisphereLight(0xffffff, 0x8890a0, 0.72);
   sky.position.set(0, 0, 1);
@@ -63,20 +69,31 @@ const light = (scene) => {
   scene.add(sky, sun, sun.target);
 };
 
-/** The node of meshcat's tree at a path, or undefined. */
+/**
+ * The node of meshcat's tree at a path, or undefined.
+ * @param {Three} viewer
+ * @param {string} path
+ */
 export const nodeAt = (viewer, path) => {
   let node = viewer.scene_tree;
   for (const name of path.split("/").filter(Boolean)) node = node?.children[name];
   return node;
 };
 
-/** The tops of what was drawn by commands: [name, three.js's object]. */
+/**
+ * The tops of what was drawn by commands: [name, three.js's object].
+ * @param {Three} viewer
+ * @returns {[string, Three][]}
+ */
 export const drawnIn = (viewer) =>
   Object.entries(viewer.scene_tree.children)
     .filter(([name]) => !OWN.includes(name))
     .map(([name, node]) => [name, node.object]);
 
-/** Forgets all that was drawn by commands. */
+/**
+ * Forgets all that was drawn by commands.
+ * @param {Three} viewer
+ */
 export const empty = (viewer) => {
   for (const [name, object] of drawnIn(viewer)) {
     object.traverse(dispose); // meshcat itself forgets what is inside groups
@@ -84,6 +101,7 @@ export const empty = (viewer) => {
   }
 };
 
+/** @param {Three} object */
 const dispose = ({ geometry, material }) => {
   geometry?.dispose();
   for (const each of [material].flat()) {
@@ -92,7 +110,11 @@ const dispose = ({ geometry, material }) => {
   }
 };
 
-/** Place of an object in MuJoCo's coordinates: all its own transforms below meshcat's scene. */
+/**
+ * Place of an object in MuJoCo's coordinates: all its own transforms below meshcat's scene.
+ * @param {Three} viewer
+ * @param {Three} object
+ */
 export const matrixIn = (viewer, object) => {
   const matrix = new THREE.Matrix4();
   for (let at = object; at && at !== viewer.scene; at = at.parent) {

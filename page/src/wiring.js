@@ -11,8 +11,8 @@ export const wire = (page) => {
   const { scene, toolbar } = page;
   const actions = {
     " ": () => page.playPause(),
-    ArrowRight: ({ shiftKey }) => page.step(1, shiftKey),
-    ArrowLeft: ({ shiftKey }) => page.step(-1, shiftKey),
+    ArrowRight: (/** @type {KeyboardEvent} */ { shiftKey }) => page.step(1, shiftKey),
+    ArrowLeft: (/** @type {KeyboardEvent} */ { shiftKey }) => page.step(-1, shiftKey),
     r: () => page.restart(),
     f: () => scene.camera.fit(),
     l: () => toolbar.toggleLabels(),
@@ -47,20 +47,26 @@ const fold = () => press(byId("fold"), !document.body.classList.toggle("folded")
 
 /** What was pressed by mouse does not keep the keys: space is to play and pause. */
 const leaveKeys = () => {
-  const release = ({ target }) => {
-    const pressed = target.closest?.("button, summary, select");
+  /** @param {Event} event */
+  const pressedBy = ({ target }) =>
+    target instanceof Element
+      ? /** @type {HTMLElement | null} */ (target.closest("button, summary, select"))
+      : null;
+  /** @param {HTMLElement | null} pressed */
+  const release = (pressed) => {
     if (pressed && !pressed.matches(":focus-visible")) pressed.blur();
   };
-  document.addEventListener("change", release);
+  document.addEventListener("change", (event) => release(pressedBy(event)));
   document.addEventListener("click", (event) => {
-    if (!(/** @type {Element} */ (event.target).closest("select"))) release(event);
+    const pressed = pressedBy(event);
+    if (pressed?.tagName !== "SELECT") release(pressed);
   });
 };
 
 /** @param {Page} page */
 const wirePane = (page) => {
   const pane = byId("pane");
-  const near = (event) => {
+  const near = (/** @type {MouseEvent} */ event) => {
     const box = pane.getBoundingClientRect();
     return page.overlay.agentNear(event.clientX - box.left, event.clientY - box.top);
   };
@@ -75,7 +81,7 @@ const wirePane = (page) => {
 
 const wireDivider = () => {
   const divider = byId("divider");
-  const set = (width) => {
+  const set = (/** @type {number} */ width) => {
     const fitting = Math.round(Math.min(Math.max(width, NARROWEST), innerWidth - VIEW));
     document.documentElement.style.setProperty("--plots", `${fitting}px`);
     divider.setAttribute("aria-valuenow", String(fitting));

@@ -25,7 +25,10 @@ export const fixed = (value, decimals) =>
         .replace(/^-(?=[0.]*$)/, "")
         .replace("-", "−");
 
-/** Decimals that tell three digits of the greatest value, so that all texts stay as long. */
+/**
+ * Decimals that tell three digits of the greatest value, so that all texts stay as long.
+ * @param {number} greatest
+ */
 export const decimals = (greatest) =>
   greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
 

@@ -162,6 +162,9 @@
 
   // src/header.js
   var Header = class {
+    chipKey = "";
+    // of what the chips say
+    bannerText = "";
     /**
      * @param {Scene} meta
      * @param {Source} source
@@ -253,7 +256,7 @@
     "margin",
     "estimate"
   ];
-  var orNull = (value) => Number.isFinite(value) ? value : null;
+  var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
   var instantOfFrame = (pack, systems) => {
     const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
     for (const system of systems) {
@@ -348,9 +351,14 @@
         this.spacing = (this.time[this.time.length - 1] - this.time[0]) / this.time.length;
       }
     }
+    /**
+     * @param {string} name
+     * @param {number} k
+     */
     column(name, k) {
       return this.columns[name][k] || this.time.map(() => null);
     }
+    /** @param {string} name */
     greatest(name) {
       return this.peaks[name] || 0;
     }
@@ -418,7 +426,14 @@
   var AGAIN = 2e3;
   var FULL = 1013;
   var Socket = class {
-    /** callbacks: pack(pack), command(bytes), message(object), opened(), lost(why). */
+    /**
+     * @param {object} callbacks
+     * @param {() => void} callbacks.opened
+     * @param {(why: string) => void} callbacks.lost
+     * @param {(bytes: Uint8Array) => void} callbacks.command one of meshcat's
+     * @param {(pack: Pack) => void} callbacks.pack
+     * @param {(message: any) => void} callbacks.message from JSON
+     */
     constructor(callbacks) {
       this.callbacks = callbacks;
       this.socket = this.connect();
@@ -438,6 +453,7 @@
       };
       return socket;
     }
+    /** @param {string | ArrayBuffer} data */
     receive(data) {
       if (typeof data === "string") return this.callbacks.message(JSON.parse(data));
       const bytes = new Uint8Array(data);
@@ -449,6 +465,7 @@
     get open() {
       return this.socket.readyState === WebSocket.OPEN;
     }
+    /** @param {object} message */
     send(message) {
       if (this.open) this.socket.send(JSON.stringify(message));
     }
@@ -491,18 +508,21 @@
       return instant;
     }
     // ---- what the simulation is asked for
+    /** @param {object} message */
     send(message) {
       this.socket.send(message);
     }
     playPause() {
       this.send({ do: this.playing ? "pause" : "play" });
     }
+    /** @param {number} direction */
     step(direction) {
       if (direction > 0) this.send({ do: "step" });
     }
     restart() {
       this.send({ do: "restart" });
     }
+    /** @param {number | null} value */
     setSpeed(value) {
       this.send({ do: "speed", value });
     }
@@ -518,6 +538,7 @@
       this.connected = true;
       this.listener.opened();
     }
+    /** @param {string} why */
     lost(why) {
       this.connected = this.playing = false;
       this.listener.lost(why);
@@ -593,6 +614,7 @@
       this.time = 0;
       this.listener.resumed();
     }
+    /** @param {any} message */
     hear(message) {
       if (message.kind === "notice") notify(message.text, message.level);
       else if (message.kind === "controls") this.listener.controls(message.values);
@@ -663,11 +685,18 @@
     }
     /**
      * A slow steady flow, where messages have no instants.
+     * @param {System[]} systems
+     * @param {number} now
+     */
+    flow(systems, now) {
+      if (!this.pulsing) return;
+      for (const system of systems) if (system.message_period === null) this.flowIn(system, now);
+    }
+    /**
      * @param {System} system
      * @param {number} now
      */
-    flow(system, now) {
-      if (!this.pulsing || system.message_period !== null) return;
+    flowIn(system, now) {
       const every = Math.max(1, Math.ceil(system.links.length / MANY));
       for (let link = 0; link < system.links.length; link += every) {
         const key = `${system.name}/${link}`;
@@ -774,7 +803,12 @@
       context.arc(x, y, 3, 0, 2 * Math.PI);
       context.fill();
     }
-    /** A message that is lost. */
+    /**
+     * A message that is lost.
+     * @param {number} x
+     * @param {number} y
+     * @param {number} alpha
+     */
     cross(x, y, alpha) {
       const { context } = this;
       context.globalAlpha = alpha;
@@ -906,7 +940,8 @@
       const name = String(agent + 1);
       const out = share > 1;
       const digits = out && share < 1.1 ? 1 : 0;
-      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : out ? "outside" : "";
+      const used = out ? "outside" : "";
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
       for (const text of percent ? [percent, ""] : [""]) {
         const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
         if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
@@ -914,6 +949,11 @@
         return this.pill(box, { name, system, agent, out });
       }
     }
+    /**
+     * @param {{x: number, y: number}} p
+     * @param {string} name
+     * @param {string} text
+     */
     pillBox(p, name, text) {
       const context = this.context;
       context.font = "600 13px system-ui, sans-serif";
@@ -923,6 +963,10 @@
       const w = wide + more + 14;
       return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text };
     }
+    /**
+     * @param {Pill} box
+     * @param {{name: string, system: System, agent: number, out: boolean}} about
+     */
     pill(box, { name, system, agent, out }) {
       const context = this.context;
       const chosen = this.isHighlighted(system, agent);
@@ -943,7 +987,11 @@
       context.fillText(box.text, box.x + 14 + box.wide, box.y + 10.5);
       if (system.agents <= 14 && !out) this.swatch(box, agent);
     }
-    /** The look of the agent's line in the plots, under its label. */
+    /**
+     * The look of the agent's line in the plots, under its label.
+     * @param {Box} box
+     * @param {number} agent
+     */
     swatch(box, agent) {
       const context = this.context;
       const look = line(agent);
@@ -996,7 +1044,12 @@
       context.fillStyle = colour(colourOf(kind));
       this.haloed(text, left, p.y + shift);
     }
-    /** Text that can be read on anything. */
+    /**
+     * Text that can be read on anything.
+     * @param {string} text
+     * @param {number} x
+     * @param {number} y
+     */
     haloed(text, x, y) {
       const context = this.context;
       context.lineWidth = 3;
@@ -1005,7 +1058,11 @@
       context.strokeText(text, x, y);
       context.fillText(text, x, y);
     }
-    /** The agent whose label or head is near a point of the pane. */
+    /**
+     * The agent whose label or head is near a point of the pane.
+     * @param {number} x
+     * @param {number} y
+     */
     agentNear(x, y) {
       let best = null;
       let nearest = 26;
@@ -1190,6 +1247,10 @@
       if (!this.playing && this.time >= this.end) this.seek(this.start);
       this.playing = !this.playing;
     }
+    /**
+     * @param {number} direction
+     * @param {boolean} second
+     */
     step(direction, second) {
       this.playing = false;
       if (second) return this.seek(this.time + direction);
@@ -1201,10 +1262,14 @@
     restart() {
       this.seek(this.start);
     }
+    /** @param {number | null} speed */
     setSpeed(speed) {
       this.speed = speed;
     }
-    /** Shows a time; messages since the time before pass if it is a step on. */
+    /**
+     * Shows a time; messages since the time before pass if it is a step on.
+     * @param {number} time
+     */
     seek(time, withMessages = false) {
       const before = this.time;
       this.time = Math.min(Math.max(time, this.start), this.end);
@@ -5561,7 +5626,12 @@
       draw: [() => plot.setTime(plot.plots.now)],
       // the axis is another one only by now
       setCursor: [(u) => plot.hover(u)],
-      setSeries: [(_2, k, how) => plot.focusedByMouse(k, how)]
+      // uPlot's types do not know what it tells here
+      setSeries: [(_2, k, how) => plot.focusedByMouse(
+        k,
+        /** @type {any} */
+        how
+      )]
     }
   });
   var axesOf = (unit) => {
@@ -5738,13 +5808,19 @@
       this.readout = element("span", { class: "readout" });
       if (!this.values.length) this.chips.append(this.readout);
     }
-    /** Colour and dash of the k-th line. */
+    /**
+     * Colour and dash of the k-th line.
+     * @param {number} k
+     */
     lineOf(k) {
       const { spec } = this;
       if (spec.total === 1) return { colour: colour("text"), dash: [] };
       return line(spec.agents[k] ?? spec.columns[k]);
     }
-    /** The chip of the k-th line; returns where its value is written. */
+    /**
+     * The chip of the k-th line; returns where its value is written.
+     * @param {number} k
+     */
     addChip(k) {
       const { spec } = this;
       const value = element("span", { class: "chip-value" });
@@ -5772,6 +5848,7 @@
       const which = agent === null ? null : { system: this.spec.system.name, agent };
       this.plots.callbacks.highlight(which, this);
     }
+    /** @param {number | null} k */
     focus(k) {
       if (this.focused === k) return;
       this.focused = k;
@@ -5781,6 +5858,7 @@
         null
       ) : k + 1, { focus: true });
     }
+    /** @param {number | null} k */
     markChip(k) {
       this.values.forEach(
         (value, each) => value.parentElement?.classList.toggle("chosen", each === k)
@@ -5793,6 +5871,10 @@
       this.focus(k < 0 ? null : k);
     }
     // ---- uPlot
+    /**
+     * @param {number} width
+     * @param {number} height
+     */
     setSize(width, height) {
       if (this.uplot) return this.uplot.setSize({ width, height });
       this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
@@ -5813,6 +5895,10 @@
       this.hovered = left >= 0 ? idx : null;
       this.writeValues();
     }
+    /**
+     * @param {number | null} k
+     * @param {{focus?: boolean}} how
+     */
     focusedByMouse(k, how) {
       if (how?.focus === void 0 || this.uplot?.cursor.left === void 0) return;
       if (!this.mouseInside) return;
@@ -5851,6 +5937,7 @@
       this.uplot?.setData(this.data(), true);
       this.writeValues();
     }
+    /** @param {number} t */
     setTime(t) {
       if (!this.uplot) return;
       this.timeLine.place(this.uplot, t);
@@ -5969,7 +6056,9 @@
   var Plots = class {
     /**
      * @param {HTMLElement} column where they are put
-     * @param {{seek: (t: number) => void, highlight: (which: Agent | null, plot: Plot) => void}} callbacks
+     * @param {object} callbacks
+     * @param {(time: number) => void} callbacks.seek
+     * @param {(which: Agent | null, plot: Plot) => void} callbacks.highlight
      */
     constructor(column, callbacks) {
       this.column = column;
@@ -6032,6 +6121,7 @@
     refresh() {
       for (const plot of this.plots) plot.refresh();
     }
+    /** @param {number} t */
     setTime(t) {
       this.now = t;
       for (const plot of this.plots) plot.setTime(t);
@@ -6039,6 +6129,10 @@
     writeValues() {
       for (const plot of this.plots) plot.writeValues();
     }
+    /**
+     * @param {Agent | null} which
+     * @param {Plot} [except]
+     */
     highlight(which, except) {
       for (const plot of this.plots) if (plot !== except) plot.highlight(which);
     }
@@ -6081,7 +6175,7 @@
   };
   var Bars = class {
     /**
-     * @param {any} parent three.js's
+     * @param {Three} parent
      * @param {System} system
      */
     constructor(parent, system) {
@@ -6108,11 +6202,15 @@
         ({ bound, labels }) => labels.length === 1 && typeof bound?.[0] === "number"
       );
     }
-    /** Where the k-th bar stands, from the middle of the group. */
+    /**
+     * Where the k-th bar stands, from the middle of the group.
+     * @param {number} k
+     */
     spot(k) {
       const row = Math.floor(k / this.perRow);
       return [PITCH * (k % this.perRow + 0.5) - this.width / 2, PITCH * row];
     }
+    /** @param {number} k */
     addBar(k) {
       const bar = mesh(8947848);
       const [x, y] = this.spot(k);
@@ -6127,14 +6225,14 @@
      */
     addGauge(quantity, k) {
       const x = PITCH * this.perRow + GAUGE * (k + 0.5) + 0.1 - this.width / 2;
-      const place = (object, width, z) => {
+      const place = (object, width, z = 0) => {
         object.position.set(x, 0, z);
         object.scale.set(width, width, 1);
         this.group.add(object);
         return object;
       };
-      const bar = place(mesh(8947848), 0.7, 0);
-      const frame = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 0.72, 0);
+      const bar = place(mesh(8947848), 0.7);
+      const frame = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 0.72);
       setHeight(frame, TALL);
       const plate = place(mesh(16777215, 0.55), 1.15, TALL);
       setHeight(plate, 0.03);
@@ -6181,30 +6279,41 @@
       });
       for (const gauge of this.gauges) this.updateGauge(gauge, own);
     }
+    /**
+     * @param {ReturnType<Bars["addGauge"]>} gauge
+     * @param {Record<string, Numbers | undefined>} own arrays of the system
+     */
     updateGauge(gauge, own) {
       gauge.value = own[`quantity/${gauge.quantity.name}`]?.[0] ?? NaN;
       gauge.share = gauge.value / gauge.limit;
       setHeight(gauge.bar, TALL * (Number.isFinite(gauge.share) ? gauge.share : 0));
       gauge.bar.material.color.setRGB(...ramp(gauge.share));
     }
+    /** @param {number} value */
     heightOf(value) {
       return Number.isFinite(value) ? TALL * value / this.reference : 0;
     }
     /**
      * A point of the group, in MuJoCo's coordinates.
      * @returns {Point}
+     * @param {number} x
+     * @param {number} y
+     * @param {number} z
      */
     point(x, y, z) {
       const [ox, oy, oz] = this.origin;
       return [ox + this.scale * x, oy + this.scale * y, oz + 0.035 + this.scale * z];
     }
+    /** @param {number} k */
     top(k) {
       const [x, y] = this.spot(k);
       return this.point(x, y, Math.max(0, this.heightOf(this.values[k])));
     }
+    /** @param {number} agent */
     topOfAgent(agent) {
       return this.top(this.system.action.owner.indexOf(agent + 1));
     }
+    /** @param {number} k */
     foot(k) {
       const [x, y] = this.spot(k);
       return this.point(x, y - WIDTH2 / 2, 0);
@@ -6299,6 +6408,7 @@
     return geometry;
   };
   var Batches = class {
+    /** @param {Three} scene */
     constructor(scene) {
       this.scene = scene;
       this.group = new THREE.Group();
@@ -6316,7 +6426,10 @@
       }
       this.all = [];
     }
-    /** Batches the meshes below these objects, if they are many. */
+    /**
+     * Batches the meshes below these objects, if they are many.
+     * @param {Three[]} roots
+     */
     build(roots) {
       this.clear();
       const groups = /* @__PURE__ */ new Map();
@@ -6332,6 +6445,7 @@
       if (count <= FEW) return;
       for (const meshes of groups.values()) if (meshes.length > 4) this.add(meshes);
     }
+    /** @param {Three[]} meshes */
     add(meshes) {
       const material = meshes[0].material.clone();
       material.color.setRGB(1, 1, 1);
@@ -6354,6 +6468,7 @@
         instanced.instanceColor.needsUpdate = true;
       }
     }
+    /** @param {Three} mesh */
     visible(mesh2) {
       for (let at = mesh2; at; at = at.parent) if (!at.visible) return false;
       return true;
@@ -6447,7 +6562,7 @@
   // src/camera.js
   var Camera = class {
     /**
-     * @param {any} viewer meshcat's
+     * @param {Three} viewer meshcat's
      * @param {HTMLElement} pane
      * @param {Layout} layout
      */
@@ -6481,7 +6596,11 @@
       }
       return this.layout.middle();
     }
-    /** Distance from the target at which all points are in view from a direction. */
+    /**
+     * Distance from the target at which all points are in view from a direction.
+     * @param {Three} direction
+     * @param {Three} target
+     */
     fitDistance(direction, target) {
       const view = new THREE.Matrix4().lookAt(
         direction,
@@ -6529,6 +6648,11 @@
       this.followPoint = target;
       this.placed = true;
     }
+    /**
+     * @param {Three} target
+     * @param {Three} direction
+     * @param {number} distance
+     */
     look(target, direction, distance) {
       this.controls.target.copy(target);
       this.lens.position.copy(target).addScaledVector(direction, distance);
@@ -6567,7 +6691,11 @@
       this.follow = follow;
       this.fit();
     }
-    /** Turns about the target (degrees) and zooms (factor), for the keyboard. */
+    /**
+     * Turns about the target (degrees) and zooms (factor), for the keyboard.
+     * @param {number} turn
+     * @param {number} factor
+     */
     nudge(turn, factor) {
       const { direction, distance } = this.arm();
       direction.applyAxisAngle(new THREE.Vector3(0, 1, 0), turn * DEGREE);
@@ -6639,13 +6767,22 @@
       const bars2 = this.scene.layout.barsOf(system);
       system.action.owner.forEach((owner, k) => {
         if (owner === holder + 1) return;
-        if (!this.copies.has(k)) this.copies.set(k, [this.outline()]);
-        const [outline] = this.copies.get(k);
+        const [outline] = this.copiesOf(k, () => [this.outline()]);
         const [x, y] = bars2.spot(k);
         outline.position.set(...bars2.point(x, y, 0));
         const height = bars2.scale * bars2.heightOf(row[k]);
         outline.scale.set(0.5 * bars2.scale, 0.5 * bars2.scale, height || 1e-4);
       });
+    }
+    /**
+     * What stands for an agent or a bar, made when it is first needed.
+     * @param {number} k
+     * @param {() => Three[]} make
+     */
+    copiesOf(k, make) {
+      const copies = this.copies.get(k) ?? make();
+      this.copies.set(k, copies);
+      return copies;
     }
     outline() {
       const material = new THREE.LineBasicMaterial({ color: colour("ghost") });
@@ -6664,12 +6801,8 @@
         if (agent === holder) continue;
         const ahead = this.ahead(system, agent, row, action);
         const sources = this.scene.tinted.get(system.name)?.[agent] ?? [];
-        if (!this.copies.has(agent))
-          this.copies.set(
-            agent,
-            sources.map((mesh2) => this.copy(mesh2))
-          );
-        this.copies.get(agent).forEach((copy2, k) => {
+        const copies = this.copiesOf(agent, () => sources.map((mesh2) => this.copy(mesh2)));
+        copies.forEach((copy2, k) => {
           copy2.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
           ahead.forEach((v, axis) => copy2.matrix.elements[12 + axis] += v);
           copy2.visible = Math.hypot(...ahead) > 0.01;
@@ -6691,6 +6824,7 @@
       });
       return ahead;
     }
+    /** @param {Three} mesh */
     copy(mesh2) {
       const material = new THREE.MeshPhongMaterial({
         color: colour("ghost"),
@@ -6733,6 +6867,7 @@
     gl_FragColor = vec4(colour, strength * alpha * fade);
   }`;
   var Ground = class {
+    /** @param {Three} scene */
     constructor(scene) {
       const uniform = (value) => ({ value });
       this.uniforms = {
@@ -6761,7 +6896,13 @@
       scene.add(this.mesh);
       this.major = 10;
     }
-    /** Follows the point that the camera looks at, in whole squares, so that lines stand still. */
+    /**
+     * Follows the point that the camera looks at, in whole squares, so that lines stand still.
+     * @param {number[]} target
+     * @param {number} distance
+     * @param {number} floor
+     * @param {number | null} lane
+     */
     place(target, distance, floor2, lane) {
       const u = this.uniforms;
       const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
@@ -6950,7 +7091,10 @@
     dirty() {
       this.viewer.set_dirty();
     }
-    /** One of meshcat's commands. */
+    /**
+     * One of meshcat's commands.
+     * @param {Uint8Array} bytes
+     */
     command(bytes) {
       this.viewer.handle_command_bytearray(bytes);
       this.stale = true;
@@ -7026,7 +7170,10 @@
         return meshes;
       });
     }
-    /** Where an item is, in MuJoCo's coordinates; null if there is none at this path. */
+    /**
+     * Where an item is, in MuJoCo's coordinates; null if there is none at this path.
+     * @param {string} path
+     */
     position(path) {
       const node = nodeAt(this.viewer, path);
       return node ? matrixIn(this.viewer, node.object).elements.slice(12, 15) : null;
@@ -7100,7 +7247,10 @@
       }
     }
     // ---- pictures
-    /** Fewer pixels while a slow machine plays (without a graphics card); all of them at rest. */
+    /**
+     * Fewer pixels while a slow machine plays (without a graphics card); all of them at rest.
+     * @param {number} quality
+     */
     setQuality(quality) {
       if (quality === this.quality) return;
       this.quality = quality;
@@ -7173,13 +7323,12 @@
     }
     // ---- what the camera follows
     fillFollow() {
-      const option = (value, text) => element("option", { value, text });
       const fleets = this.systems.filter((system) => system.drawn_as === "fleet");
       byId("follow-label").hidden = fleets.length === 0;
       byId("follow").replaceChildren(
-        option("fleet", "all"),
+        element("option", { value: "fleet", text: "all" }),
         ...fleets.flatMap(optionsOf2),
-        option("none", "nothing")
+        element("option", { value: "none", text: "nothing" })
       );
     }
     /** @param {string} value of an option */
@@ -7250,6 +7399,8 @@
   var SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
   var speedName = (speed) => speed === null ? "max" : `×${speed}`;
   var Transport = class {
+    speedKey = "";
+    // of what the menu of speeds has
     /** @param {Page} page which is driven */
     constructor(page) {
       this.play = byId("play");
@@ -7330,7 +7481,7 @@
   var ECHO = 400;
   var atMost = (perSecond, call) => {
     let waiting = null;
-    let latest;
+    let latest = NaN;
     return (value) => {
       latest = value;
       waiting ??= setTimeout(() => {
@@ -7393,12 +7544,16 @@
     get logarithmic() {
       return this.control.scale === "log" && this.control.min > 0;
     }
-    /** Where a value is along the slider, from 0 to 1. */
+    /**
+     * Where a value is along the slider, from 0 to 1.
+     * @param {number} value
+     */
     placeOf(value) {
       const { min: min2, max: max2 } = this.control;
       if (this.logarithmic) return Math.log(value / min2) / Math.log(max2 / min2);
       return (value - min2) / (max2 - min2);
     }
+    /** @param {number} place */
     valueAt(place) {
       const { min: min2, max: max2 } = this.control;
       return this.logarithmic ? min2 * (max2 / min2) ** place : min2 + (max2 - min2) * place;
@@ -7410,7 +7565,10 @@
       this.range.style.setProperty("--done", `${100 * place}%`);
       if (!this.typing) this.number.value = String(Number(this.value.toPrecision(3)));
     }
-    /** The simulation's value, shown when no hand is on the slider. */
+    /**
+     * The simulation's value, shown when no hand is on the slider.
+     * @param {number} value
+     */
     follow(value) {
       this.value = value;
       clearTimeout(this.told);
@@ -7508,7 +7666,7 @@
      * @param {string} whom in words
      */
     arrows({ system, axes, force }, agentOf, whom) {
-      const arrow = (axis, k, sign2) => {
+      const arrow = (axis, k, sign2 = 1) => {
         const what = `push ${whom} ${sign2 < 0 ? "against" : "along"} ${axis || "its axis"}`;
         return element("button", {
           type: "button",
@@ -7521,7 +7679,10 @@
       };
       return axes.flatMap((axis, k) => [-1, 1].map((sign2) => arrow(axis, k, sign2)));
     }
-    /** The simulation's values. */
+    /**
+     * The simulation's values.
+     * @param {Record<string, number>} values
+     */
     follow(values) {
       for (const [key, value] of Object.entries(values)) this.sliders.get(key)?.follow(value);
     }
@@ -7589,14 +7750,17 @@
   };
   var fold = () => press(byId("fold"), !document.body.classList.toggle("folded"));
   var leaveKeys = () => {
-    const release = ({ target }) => {
-      const pressed = target.closest?.("button, summary, select");
+    const pressedBy = ({ target }) => target instanceof Element ? (
+      /** @type {HTMLElement | null} */
+      target.closest("button, summary, select")
+    ) : null;
+    const release = (pressed) => {
       if (pressed && !pressed.matches(":focus-visible")) pressed.blur();
     };
-    document.addEventListener("change", release);
+    document.addEventListener("change", (event) => release(pressedBy(event)));
     document.addEventListener("click", (event) => {
-      if (!/** @type {Element} */
-      event.target.closest("select")) release(event);
+      const pressed = pressedBy(event);
+      if (pressed?.tagName !== "SELECT") release(pressed);
     });
   };
   var wirePane = (page) => {
@@ -7684,9 +7848,13 @@
         /** @type {Meta} */
         pack.meta
       );
+      const commands = (
+        /** @type {Uint8Array} */
+        pack.arrays.commands?.data
+      );
       let at = 0;
       for (const length of lengths) {
-        this.scene.command(pack.arrays.commands.data.slice(at, at + length));
+        this.scene.command(commands.slice(at, at + length));
         at += length;
       }
       const playback = new Playback(pack, { messages: this.messages });
@@ -7718,6 +7886,7 @@
       this.meta = this.instant = null;
       byId("lost").hidden = true;
     }
+    /** @param {string} why */
     lost(why) {
       byId("lost").hidden = false;
       byId("lost-text").textContent = why;
@@ -7780,6 +7949,10 @@
       this.source?.playPause();
       this.slowDue = 0;
     }
+    /**
+     * @param {number} direction
+     * @param {boolean} second
+     */
     step(direction, second) {
       this.source?.step(direction, second);
     }
@@ -7787,10 +7960,12 @@
     restart() {
       (this.live ?? this.playback)?.restart();
     }
+    /** @param {number | null} speed */
     setSpeed(speed) {
       this.source?.setSpeed(speed);
       this.slowDue = 0;
     }
+    /** @param {number} time */
     seek(time) {
       this.source?.seek(time);
     }
@@ -7822,10 +7997,14 @@
       this.watchPace(passed, source?.playing ?? false);
       source?.advance(passed);
       if (!this.meta || !source) return;
-      if (source.playing) for (const system of this.meta.systems) this.overlay.links.flow(system, now);
+      if (source.playing) this.overlay.links.flow(this.meta.systems, now);
       this.draw(source, now);
       if (now >= this.slowDue) this.slow(this.meta, source, now);
     }
+    /**
+     * @param {number} passed s
+     * @param {boolean} playing
+     */
     watchPace(passed, playing) {
       if (!playing) {
         this.usual = PICTURE;
