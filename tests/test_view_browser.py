@@ -107,6 +107,15 @@ def test_replayed_robots_are_where_the_trajectory_has_them(page, recorded, serve
     quiet(recorded, *origins(served))
 
 
+def test_the_page_defines_one_name(page, served):
+    names = "Object.getOwnPropertyNames(window)"
+    page.goto(served.url + "uPlot-LICENSE.txt")  # of the same origin, without scripts
+    page.add_script_tag(url="meshcat.min.js")
+    before = set(page.evaluate(names))
+    opened(page, served.url)
+    assert set(page.evaluate(names)) - before == {"gne"}
+
+
 def test_the_slider_drives_scene_and_plots(page, served, paper):
     opened(page, served.url)
     page.locator("#time-slider").evaluate(
@@ -298,13 +307,27 @@ def live_wait(condition, patience=10.0):
     raise AssertionError("it never came true")
 
 
+LOSSY = {
+    "controller": {"information": "partial", "graph": "ring", "mode": "sampled"},
+    "simulation.control_period": 0.02,
+    "faults": [{"type": "message-loss", "probability": 0.5}],
+}
+
+
+def test_messages_of_a_replay_run_along_their_links(page, recorded):
+    server = serve(gne_mj.run("velocity-sync", {**LOSSY, "simulation.duration": 2.0}))
+    try:
+        opened(page, server.url)
+        assert page.evaluate("window.gne.state().pulses") == 0
+        page.keyboard.press("ArrowRight")
+        until(page, "window.gne.state().pulses > 0")
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
+
+
 def test_messages_run_along_their_links_and_can_be_switched_off(page, recorded):
-    changes = {
-        "controller": {"information": "partial", "graph": "ring", "mode": "sampled"},
-        "simulation.control_period": 0.02,
-        "faults": [{"type": "message-loss", "probability": 0.5}],
-    }
-    with session(changes=changes) as live:
+    with session(changes=LOSSY) as live:
         opened(page, live.server.url)
         until(page, "window.gne.state().pulses > 0")
         page.keyboard.press("c")

@@ -301,11 +301,32 @@ def test_the_file_has_all_inside_and_asks_for_nothing(tmp_path):
     assert "&lt;b&gt;&amp; co&lt;/b&gt;" in text
     assert "connect-src" not in text.split("</head>")[0]  # so that default-src 'none' holds for it
     assert "default-src 'none'" in text
-    assert ' src="' not in text.replace(page_file("vendor/meshcat.min.js").decode(), "")
+    assert ' src="' not in text.replace(page_file("meshcat.min.js").decode(), "")
     assert re.findall("<link [^>]*>", text) == ['<link rel="icon" href="data:,">']
     for licence in ("Robin Deits", "Leon Sorokin"):
         assert licence in text
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_page_is_one_script_and_one_style_besides_meshcat():
+    page = page_file("index.html").decode()
+    assert re.findall('<script[^>]* src="([^"]*)"', page) == ["meshcat.min.js", "page.js"]
+    assert re.findall('<link rel="stylesheet" href="([^"]*)"', page) == ["page.css"]
+    assert not re.search(r"@import|url\(", page_file("page.css").decode())
+    script = page_file("page.js").decode()
+    inside = re.fullmatch(r'//.*?\n"use strict";\n\(\(\) => \{\n(.*)\}\)\(\);\n', script, re.S)
+    assert inside
+    assert not re.search(r"^[^ \n]", inside[1], re.M)  # all of it is within that function
+    assert not re.search(r"\bimport\(", script)
+
+
+def test_every_element_that_scripts_look_for_is_in_the_page():
+    types = (Path(__file__).parents[1] / "page" / "src" / "types.d.ts").read_text()
+    elements = types.partition("export interface Elements {")[2].partition("}")[0]
+    looked_for = set(re.findall(r'^  "?([\w-]+)"?:', elements, re.M))
+    there = set(re.findall(r' id="([\w-]+)"', page_file("index.html").decode()))
+    assert looked_for - there == {"replay"}  # which only a file from disk has
+    assert len(looked_for) > 30
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):

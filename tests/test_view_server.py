@@ -89,7 +89,7 @@ def test_the_page_its_files_and_the_pack_are_served(static):
     assert page.headers["X-Content-Type-Options"] == "nosniff"
     assert get(static.url + "replay").body == b"the pack"
     assert get(static.url + "page.js").headers["Content-Type"].startswith("text/javascript")
-    assert b"MeshCat" in get(static.url + "vendor/meshcat.min.js").body
+    assert b"MeshCat" in get(static.url + "meshcat.min.js").body
 
 
 @pytest.mark.parametrize(

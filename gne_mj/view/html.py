@@ -11,8 +11,7 @@ from gne_mj.files import written
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.replay import replay_pack
 
-# Names the page uses for files that are not its own
-_BUNDLE = "vendor/meshcat.min.js"
+_MESHCAT = "meshcat.min.js"  # the page's name for the bundle of the meshcat package
 _SETTINGS = '<script id="settings" type="application/json">{}</script>'
 # A page from disk has no business on any network.
 _POLICY = (
@@ -71,11 +70,11 @@ def page_file(name: str) -> bytes:
     Raises:
         FileNotFoundError: there is no such file.
     """
-    if not re.fullmatch(r"(vendor/)?[\w-]+(\.[\w-]+)+", name, flags=re.ASCII):
+    if not re.fullmatch(r"[\w-]+(\.[\w-]+)+", name, flags=re.ASCII):
         raise FileNotFoundError(name)
-    if name == _BUNDLE:
+    if name == _MESHCAT:
         return (_meshcat_viewer() / "dist" / "main.min.js").read_bytes()
-    return files("gne_mj.view").joinpath("page", *name.split("/")).read_bytes()
+    return files("gne_mj.view").joinpath("page", name).read_bytes()
 
 
 def _begin(mode: str, title: str) -> str:
@@ -102,7 +101,7 @@ def _licences() -> str:
     texts = [
         "meshcat\n" + (viewer / "LICENSE").read_text(encoding="utf-8"),
         (viewer / "dist" / "main.min.js.LICENSE.txt").read_text(encoding="utf-8"),
-        "uPlot\n" + page_file("vendor/uPlot-LICENSE.txt").decode("utf-8"),
+        "uPlot\n" + page_file("uPlot-LICENSE.txt").decode("utf-8"),
     ]
     return "\n".join(texts).replace("--", "- -")
 

@@ -1,331 +1,1257 @@
+// Built by scripts/page from page/src
 "use strict";
-// The page: puts data, scene, plots and controls together; live, or as a replay.
 (() => {
-  const SLOW = 100; // ms between refreshes of texts and, live, of plots
+  // src/dom.js
+  var byId = (id) => (
+    /** @type {Elements[Id]} */
+    document.getElementById(id)
+  );
+  var element = (tag, attributes = {}, ...children) => {
+    const made = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) {
+      if (value === void 0 || value === null || value === false) continue;
+      if (name === "text") made.textContent = value;
+      else if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+      else made.setAttribute(name, value === true ? "" : value);
+    }
+    made.append(...children.filter((child) => child !== null && child !== void 0));
+    return made;
+  };
+  var press = (button, pressed) => button.setAttribute("aria-pressed", String(pressed));
 
-  class Page {
-    constructor() {
-      this.settings = JSON.parse(GNE.byId("settings").textContent || "{}");
-      this.mode = this.settings.mode || "served";
-      this.time = 0;
-      this.speed = 1;
-      this.playing = false;
+  // src/theme.js
+  var KEY = "gne_mj.theme";
+  var colours = /* @__PURE__ */ new Map();
+  var remembered = () => {
+    try {
+      return localStorage.getItem(KEY);
+    } catch {
+      return null;
+    }
+  };
+  var theme = () => document.documentElement.dataset.theme === "dark" ? "dark" : "light";
+  var setTheme = (name, remember = true) => {
+    document.documentElement.dataset.theme = name;
+    colours.clear();
+    if (!remember) return;
+    try {
+      localStorage.setItem(KEY, name);
+    } catch {
+    }
+  };
+  var colour = (name) => {
+    if (!colours.has(name)) {
+      const style = getComputedStyle(document.documentElement);
+      colours.set(name, style.getPropertyValue(`--${name}`).trim());
+    }
+    return colours.get(name);
+  };
+  var still = matchMedia("(prefers-reduced-motion: reduce)");
+  var reducedMotion = () => still.matches;
+  var light = matchMedia("(prefers-color-scheme: light)").matches;
+  setTheme(remembered() || (light ? "light" : "dark"), false);
+
+  // src/colours.js
+  var RAMP = [
+    [0, [0.16, 0.38, 0.83]],
+    [0.4, [0.36, 0.66, 0.9]],
+    [0.56, [0.66, 0.84, 0.83]],
+    [0.72, [0.97, 0.85, 0.3]],
+    [0.9, [0.96, 0.55, 0.12]],
+    [1, [0.88, 0.27, 0.08]]
+  ];
+  var OUTSIDE = [0.86, 0.02, 0.16];
+  var UNKNOWN = [0.55, 0.58, 0.62];
+  var ramp = (share) => {
+    if (share === null || Number.isNaN(share)) return UNKNOWN;
+    if (share > 1) return OUTSIDE;
+    const above = RAMP.findIndex(([stop]) => share <= stop);
+    if (above <= 0) return RAMP[0][1];
+    const [[from, a], [to, b]] = [RAMP[above - 1], RAMP[above]];
+    return a.map((v, k) => v + (b[k] - v) * (share - from) / (to - from));
+  };
+  var css = (rgb) => `rgb(${rgb.map((v) => Math.round(255 * v)).join(", ")})`;
+  var rampGradient = () => `linear-gradient(to right, ${RAMP.map(([s, c]) => `${css(c)} ${100 * s}%`).join(", ")})`;
+  var LINES = {
+    dark: ["#56b4e9", "#e69f00", "#2fc18c", "#f0e442", "#e87c3a", "#d98cbb", "#f2f2f2", "#5a9bff"],
+    light: ["#0072b2", "#c07c00", "#00805c", "#8c7a00", "#d55e00", "#a8518a", "#111111", "#2f62c9"]
+  };
+  var DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
+  var line = (k) => {
+    const colours2 = LINES[theme()];
+    return {
+      colour: colours2[k % colours2.length],
+      dash: DASHES[Math.floor(k / colours2.length) % DASHES.length]
+    };
+  };
+
+  // src/handle.js
+  var handleOf = (page) => ({
+    /** Whether something has been drawn. */
+    get ready() {
+      return page.drawn;
+    },
+    /** Simulated time that is shown, s. */
+    time: () => page.source?.time ?? 0,
+    /** Shows a time of a replay, at once. */
+    seek(time) {
+      page.seek(time);
+      if (page.source) page.draw(page.source, performance.now());
+    },
+    /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
+    position: (path) => page.scene.position(path),
+    /** CSS colour of an agent (from 0) as it is drawn. */
+    tint: (agent, system) => tintOf(page, agent, system),
+    /** What is plotted. */
+    get plots() {
+      return page.plots.describe();
+    },
+    get framesReceived() {
+      return page.live?.framesReceived ?? 0;
+    },
+    /** What the page is doing. */
+    state: () => stateOf(page)
+  });
+  var tintOf = ({ scene }, agent, name) => {
+    const bars2 = scene.bars.find(({ system }) => system.name === name);
+    const drawn = bars2 ? bars2.bars[bars2.system.action.owner.indexOf(agent + 1)] : scene.tinted.get(name)?.[agent]?.[0];
+    return drawn ? css(drawn.material.color.toArray()) : null;
+  };
+  var stateOf = ({ meta, mode: mode2, live, overlay, playback, scene, source, tuning }) => ({
+    mode: mode2,
+    replaying: playback !== null,
+    connected: live?.connected ?? false,
+    theme: theme(),
+    controls: [...tuning?.sliders.keys() ?? []],
+    pulses: overlay.links.pulses.length,
+    following: scene.camera.following,
+    follow: scene.camera.follow,
+    ghosts: scene.ghosts.shown,
+    ...meta && source && shownOf(meta, source)
+  });
+  var shownOf = (meta, source) => ({
+    time: source.time,
+    playing: source.playing,
+    speed: source.speed,
+    exits: source.exits,
+    interventions: source.interventions,
+    systems: Object.fromEntries(meta.systems.map((each) => [each.name, source.stateOf(each)]))
+  });
+
+  // src/words.js
+  var number = (value, digits = 3) => {
+    if (value === null || value === void 0 || Number.isNaN(value)) return "–";
+    const size = Math.abs(value);
+    let text;
+    if (size !== 0 && (size < 1e-3 || size >= 1e5)) text = value.toExponential(digits - 1);
+    else text = String(Number(value.toPrecision(digits)));
+    return text.replace("-", "−").replace("e+", "e");
+  };
+  var fixed = (value, decimals2) => value === null || Number.isNaN(value) ? "–" : value.toFixed(decimals2).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+  var decimals = (greatest) => greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
+  var withUnit = (value, unit) => number(value) + (unit ? ` ${unit}` : "");
+  var SYMBOLS = { ok: "✓", going: "▸", bad: "⚠", unknown: "?" };
+  var status = (word) => {
+    let kind = "unknown";
+    if (/^(converged|completed)$/.test(word)) kind = "ok";
+    else if (/left|diverged|too_small/.test(word)) kind = "bad";
+    else if (word === "running") kind = "going";
+    return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
+  };
+  var outside = (word) => status(word).kind === "bad";
+
+  // src/header.js
+  var Header = class {
+    chipKey = "";
+    // of what the chips say
+    bannerText = "";
+    /**
+     * @param {Scene} meta
+     * @param {Source} source
+     */
+    show(meta, source) {
+      byId("time").textContent = source.time.toFixed(2);
+      byId("duration").textContent = number(meta.duration, 6);
+      byId("pace").textContent = source.pace;
+      this.showChips(meta.systems, source);
+      this.showBanner(meta.systems, source);
+    }
+    /**
+     * @param {System[]} systems
+     * @param {Source} source
+     */
+    showChips(systems, source) {
+      const key = JSON.stringify(systems.map((system) => source.stateOf(system)));
+      if (key === this.chipKey) return;
+      this.chipKey = key;
+      const of = source.seekable ? "the run's least margin" : "least margin so far";
+      const chips = systems.map((system) => chipOf(system, source.stateOf(system), of));
+      byId("chips").replaceChildren(...chips);
+      announce(systems, source);
+    }
+    /**
+     * @param {System[]} systems
+     * @param {Source} source
+     */
+    showBanner(systems, source) {
+      const out = systems.filter((system) => outside(source.stateOf(system).status));
+      const text = out.map((system) => exitText(system, source)).join("   ");
+      byId("banner-show").hidden = !source.seekable || !(out[0]?.name in source.exits);
+      if (text === this.bannerText) return;
+      this.bannerText = text;
+      byId("banner").hidden = !text;
+      byId("banner-text").textContent = text;
+    }
+  };
+  var warn = (text) => {
+    byId("banner-text").textContent = text;
+    byId("banner").hidden = false;
+    byId("waiting").hidden = true;
+  };
+  var announce = (systems, source) => {
+    const words = systems.map(
+      (system) => `${system.name}: ${status(source.stateOf(system).status).words}`
+    );
+    const text = words.join(", ");
+    const place = byId("announcement");
+    if (place.textContent !== text) place.textContent = text;
+  };
+  var chipOf = (system, state, of) => {
+    const { kind, symbol, words } = status(state.status);
+    const about = [
+      system.game,
+      `${system.agents} ${system.agent_name}s`,
+      `information: ${system.information}`,
+      `mode: ${system.mode}`,
+      `engine: ${system.engine}`
+    ];
+    return element(
+      "div",
+      {
+        class: `chip ${kind}`,
+        title: [state.message, about.join(" · ")].filter(Boolean).join("\n")
+      },
+      element("span", { class: "sign", "aria-hidden": true, text: symbol }),
+      element("span", {}, element("b", { text: system.name }), `: ${words}`),
+      element("span", { class: "margin", text: marginText(state, of) })
+    );
+  };
+  var marginText = ({ margin, margin_name: name, margin_time: time }, of) => {
+    if (typeof margin !== "number") return "no margin known";
+    const when = typeof time === "number" ? ` at ${fixed(time, time < 10 ? 2 : 1)} s` : "";
+    return `${of} ${number(margin)}${name ? ` · ${name}` : ""}${when}`;
+  };
+  var exitText = (system, source) => {
+    const { status: word, message } = source.stateOf(system);
+    const at = source.exits[system.name];
+    const when = at === void 0 ? "" : ` at ${number(at, 4)} s`;
+    return `${system.name}: ${status(word).words}${when}${message ? `: ${message}` : ""}`;
+  };
+
+  // src/instant.js
+  var partsOf = (system) => [
+    "action",
+    ...system.quantities.map((quantity) => `quantity/${quantity.name}`),
+    "share",
+    "margin",
+    "estimate"
+  ];
+  var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
+  var instantOfFrame = (pack, systems) => {
+    const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
+    for (const system of systems) {
+      const own = instant.systems[system.name] = {};
+      for (const part of [...partsOf(system), "messages"])
+        own[part] = pack.arrays[`${system.name}/${part}`]?.data;
+    }
+    return instant;
+  };
+
+  // src/history.js
+  var History = class {
+    /**
+     * @param {System[]} systems
+     * @param {number} most samples
+     */
+    constructor(systems, most = 3e3) {
+      this.most = most;
+      this.names = systems.flatMap(
+        (system) => partsOf(system).filter((part) => part !== "estimate").map((part) => `${system.name}/${part}`)
+      );
+      this.time = [];
+      this.columns = {};
+      this.spacing = 0;
+      this.peaks = {};
+      this.clear();
+    }
+    clear() {
+      this.time = [];
+      this.columns = Object.fromEntries(this.names.map((name) => [name, []]));
+      this.spacing = 0;
+      this.peaks = {};
+    }
+    /** @param {Pack} pack of all that was before */
+    fill(pack) {
+      this.clear();
+      const time = pack.arrays.time.data;
+      for (const name of this.names) {
+        const data = pack.arrays[name]?.data;
+        if (!data || time.length === 0) continue;
+        const width = data.length / time.length;
+        this.columns[name] = [...Array(width).keys()].map(
+          (k) => Array.from(time, (_2, i) => orNull(data[i * width + k]))
+        );
+        this.notePeak(name, data);
+      }
+      this.time = Array.from(time);
+      this.thin();
+    }
+    /**
+     * @param {string} name
+     * @param {Numbers | number[]} values
+     */
+    notePeak(name, values) {
+      let most = this.peaks[name] || 0;
+      for (const value of values) if (Math.abs(value) > most) most = Math.abs(value);
+      this.peaks[name] = most;
+    }
+    /**
+     * Takes an instant if it is new; one from the past means that the run began again.
+     * @param {Instant} instant
+     */
+    push(instant) {
+      const last = this.time[this.time.length - 1];
+      if (instant.time < last) this.clear();
+      else if (instant.time < last + this.spacing || instant.time === last) return;
+      for (const name of this.names) {
+        const cut = name.indexOf("/");
+        const values = instant.systems[name.slice(0, cut)][name.slice(cut + 1)];
+        this.append(name, values || []);
+      }
+      this.time.push(instant.time);
+      if (this.time.length > this.most) this.thin();
+    }
+    /**
+     * @param {string} name
+     * @param {Numbers | number[]} values
+     */
+    append(name, values) {
+      const columns = this.columns[name];
+      for (let k = 0; k < Math.max(values.length, columns.length); k++) {
+        columns[k] ??= Array(this.time.length).fill(null);
+        columns[k].push(orNull(values[k]));
+      }
+      this.notePeak(name, values);
+    }
+    thin() {
+      while (this.time.length > this.most) {
+        const keep = (values) => values.filter((_2, i) => i % 2 === 0);
+        this.time = keep(this.time);
+        for (const name of this.names) this.columns[name] = this.columns[name].map(keep);
+        this.spacing = (this.time[this.time.length - 1] - this.time[0]) / this.time.length;
+      }
+    }
+    /**
+     * @param {string} name
+     * @param {number} k
+     */
+    column(name, k) {
+      return this.columns[name][k] || this.time.map(() => null);
+    }
+    /** @param {string} name */
+    greatest(name) {
+      return this.peaks[name] || 0;
+    }
+  };
+
+  // src/notices.js
+  var MOST = 3;
+  var notify = (text, level = "info") => {
+    const error = level === "error";
+    const notice = element(
+      "div",
+      { class: `toast ${error ? "error" : ""}` },
+      element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
+      element("span", { text })
+    );
+    const place = byId(error ? "alerts" : "notices");
+    place.append(notice);
+    while (place.children.length > MOST) place.firstChild?.remove();
+    setTimeout(() => notice.remove(), error ? 12e3 : 5e3);
+  };
+
+  // src/pack.js
+  var TYPES = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
+  var unshuffled = (bytes, size) => {
+    if (size === 1) return bytes.slice();
+    const n = bytes.length / size;
+    const out = new Uint8Array(bytes.length);
+    for (let byte = 0; byte < size; byte++) {
+      const group = byte * n;
+      for (let k = 0; k < n; k++) out[k * size + byte] = bytes[group + k];
+    }
+    return out;
+  };
+  var isPack = (bytes) => bytes.length > 8 && String.fromCharCode(...bytes.subarray(0, 4)) === "GNE1";
+  var decodePack = (bytes) => {
+    if (!isPack(bytes)) throw new Error("these bytes are no pack of gne_mj");
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    const length = view.getUint32(4, true);
+    const header = JSON.parse(new TextDecoder().decode(bytes.subarray(8, 8 + length)));
+    const start = Math.ceil((8 + length) / 8) * 8;
+    const arrays = {};
+    for (const entry of header.arrays) {
+      const Type = TYPES[entry.dtype];
+      const count = entry.shape.reduce((a, b) => a * b, 1);
+      const from = start + entry.offset;
+      const raw = bytes.subarray(from, from + count * Type.BYTES_PER_ELEMENT);
+      const own = entry.shuffled ? unshuffled(raw, Type.BYTES_PER_ELEMENT) : raw.slice();
+      arrays[entry.name] = { data: new Type(own.buffer, 0, count), shape: entry.shape };
+    }
+    return { meta: header.meta, arrays };
+  };
+  var inflate = async (bytes) => {
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  };
+  var fromBase64 = (text) => Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+  var unpack = async (bytes) => decodePack(await inflate(bytes));
+  var fetchReplay = async () => {
+    const answer = await fetch("replay");
+    if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
+    return unpack(new Uint8Array(await answer.arrayBuffer()));
+  };
+
+  // src/socket.js
+  var AGAIN = 2e3;
+  var FULL = 1013;
+  var Socket = class {
+    /**
+     * @param {object} callbacks
+     * @param {() => void} callbacks.opened
+     * @param {(why: string) => void} callbacks.lost
+     * @param {(bytes: Uint8Array) => void} callbacks.command one of meshcat's
+     * @param {(pack: Pack) => void} callbacks.pack
+     * @param {(message: any) => void} callbacks.message from JSON
+     */
+    constructor(callbacks) {
+      this.callbacks = callbacks;
+      this.socket = this.connect();
+    }
+    connect() {
+      const url = new URL("socket", location.href);
+      url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+      const socket = new WebSocket(url);
+      socket.binaryType = "arraybuffer";
+      socket.onopen = () => this.callbacks.opened();
+      socket.onmessage = ({ data }) => this.receive(data);
+      socket.onclose = ({ code, reason }) => {
+        this.callbacks.lost(
+          code === FULL ? `this page is not connected: ${reason}` : "connection lost: the simulation has ended or the server is gone"
+        );
+        setTimeout(() => this.socket = this.connect(), AGAIN);
+      };
+      return socket;
+    }
+    /** @param {string | ArrayBuffer} data */
+    receive(data) {
+      if (typeof data === "string") return this.callbacks.message(JSON.parse(data));
+      const bytes = new Uint8Array(data);
+      if (!isPack(bytes)) return this.callbacks.command(bytes);
+      const pack = decodePack(bytes);
+      this.callbacks.pack(pack);
+      if (pack.meta.kind !== "scene") this.send({ do: "shown" });
+    }
+    get open() {
+      return this.socket.readyState === WebSocket.OPEN;
+    }
+    /** @param {object} message */
+    send(message) {
+      if (this.open) this.socket.send(JSON.stringify(message));
+    }
+  };
+
+  // src/live.js
+  var Live = class {
+    /** @param {Listener} listener */
+    constructor(listener) {
+      this.listener = listener;
+      this.seekable = false;
+      this.connected = false;
       this.framesReceived = 0;
-      this.scene = new GNE.Scene(GNE.byId("pane"));
-      this.overlay = new GNE.Overlay(GNE.byId("overlay"), this.scene);
-      this.plots = new GNE.Plots(GNE.byId("plots"), {
-        seek: (t) => this.seek(t),
-        highlight: (which, plot) => this.highlight(which, plot),
-      });
-      this.transport = new GNE.Transport(this);
-      this.wire();
-      this.expose();
-      this.start();
-      requestAnimationFrame((now) => this.loop(now));
-    }
-
-    /** Time at which each system left the set, of those that did. */
-    get exits() {
-      return this.plots.exits;
-    }
-
-    set exits(exits) {
-      this.plots.exits = exits;
-    }
-
-    get live() {
-      return this.mode === "live";
-    }
-
-    /** Whether time is ours: a replay is shown. */
-    get replaying() {
-      return Boolean(this.replay);
-    }
-
-    // ---- where the data come from
-
-    async start() {
-      if (this.live) return this.startLive();
-      try {
-        const packed =
-          this.mode === "file"
-            ? GNE.fromBase64(GNE.byId("replay").textContent)
-            : await this.fetchReplay();
-        this.showReplay(GNE.decodePack(await GNE.inflate(packed)));
-      } catch (error) {
-        this.warn(`The replay cannot be read: ${error.message}`);
-      }
-    }
-
-    async fetchReplay() {
-      const answer = await fetch("replay");
-      if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
-      return new Uint8Array(await answer.arrayBuffer());
-    }
-
-    showReplay(pack) {
-      const { meta, arrays } = pack;
-      this.runCommands(meta.command_lengths || [], arrays.commands?.data);
-      this.setReplay(pack);
-      this.takeOutcome();
-      this.setScene(meta, this.replay);
-      this.seek(this.replay.time[0]);
-    }
-
-    runCommands(lengths, bytes) {
-      let at = 0;
-      for (const length of lengths) {
-        this.scene.command(bytes.slice(at, at + length));
-        at += length;
-      }
-    }
-
-    setReplay(pack) {
-      this.replay = new GNE.Replay(pack);
-      this.store = this.replay;
-      this.plots.seekable = true;
-    }
-
-    startLive() {
-      this.tuning = new GNE.Tuning((message) => this.link.send(message));
-      this.link = new GNE.Live({
+      this.meta = null;
+      this.frame = null;
+      this.store = new History([]);
+      this.time = 0;
+      this.playing = false;
+      this.speed = 1;
+      this.grown = false;
+      this.exits = {};
+      this.interventions = [];
+      this.pending = null;
+      this.fetching = false;
+      this.replayed = false;
+      this.socket = new Socket({
         opened: () => this.opened(),
         lost: (why) => this.lost(why),
-        command: (bytes) => this.scene.command(bytes),
+        command: (bytes) => listener.command(bytes),
         pack: (pack) => this.receive(pack),
-        message: (message) => this.hear(message),
+        message: (message) => this.hear(message)
       });
     }
-
+    get end() {
+      return this.meta?.duration ?? 0;
+    }
+    take() {
+      const instant = this.pending;
+      this.pending = null;
+      return instant;
+    }
+    // ---- what the simulation is asked for
+    /** @param {object} message */
+    send(message) {
+      this.socket.send(message);
+    }
+    playPause() {
+      this.send({ do: this.playing ? "pause" : "play" });
+    }
+    /** @param {number} direction */
+    step(direction) {
+      if (direction > 0) this.send({ do: "step" });
+    }
+    restart() {
+      this.send({ do: "restart" });
+    }
+    /** @param {number | null} value */
+    setSpeed(value) {
+      this.send({ do: "speed", value });
+    }
+    seek() {
+    }
+    // its time cannot be turned back
+    advance() {
+    }
+    // it does so itself
+    // ---- what it tells
     opened() {
-      // another server may stand behind the address now
-      if (this.meta) this.scene.clear();
-      this.meta = this.instant = this.pending = null;
-      GNE.byId("lost").hidden = true;
+      this.meta = this.pending = null;
       this.connected = true;
+      this.listener.opened();
     }
-
+    /** @param {string} why */
     lost(why) {
-      GNE.byId("lost").hidden = false;
-      GNE.byId("lost-text").textContent = why;
-      this.connected = false;
-      if (!this.replaying) this.playing = false;
-      this.slowDue = 0;
+      this.connected = this.playing = false;
+      this.listener.lost(why);
     }
-
+    /** @param {Pack} pack */
     receive(pack) {
       const { kind } = pack.meta;
-      if (kind === "scene") {
-        this.endReplay();
-        this.exits = {};
-        this.setScene(pack.meta, new GNE.History(pack.meta.systems));
-        this.tuning.build(pack.meta);
-      } else if (kind === "history" && this.store) {
-        this.history.fill(pack);
-        this.plotsDue = true;
-      } else if (kind === "frame" && this.meta) this.takeFrame(pack);
+      if (kind === "scene") this.begin(pack.meta);
+      else if (kind === "history") {
+        this.store.fill(pack);
+        this.grown = true;
+      } else if (kind === "frame" && this.meta) this.takeFrame(pack, this.meta.systems);
     }
-
-    takeFrame(pack) {
+    /** @param {Scene} meta */
+    begin(meta) {
+      this.leaveReplay();
+      this.exits = {};
+      this.meta = meta;
+      this.store = new History(meta.systems);
+      this.listener.scene(meta);
+    }
+    /**
+     * @param {Pack} pack
+     * @param {System[]} systems
+     */
+    takeFrame(pack, systems) {
       this.framesReceived++;
-      const { meta } = pack;
-      this.frame = meta;
-      if (meta.ended) this.runEnded();
-      else this.endReplay();
-      if (this.replaying) return;
-      const instant = GNE.instantOfFrame(pack, this.meta.systems);
+      const frame = this.frame = /** @type {Frame} */
+      pack.meta;
+      if (frame.ended) this.askForReplay();
+      else this.leaveReplay();
+      if (this.replayed) return;
+      const instant = instantOfFrame(pack, systems);
       if (instant.time < this.time) this.exits = {};
-      this.noteExits(meta);
-      this.playing = meta.playing;
-      this.speed = meta.speed;
-      this.history.push(instant);
+      this.noteExits(frame);
+      this.playing = frame.playing;
+      this.speed = frame.speed;
+      this.store.push(instant);
       this.time = instant.time;
       this.pending = instant;
-      this.plotsDue = true;
-      const now = performance.now();
-      for (const system of this.meta.systems)
-        this.overlay.messages(system, instant.systems[system.name].messages, now);
+      this.grown = true;
+      for (const system of systems)
+        this.listener.messages(system, instant.systems[system.name].messages);
     }
-
-    noteExits(meta) {
-      for (const [name, state] of Object.entries(meta.state))
-        if (GNE.outside(state.status)) this.exits[name] ??= state.exit_time ?? meta.time;
+    /** @param {Frame} frame */
+    noteExits(frame) {
+      for (const [name, state] of Object.entries(frame.state))
+        if (outside(state.status)) this.exits[name] ??= state.exit_time ?? frame.time;
         else delete this.exits[name];
     }
-
-    /** A run has ended: it can be replayed now. */
-    async runEnded() {
-      if (this.fetching || this.replaying) return;
+    async askForReplay() {
+      if (this.fetching || this.replayed) return;
       this.fetching = true;
       try {
-        const pack = GNE.decodePack(await GNE.inflate(await this.fetchReplay()));
-        if (!this.frame.ended) return; // restarted meanwhile
-        this.setReplay(pack);
+        const pack = await fetchReplay();
+        if (!this.frame?.ended) return;
+        this.listener.ended(pack);
+        this.replayed = true;
         this.playing = false;
-        this.speed = Number.isFinite(this.speed) && this.speed !== null ? this.speed : 1;
-        this.takeOutcome();
-        this.plots.setStore(this.replay);
-        this.seek(this.replay.end);
       } catch (error) {
-        GNE.toast(`The run has ended, but its replay could not be had: ${error.message}`, "error");
+        notify(`The run has ended, but its replay could not be had: ${error.message}`, "error");
       } finally {
-        // not asked for again at every frame, should it have failed
-        this.fetching = this.frame.ended && !this.replaying;
+        this.fetching = Boolean(this.frame?.ended) && !this.replayed;
       }
     }
-
-    endReplay() {
+    leaveReplay() {
       this.fetching = false;
-      if (!this.replaying || !this.live) return;
-      this.replay = null;
+      if (!this.replayed) return;
+      this.replayed = false;
       this.exits = {};
-      this.store = this.history;
-      this.history.clear();
+      this.interventions = [];
+      this.store.clear();
       this.time = 0;
-      this.plots.seekable = false;
-      this.plots.interventions = [];
-      this.plots.setStore(this.history);
-      this.transport.mark([], 1);
+      this.listener.resumed();
     }
-
+    /** @param {any} message */
     hear(message) {
-      if (message.kind === "notice") GNE.toast(message.text, message.level);
-      else if (message.kind === "controls") this.tuning.follow(message.values);
-      else if (message.kind === "interventions") this.plots.interventions = message.done;
+      if (message.kind === "notice") notify(message.text, message.level);
+      else if (message.kind === "controls") this.listener.controls(message.values);
+      else if (message.kind === "interventions") this.interventions = message.done;
     }
-
-    // ---- a scene
-
-    setScene(meta, store) {
-      this.meta = meta;
-      this.store = store;
-      if (this.live) this.history = store;
-      document.title = `${meta.title} · gne_mj`;
-      GNE.byId("title").textContent = meta.title;
-      GNE.byId("waiting").hidden = true;
-      this.scene.setMeta(meta);
-      this.overlay.setMeta(meta);
-      this.plots.setScene(meta, store);
-      this.fillFollow();
-      this.fillGhosts();
-      this.describeLinks();
+    // ---- in words
+    /**
+     * @param {System} system
+     * @returns {State}
+     */
+    stateOf({ name }) {
+      return this.frame?.state[name] ?? { status: "waiting" };
     }
-
-    /** Exits and interventions of a replay, marked in plots and along the slider. */
-    takeOutcome() {
-      const { outcome, interventions } = this.replay.meta;
-      const exits = Object.entries(outcome || {}).filter(([, each]) =>
-        Number.isFinite(each.exit_time),
-      );
-      this.exits = Object.fromEntries(exits.map(([name, each]) => [name, each.exit_time]));
-      this.plots.interventions = interventions || [];
-      const marks = exits.map(([name, { exit_time: time }]) => ({
-        time,
-        what: `${name} left the set`,
-        bad: true,
-      }));
-      this.transport.mark([...this.plots.interventions, ...marks], this.replay.end);
+    get pace() {
+      if (!this.frame) return "";
+      if (!this.connected) return "not connected";
+      if (!this.playing) return "paused";
+      const { speed, pace } = this.frame;
+      const wished = speed === null ? "as fast as possible" : `×${number(speed)}`;
+      return pace === null ? wished : `${wished}, ${number(pace)} reached`;
     }
+  };
 
-    fillFollow() {
-      const option = (value, text) => GNE.element("option", { value, text });
-      const { fleets } = this.scene;
-      GNE.byId("follow-label").hidden = fleets.length === 0;
-      GNE.byId("follow").replaceChildren(
-        option("fleet", "all"),
-        ...fleets.flatMap((system) =>
-          [...Array(system.agents).keys()].map((agent) =>
-            option(
-              JSON.stringify({ system: system.name, agent }),
-              `${system.agent_name} ${agent + 1}`,
-            ),
-          ),
-        ),
-        option("none", "nothing"),
-      );
+  // src/links.js
+  var TRAVEL = 650;
+  var REST = 400;
+  var FLOW = 1800;
+  var MANY = 160;
+  var DENSE = 300;
+  var along = ([a, c, b], t) => {
+    const u = 1 - t;
+    return {
+      x: u * u * a.x + 2 * u * t * c.x + t * t * b.x,
+      y: u * u * a.y + 2 * u * t * c.y + t * t * b.y
+    };
+  };
+  var Links = class {
+    /**
+     * @param {CanvasRenderingContext2D} context
+     * @param {Scene} scene
+     */
+    constructor(context, scene) {
+      this.context = context;
+      this.scene = scene;
+      this.shown = true;
+      this.pulses = [];
+      this.lastPulse = /* @__PURE__ */ new Map();
+      this.heads = /* @__PURE__ */ new Map();
     }
-
-    fillGhosts() {
-      const systems = this.meta.systems.filter((system) => system.estimates);
-      GNE.byId("ghost-tools").hidden = systems.length === 0;
-      GNE.byId("ghost-agent").replaceChildren(
-        ...systems.map((system) =>
-          GNE.element(
-            "optgroup",
-            { label: system.name },
-            ...[...Array(system.agents).keys()].map((agent) =>
-              GNE.element("option", {
-                value: JSON.stringify({ system: system.name, agent }),
-                text: `${system.agent_name} ${agent + 1}`,
-              }),
-            ),
-          ),
-        ),
-      );
-      this.setGhosts(false);
+    /** Another scene. */
+    begin() {
+      this.pulses = [];
+      this.lastPulse.clear();
     }
-
-    describeLinks() {
-      const linked = this.meta.systems.filter((system) => system.edges.length > 0);
-      const button = GNE.byId("links");
-      button.hidden = linked.length === 0;
-      const words = new Set(linked.map((system) => system.edges_are));
-      const parts = [];
-      if (words.has("messages")) parts.push("lines: messages pass");
-      if (words.has("measurements")) parts.push("dashed lines: measured directly");
-      if (linked.some((system) => system.links.length && system.message_period !== null))
-        parts.push("✕ lost");
-      const note = GNE.byId("link-note");
-      note.textContent = parts.join(" · ");
-      note.hidden = parts.length === 0;
-    }
-
-    setGhosts(on) {
-      const select = GNE.byId("ghost-agent");
-      const shown = on && select.value ? JSON.parse(select.value) : null;
-      GNE.byId("ghosts").setAttribute("aria-pressed", Boolean(shown));
-      GNE.byId("ghost-label").hidden = !shown;
-      const note = GNE.byId("ghost-note");
-      note.hidden = !shown;
-      if (shown) note.textContent = this.ghostNote(shown);
-      this.scene.ghosts.show(shown);
-    }
-
-    ghostNote({ system: name, agent }) {
-      const system = this.meta.systems.find((each) => each.name === name);
-      const who = `${system.agent_name} ${agent + 1}`;
-      if (system.drawn_as === "bars")
-        return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
-      const wrong = `(estimate − actual ${system.action.name})`;
-      return `Pale copies: the others as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
-    }
-
-    highlight(which, plot) {
-      this.overlay.highlighted = which;
-      this.plots.highlight(which, plot);
-      this.scene.dirty();
-    }
-
-    warn(text) {
-      GNE.byId("banner-text").textContent = text;
-      GNE.byId("banner").hidden = false;
-      GNE.byId("waiting").hidden = true;
-    }
-
-    // ---- transport
-
-    playPause() {
-      if (!this.replaying) return this.command({ do: this.playing ? "pause" : "play" });
-      if (!this.playing && this.time >= this.replay.end) this.seek(this.replay.time[0]);
-      this.playing = !this.playing;
-      this.slowDue = 0;
-    }
-
-    step(direction, second) {
-      if (!this.replaying) {
-        if (direction > 0) this.command({ do: "step" });
-        return;
+    /**
+     * Starts pulses for messages, not more than the eye can follow.
+     * @param {System} system
+     * @param {Numbers | undefined} counts links x [passed, lost]
+     * @param {number} now
+     */
+    messages(system, counts, now) {
+      if (!this.pulsing || !counts || document.hidden) return;
+      const every = Math.max(1, Math.ceil(system.links.length / MANY));
+      for (let link = 0; link < system.links.length; link += every) {
+        const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
+        if (passed + lost > 0) this.pulse(system, link, lost > 0, now, REST);
       }
+    }
+    /**
+     * A slow steady flow, where messages have no instants.
+     * @param {System[]} systems
+     * @param {number} now
+     */
+    flow(systems, now) {
+      if (!this.pulsing) return;
+      for (const system of systems) if (system.message_period === null) this.flowIn(system, now);
+    }
+    /**
+     * @param {System} system
+     * @param {number} now
+     */
+    flowIn(system, now) {
+      const every = Math.max(1, Math.ceil(system.links.length / MANY));
+      for (let link = 0; link < system.links.length; link += every) {
+        const key = `${system.name}/${link}`;
+        if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - link * 617 % FLOW);
+        this.pulse(system, link, false, now, FLOW);
+      }
+    }
+    get pulsing() {
+      return this.shown && !reducedMotion();
+    }
+    /**
+     * @param {System} system
+     * @param {number} link
+     * @param {boolean} lost
+     * @param {number} now ms
+     * @param {number} rest ms since the one before
+     */
+    pulse(system, link, lost, now, rest) {
+      const key = `${system.name}/${link}`;
+      if (now - (this.lastPulse.get(key) ?? -Infinity) < rest) return;
+      this.lastPulse.set(key, now);
+      const [hearer, sender] = system.links[link];
+      this.pulses.push({ system, from: sender - 1, to: hearer - 1, lost, born: now });
+    }
+    /**
+     * Curve between two agents on the screen: its two ends and the point that bends it.
+     * @param {System} system
+     * @param {number} a
+     * @param {number} b
+     */
+    curve(system, a, b) {
+      if (system.edges.length > DENSE) return this.straight(system, a, b);
+      const { camera, layout } = this.scene;
+      const [p, q] = [layout.headOf(system, a), layout.headOf(system, b)];
+      const length = Math.hypot(...p.map((v, k) => v - q[k]));
+      const middle = p.map((v, k) => (v + q[k]) / 2);
+      middle[2] += Math.max(0.25, 0.22 * length);
+      const ends = [p, middle, q].map((point) => camera.project(point));
+      return ends.includes(null) ? null : ends;
+    }
+    /**
+     * @param {System} system
+     * @param {number} a
+     * @param {number} b
+     */
+    straight(system, a, b) {
+      const [from, to] = [this.headAt(system, a), this.headAt(system, b)];
+      return from && to && [from, { x: (from.x + to.x) / 2, y: (from.y + to.y) / 2 }, to];
+    }
+    /**
+     * Where the links of an agent begin on the screen; once a picture for each.
+     * @param {System} system
+     * @param {number} agent
+     */
+    headAt(system, agent) {
+      const key = `${system.name}/${agent}`;
+      const { camera, layout } = this.scene;
+      if (!this.heads.has(key)) this.heads.set(key, camera.project(layout.headOf(system, agent)));
+      return this.heads.get(key);
+    }
+    /**
+     * @param {System[]} systems
+     * @param {number} now
+     */
+    draw(systems, now) {
+      if (!this.shown) return void (this.pulses = []);
+      this.heads.clear();
+      for (const system of systems) this.edges(system);
+      this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
+      for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
+    }
+    /** @param {System} system */
+    edges(system) {
+      const { context } = this;
+      const dense = system.edges.length > 60;
+      context.lineWidth = dense ? 0.8 : 1.4;
+      context.strokeStyle = colour("link");
+      context.globalAlpha = dense ? Math.max(0.15, 30 / system.edges.length) : 0.75;
+      context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
+      context.beginPath();
+      for (const [a, b] of system.edges) {
+        const curve = this.curve(system, a - 1, b - 1);
+        if (!curve) continue;
+        const [from, bend, to] = curve;
+        context.moveTo(from.x, from.y);
+        context.quadraticCurveTo(bend.x, bend.y, to.x, to.y);
+      }
+      context.stroke();
+      context.setLineDash([]);
+      context.globalAlpha = 1;
+    }
+    /**
+     * @param {Pulse} pulse
+     * @param {number} age in times that a message is seen
+     */
+    drawPulse({ system, from, to, lost }, age) {
+      const { context } = this;
+      const curve = this.curve(system, from, to);
+      if (!curve) return;
+      const { x, y } = along(curve, lost ? Math.min(age, 0.5) : age);
+      context.fillStyle = context.strokeStyle = colour(lost ? "bad" : "pulse");
+      if (lost && age > 0.5) return this.cross(x, y, Math.max(0, 1.5 - age));
+      context.beginPath();
+      context.arc(x, y, 3, 0, 2 * Math.PI);
+      context.fill();
+    }
+    /**
+     * A message that is lost.
+     * @param {number} x
+     * @param {number} y
+     * @param {number} alpha
+     */
+    cross(x, y, alpha) {
+      const { context } = this;
+      context.globalAlpha = alpha;
+      context.lineWidth = 2;
+      context.beginPath();
+      context.moveTo(x - 4, y - 4);
+      context.lineTo(x + 4, y + 4);
+      context.moveTo(x + 4, y - 4);
+      context.lineTo(x - 4, y + 4);
+      context.stroke();
+      context.globalAlpha = 1;
+    }
+  };
+
+  // src/overlay.js
+  var labelOrder = (n) => {
+    const zeros = (k) => k === 0 ? 32 : Math.log2(k & -k);
+    return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
+  };
+  var colourOf = ({ bad, limit, chosen, title }) => bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+  var Overlay = class {
+    /**
+     * @param {HTMLCanvasElement} canvas
+     * @param {Scene} scene
+     */
+    constructor(canvas, scene) {
+      this.canvas = canvas;
+      this.scene = scene;
+      this.context = /** @type {CanvasRenderingContext2D} */
+      canvas.getContext("2d");
+      this.links = new Links(this.context, scene);
+      this.labelled = true;
+      this.systems = [];
+      this.orders = /* @__PURE__ */ new Map();
+      this.taken = [];
+      this.marks = [];
+      this.highlighted = null;
+    }
+    /** @param {Meta} meta */
+    setMeta({ systems }) {
+      this.systems = systems;
+      this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
+      this.links.begin();
+    }
+    /** Whether pictures must go on although nothing new came. */
+    get moving() {
+      return this.links.pulses.length > 0;
+    }
+    // ---- drawing
+    /**
+     * @param {Instant} instant
+     * @param {number} now
+     */
+    draw(instant, now) {
+      const { canvas, context } = this;
+      const ratio = Math.min(devicePixelRatio, 2);
+      const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+      if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+        canvas.width = Math.round(w * ratio);
+        canvas.height = Math.round(h * ratio);
+      }
+      context.setTransform(ratio, 0, 0, ratio, 0, 0);
+      context.clearRect(0, 0, w, h);
+      this.taken = [];
+      this.marks = [];
+      this.links.draw(this.systems, now);
+      for (const system of this.systems)
+        if (system.drawn_as === "bars") this.barTexts(system);
+        else if (this.labelled) this.labels(system, instant);
+      this.distances();
+    }
+    /** Metres along the lane, at the ground's stronger lines. */
+    distances() {
+      const { context } = this;
+      const { camera, ground, layout } = this.scene;
+      if (!layout.box) return;
+      const { low, high } = layout.box;
+      const y = low[1] - (layout.lane === null ? 1.5 : 0.75);
+      context.font = "11px system-ui, sans-serif";
+      context.textAlign = "center";
+      context.textBaseline = "top";
+      context.fillStyle = colour("muted");
+      const step = ground.major > 10 ? ground.major : 5;
+      for (let x = Math.floor((low[0] - 2 * step) / step) * step; x <= high[0] + 2 * step; x += step) {
+        const p = camera.project([x, y, layout.floor]);
+        if (!p || !this.free({ x: p.x - 26, y: p.y, w: 52, h: 18 })) continue;
+        this.taken.push({ x: p.x - 26, y: p.y, w: 52, h: 18 });
+        this.haloed(`${number(x, 6)} m`, p.x, p.y + 4);
+      }
+    }
+    // ---- labels
+    /** @param {Box} box */
+    free(box) {
+      return !this.taken.some(
+        (t) => box.x < t.x + t.w && t.x < box.x + box.w && box.y < t.y + t.h && t.y < box.y + box.h
+      );
+    }
+    /**
+     * @param {System} system
+     * @param {Instant} instant
+     */
+    labels(system, instant) {
+      const shares = instant.systems[system.name].share;
+      const share = (agent) => shares ? shares[agent] : NaN;
+      const first = (agent) => this.isHighlighted(system, agent) || share(agent) > 1;
+      const order = this.orders.get(system.name) ?? [];
+      const urgent = order.filter(first);
+      for (const agent of [...urgent, ...order.filter((each) => !first(each))])
+        this.label(system, agent, share(agent));
+    }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     */
+    isHighlighted(system, agent) {
+      const which = this.highlighted;
+      return which?.system === system.name && which?.agent === agent;
+    }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @param {number} share
+     */
+    label(system, agent, share) {
+      const [x, y, z] = this.scene.layout.agentAt(system, agent);
+      const p = this.scene.camera.project([x, y, z + system.height]);
+      if (!p) return;
+      this.marks.push({ x: p.x, y: p.y, system: system.name, agent });
+      const name = String(agent + 1);
+      const out = share > 1;
+      const digits = out && share < 1.1 ? 1 : 0;
+      const used = out ? "outside" : "";
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
+      for (const text of percent ? [percent, ""] : [""]) {
+        const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
+        if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
+        this.taken.push(box);
+        return this.pill(box, { name, system, agent, out });
+      }
+    }
+    /**
+     * @param {{x: number, y: number}} p
+     * @param {string} name
+     * @param {string} text
+     */
+    pillBox(p, name, text) {
+      const context = this.context;
+      context.font = "600 13px system-ui, sans-serif";
+      const wide = context.measureText(name).width;
+      context.font = "12px system-ui, sans-serif";
+      const more = text ? context.measureText(text).width + 7 : 0;
+      const w = wide + more + 14;
+      return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text };
+    }
+    /**
+     * @param {Pill} box
+     * @param {{name: string, system: System, agent: number, out: boolean}} about
+     */
+    pill(box, { name, system, agent, out }) {
+      const context = this.context;
+      const chosen = this.isHighlighted(system, agent);
+      context.beginPath();
+      context.roundRect(box.x, box.y, box.w, box.h, 5);
+      context.fillStyle = out ? colour("bad-fill") : colour("pill");
+      context.fill();
+      context.lineWidth = chosen ? 2 : 1;
+      context.strokeStyle = colour(chosen ? "accent" : "pill-edge");
+      context.stroke();
+      context.textBaseline = "middle";
+      context.textAlign = "left";
+      context.fillStyle = out ? "#fff" : colour("text");
+      context.font = "600 13px system-ui, sans-serif";
+      context.fillText(name, box.x + 7, box.y + 10.5);
+      context.font = "12px system-ui, sans-serif";
+      if (!out) context.fillStyle = colour("muted");
+      context.fillText(box.text, box.x + 14 + box.wide, box.y + 10.5);
+      if (system.agents <= 14 && !out) this.swatch(box, agent);
+    }
+    /**
+     * The look of the agent's line in the plots, under its label.
+     * @param {Box} box
+     * @param {number} agent
+     */
+    swatch(box, agent) {
+      const context = this.context;
+      const look = line(agent);
+      context.strokeStyle = look.colour;
+      context.lineWidth = 2.5;
+      context.setLineDash(look.dash);
+      context.beginPath();
+      context.moveTo(box.x + 5, box.y + box.h);
+      context.lineTo(box.x + box.w - 5, box.y + box.h);
+      context.stroke();
+      context.setLineDash([]);
+    }
+    /** @param {System} system */
+    barTexts(system) {
+      const bars2 = this.scene.layout.barsOf(system);
+      for (const text of [bars2.title(), ...bars2.gaugeTexts()]) this.text(text);
+      const owners = system.action.owner;
+      const digits = decimals(bars2.reference);
+      owners.forEach((owner, k) => {
+        const p = this.scene.camera.project(bars2.top(k));
+        if (p) this.marks.push({ x: p.x, y: p.y, system: system.name, agent: owner - 1 });
+        if (!this.labelled) return;
+        const chosen = this.isHighlighted(system, owner - 1);
+        const axis = system.action.axis[k] || "";
+        this.text({ point: bars2.foot(k), text: `${owner}${axis}`, shift: 11, bold: true, chosen });
+        this.text({
+          point: bars2.top(k),
+          text: fixed(bars2.values[k] ?? null, digits),
+          shift: -9,
+          chosen
+        });
+      });
+    }
+    /**
+     * A text at a point of the scene, where there is room.
+     * @param {Text} about
+     */
+    text({ point, text, shift = 0, align = "center", ...kind }) {
+      const p = this.scene.camera.project(point);
+      if (!p) return;
+      const context = this.context;
+      context.font = `${kind.bold || kind.title ? "600 " : ""}12px system-ui, sans-serif`;
+      const w = context.measureText(text).width;
+      const left = align === "center" ? p.x - w / 2 : p.x + 4;
+      const box = { x: left - 2, y: p.y + shift - 7, w: w + 4, h: 14 };
+      if (!this.free(box) && !kind.chosen) return;
+      this.taken.push(box);
+      context.textAlign = "left";
+      context.textBaseline = "middle";
+      context.fillStyle = colour(colourOf(kind));
+      this.haloed(text, left, p.y + shift);
+    }
+    /**
+     * Text that can be read on anything.
+     * @param {string} text
+     * @param {number} x
+     * @param {number} y
+     */
+    haloed(text, x, y) {
+      const context = this.context;
+      context.lineWidth = 3;
+      context.lineJoin = "round";
+      context.strokeStyle = colour("halo");
+      context.strokeText(text, x, y);
+      context.fillText(text, x, y);
+    }
+    /**
+     * The agent whose label or head is near a point of the pane.
+     * @param {number} x
+     * @param {number} y
+     */
+    agentNear(x, y) {
+      let best = null;
+      let nearest = 26;
+      for (const mark of this.marks) {
+        const away = Math.hypot(mark.x - x, mark.y - y + 4);
+        if (away < nearest) [best, nearest] = [{ system: mark.system, agent: mark.agent }, away];
+      }
+      return best;
+    }
+  };
+
+  // src/replay.js
+  var mixQuaternion = (a, b, f, out, k) => {
+    let dot = 0;
+    for (let c = k; c < k + 4; c++) dot += a[c] * b[c];
+    const sign2 = dot < 0 ? -1 : 1;
+    let norm = 0;
+    for (let c = k; c < k + 4; c++) {
+      out[c] = (1 - f) * a[c] + f * sign2 * b[c];
+      norm += out[c] * out[c];
+    }
+    norm = Math.sqrt(norm) || 1;
+    for (let c = k; c < k + 4; c++) out[c] /= norm;
+  };
+  var Replay = class {
+    /** @param {Pack} pack */
+    constructor(pack) {
+      this.meta = pack.meta;
+      this.arrays = pack.arrays;
+      this.time = Array.from(pack.arrays.time.data);
+      const base = pack.arrays.pose_base?.data || new Float64Array(0);
+      this.before = Float64Array.from(base);
+      this.after = Float64Array.from(base);
+      this.mixed = Float64Array.from(base);
+    }
+    get end() {
+      return this.time[this.time.length - 1];
+    }
+    /**
+     * @param {number} t
+     * @returns {At}
+     */
+    at(t) {
+      const time = this.time;
+      const last = time.length - 1;
+      if (!(t > time[0])) return { i: 0, f: 0 };
+      if (t >= time[last]) return { i: last, f: 0 };
+      let [low, high] = [0, last];
+      while (high - low > 1) {
+        const middle = low + high >> 1;
+        if (time[middle] <= t) low = middle;
+        else high = middle;
+      }
+      return { i: low, f: (t - time[low]) / (time[low + 1] - time[low]) };
+    }
+    /**
+     * @param {number} i
+     * @param {Float64Array} out
+     */
+    fillPoses(i, out) {
+      const columns = this.arrays.pose_columns?.data || [];
+      const values = this.arrays.pose_values?.data;
+      const T = this.time.length;
+      for (let v = 0; v < columns.length; v++) out[columns[v]] = values[v * T + i];
+      return out;
+    }
+    /** @param {At} at */
+    poses({ i, f }) {
+      const a = this.fillPoses(i, this.before);
+      if (f === 0) return a;
+      const b = this.fillPoses(i + 1, this.after);
+      const out = this.mixed;
+      for (let k = 0; k < out.length; k += 8) {
+        for (let c = k; c < k + 3; c++) out[c] = a[c] + (b[c] - a[c]) * f;
+        mixQuaternion(a, b, f, out, k + 3);
+        const whole = a[k + 7] === 0 || b[k + 7] === 0;
+        out[k + 7] = whole ? a[k + 7] : a[k + 7] + (b[k + 7] - a[k + 7]) * f;
+      }
+      return out;
+    }
+    /**
+     * Values of one array, of any width, at an instant.
+     * @param {string} name
+     * @param {At} at
+     */
+    row(name, { i, f }) {
+      const array = this.arrays[name];
+      if (!array) return void 0;
+      const width = array.data.length / this.time.length;
+      const row = array.data.subarray(i * width, (i + 1) * width);
+      if (f === 0) return row;
+      const next = array.data.subarray((i + 1) * width, (i + 2) * width);
+      return row.map((value, k) => value + (next[k] - value) * f);
+    }
+    /**
+     * @param {number} t
+     * @returns {Instant}
+     */
+    instant(t) {
+      const at = this.at(t);
+      const time = Math.min(Math.max(t, this.time[0]), this.end);
+      const instant = { time, poses: this.poses(at), systems: {} };
+      for (const system of this.meta.systems) {
+        const own = instant.systems[system.name] = {};
+        for (const part of partsOf(system)) own[part] = this.row(`${system.name}/${part}`, at);
+      }
+      return instant;
+    }
+    /**
+     * (links x 2) messages passed and lost in (from, to], or undefined.
+     * @param {string} name of the system
+     * @param {number} from
+     * @param {number} to
+     */
+    messagesBetween(name, from, to) {
+      const array = this.arrays[`${name}/messages`];
+      if (!array || !(to > from)) return void 0;
+      const width = array.data.length / this.time.length;
+      const sum = new Float32Array(width);
+      for (let i = this.at(from).i + 1; i <= this.at(to).i; i++)
+        for (let k = 0; k < width; k++) sum[k] += array.data[i * width + k];
+      return sum;
+    }
+    /**
+     * Column k of an array, over all samples.
+     * @param {string} name
+     * @param {number} k
+     */
+    column(name, k) {
+      const array = this.arrays[name];
+      if (!array) return this.time.map(() => null);
+      const width = array.data.length / this.time.length;
+      return this.time.map((_2, i) => orNull(array.data[i * width + k]));
+    }
+    /** @param {string} name */
+    greatest(name) {
+      const data = this.arrays[name]?.data || [];
+      let most = 0;
+      for (const value of data) if (Math.abs(value) > most) most = Math.abs(value);
+      return most;
+    }
+  };
+
+  // src/playback.js
+  var Playback = class {
+    /**
+     * @param {Pack} pack
+     * @param {object} options
+     * @param {string} [options.pace] what is said beside the clock
+     * @param {number} [options.speed]
+     * @param {(system: System, counts: Numbers | undefined) => void} options.messages called with
+     *     what passed while time went on
+     */
+    constructor(pack, { messages, pace = "", speed = 1 }) {
+      this.store = this.replay = new Replay(pack);
+      const { outcome = {}, interventions = [] } = this.replay.meta;
+      this.outcome = outcome;
+      this.interventions = interventions;
+      this.exits = {};
+      for (const [name, { exit_time: time }] of Object.entries(outcome))
+        if (typeof time === "number") this.exits[name] = time;
+      this.messages = messages;
+      this.pace = pace;
+      this.speed = speed;
+      this.seekable = true;
+      this.playing = false;
+      this.grown = false;
+      this.start = this.replay.time[0];
+      this.end = this.replay.end;
+      this.time = this.start;
+      this.pending = null;
+    }
+    get meta() {
+      return this.replay.meta;
+    }
+    take() {
+      const instant = this.pending;
+      this.pending = null;
+      return instant;
+    }
+    playPause() {
+      if (!this.playing && this.time >= this.end) this.seek(this.start);
+      this.playing = !this.playing;
+    }
+    /**
+     * @param {number} direction
+     * @param {boolean} second
+     */
+    step(direction, second) {
       this.playing = false;
       if (second) return this.seek(this.time + direction);
       const { time } = this.replay;
@@ -333,379 +1259,6799 @@
       const to = direction > 0 ? i + 1 : f > 0 ? i : i - 1;
       this.seek(time[Math.min(Math.max(to, 0), time.length - 1)], direction > 0);
     }
-
     restart() {
-      if (this.live) return this.command({ do: "restart" });
-      if (this.replaying) this.seek(this.replay.time[0]);
+      this.seek(this.start);
     }
-
+    /** @param {number | null} speed */
     setSpeed(speed) {
-      if (this.replaying) this.speed = speed;
-      else this.command({ do: "speed", value: speed });
-      this.slowDue = 0;
+      this.speed = speed;
     }
-
-    command(message) {
-      if (this.live) this.link.send(message);
-    }
-
-    /** Shows a time of the replay; messages since then pass if it is a step on. */
-    seek(t, withMessages = false) {
-      if (!this.replaying) return;
+    /**
+     * Shows a time; messages since the time before pass if it is a step on.
+     * @param {number} time
+     */
+    seek(time, withMessages = false) {
       const before = this.time;
-      const { time, end } = this.replay;
-      this.time = Math.min(Math.max(t, time[0]), end);
+      this.time = Math.min(Math.max(time, this.start), this.end);
       this.pending = this.replay.instant(this.time);
       if (!withMessages) return;
-      const now = performance.now();
       for (const system of this.meta.systems)
-        this.overlay.messages(
-          system,
-          this.replay.messagesBetween(system.name, before, this.time),
-          now,
-        );
+        this.messages(system, this.replay.messagesBetween(system.name, before, this.time));
     }
+    /** @param {number} seconds that have passed */
+    advance(seconds) {
+      if (!this.playing) return;
+      this.seek(this.time + seconds * (this.speed ?? 1), true);
+      if (this.time >= this.end) this.playing = false;
+    }
+    /**
+     * Of the whole run, also while an earlier time is shown.
+     * @param {System} system
+     * @returns {State}
+     */
+    stateOf({ name }) {
+      return this.outcome[name] ?? { status: "" };
+    }
+  };
 
+  // node_modules/uplot/dist/uPlot.esm.js
+  var FEAT_TIME = true;
+  var pre = "u-";
+  var UPLOT = "uplot";
+  var ORI_HZ = pre + "hz";
+  var ORI_VT = pre + "vt";
+  var TITLE = pre + "title";
+  var WRAP = pre + "wrap";
+  var UNDER = pre + "under";
+  var OVER = pre + "over";
+  var AXIS = pre + "axis";
+  var OFF = pre + "off";
+  var SELECT = pre + "select";
+  var CURSOR_X = pre + "cursor-x";
+  var CURSOR_Y = pre + "cursor-y";
+  var CURSOR_PT = pre + "cursor-pt";
+  var LEGEND = pre + "legend";
+  var LEGEND_LIVE = pre + "live";
+  var LEGEND_INLINE = pre + "inline";
+  var LEGEND_SERIES = pre + "series";
+  var LEGEND_MARKER = pre + "marker";
+  var LEGEND_LABEL = pre + "label";
+  var LEGEND_VALUE = pre + "value";
+  var WIDTH = "width";
+  var HEIGHT = "height";
+  var TOP = "top";
+  var BOTTOM = "bottom";
+  var LEFT = "left";
+  var RIGHT = "right";
+  var hexBlack = "#000";
+  var transparent = hexBlack + "0";
+  var mousemove = "mousemove";
+  var mousedown = "mousedown";
+  var mouseup = "mouseup";
+  var mouseenter = "mouseenter";
+  var mouseleave = "mouseleave";
+  var dblclick = "dblclick";
+  var resize = "resize";
+  var scroll = "scroll";
+  var change = "change";
+  var dppxchange = "dppxchange";
+  var LEGEND_DISP = "--";
+  var domEnv = typeof window != "undefined";
+  var doc = domEnv ? document : null;
+  var win = domEnv ? window : null;
+  var nav = domEnv ? navigator : null;
+  var pxRatio;
+  var query;
+  function setPxRatio() {
+    let _pxRatio = devicePixelRatio;
+    if (pxRatio != _pxRatio) {
+      pxRatio = _pxRatio;
+      query && off(change, query, setPxRatio);
+      query = matchMedia(`(min-resolution: ${pxRatio - 1e-3}dppx) and (max-resolution: ${pxRatio + 1e-3}dppx)`);
+      on(change, query, setPxRatio);
+      win.dispatchEvent(new CustomEvent(dppxchange));
+    }
+  }
+  function addClass(el, c) {
+    if (c != null) {
+      let cl = el.classList;
+      !cl.contains(c) && cl.add(c);
+    }
+  }
+  function remClass(el, c) {
+    let cl = el.classList;
+    cl.contains(c) && cl.remove(c);
+  }
+  function setStylePx(el, name, value) {
+    el.style[name] = value + "px";
+  }
+  function placeTag(tag, cls, targ, refEl) {
+    let el = doc.createElement(tag);
+    if (cls != null)
+      addClass(el, cls);
+    if (targ != null)
+      targ.insertBefore(el, refEl);
+    return el;
+  }
+  function placeDiv(cls, targ) {
+    return placeTag("div", cls, targ);
+  }
+  var xformCache = /* @__PURE__ */ new WeakMap();
+  function elTrans(el, xPos, yPos, xMax, yMax) {
+    let xform = "translate(" + xPos + "px," + yPos + "px)";
+    let xformOld = xformCache.get(el);
+    if (xform != xformOld) {
+      el.style.transform = xform;
+      xformCache.set(el, xform);
+      if (xPos < 0 || yPos < 0 || xPos > xMax || yPos > yMax)
+        addClass(el, OFF);
+      else
+        remClass(el, OFF);
+    }
+  }
+  var colorCache = /* @__PURE__ */ new WeakMap();
+  function elColor(el, background, borderColor) {
+    let newColor = background + borderColor;
+    let oldColor = colorCache.get(el);
+    if (newColor != oldColor) {
+      colorCache.set(el, newColor);
+      el.style.background = background;
+      el.style.borderColor = borderColor;
+    }
+  }
+  var sizeCache = /* @__PURE__ */ new WeakMap();
+  function elSize(el, newWid, newHgt, centered) {
+    let newSize = newWid + "" + newHgt;
+    let oldSize = sizeCache.get(el);
+    if (newSize != oldSize) {
+      sizeCache.set(el, newSize);
+      el.style.height = newHgt + "px";
+      el.style.width = newWid + "px";
+      el.style.marginLeft = centered ? -newWid / 2 + "px" : 0;
+      el.style.marginTop = centered ? -newHgt / 2 + "px" : 0;
+    }
+  }
+  var evOpts = { passive: true };
+  var evOpts2 = { ...evOpts, capture: true };
+  function on(ev, el, cb, capt) {
+    el.addEventListener(ev, cb, capt ? evOpts2 : evOpts);
+  }
+  function off(ev, el, cb, capt) {
+    el.removeEventListener(ev, cb, evOpts);
+  }
+  domEnv && setPxRatio();
+  function closestIdx(num, arr, lo, hi) {
+    let mid;
+    lo = lo || 0;
+    hi = hi || arr.length - 1;
+    let bitwise = hi <= 2147483647;
+    while (hi - lo > 1) {
+      mid = bitwise ? lo + hi >> 1 : floor((lo + hi) / 2);
+      if (arr[mid] < num)
+        lo = mid;
+      else
+        hi = mid;
+    }
+    if (num - arr[lo] <= arr[hi] - num)
+      return lo;
+    return hi;
+  }
+  function makeIndexOfs(predicate) {
+    let indexOfs = (data, _i0, _i1) => {
+      let i0 = -1;
+      let i1 = -1;
+      for (let i = _i0; i <= _i1; i++) {
+        if (predicate(data[i])) {
+          i0 = i;
+          break;
+        }
+      }
+      for (let i = _i1; i >= _i0; i--) {
+        if (predicate(data[i])) {
+          i1 = i;
+          break;
+        }
+      }
+      return [i0, i1];
+    };
+    return indexOfs;
+  }
+  var notNullish = (v) => v != null;
+  var isPositive = (v) => v != null && v > 0;
+  var nonNullIdxs = makeIndexOfs(notNullish);
+  var positiveIdxs = makeIndexOfs(isPositive);
+  function getMinMax(data, _i0, _i1, sorted = 0, log = false) {
+    let getEdgeIdxs = log ? positiveIdxs : nonNullIdxs;
+    let predicate = log ? isPositive : notNullish;
+    [_i0, _i1] = getEdgeIdxs(data, _i0, _i1);
+    let _min = data[_i0];
+    let _max = data[_i0];
+    if (_i0 > -1) {
+      if (sorted == 1) {
+        _min = data[_i0];
+        _max = data[_i1];
+      } else if (sorted == -1) {
+        _min = data[_i1];
+        _max = data[_i0];
+      } else {
+        for (let i = _i0; i <= _i1; i++) {
+          let v = data[i];
+          if (predicate(v)) {
+            if (v < _min)
+              _min = v;
+            else if (v > _max)
+              _max = v;
+          }
+        }
+      }
+    }
+    return [_min ?? inf, _max ?? -inf];
+  }
+  function rangeLog(min2, max2, base, fullMags) {
+    let minSign = sign(min2);
+    let maxSign = sign(max2);
+    if (min2 == max2) {
+      if (minSign == -1) {
+        min2 *= base;
+        max2 /= base;
+      } else {
+        min2 /= base;
+        max2 *= base;
+      }
+    }
+    let logFn = base == 10 ? log10 : log2;
+    let growMinAbs = minSign == 1 ? floor : ceil;
+    let growMaxAbs = maxSign == 1 ? ceil : floor;
+    let minExp = growMinAbs(logFn(abs(min2)));
+    let maxExp = growMaxAbs(logFn(abs(max2)));
+    let minIncr = pow(base, minExp);
+    let maxIncr = pow(base, maxExp);
+    if (base == 10) {
+      if (minExp < 0)
+        minIncr = roundDec(minIncr, -minExp);
+      if (maxExp < 0)
+        maxIncr = roundDec(maxIncr, -maxExp);
+    }
+    if (fullMags || base == 2) {
+      min2 = minIncr * minSign;
+      max2 = maxIncr * maxSign;
+    } else {
+      min2 = incrRoundDn(min2, minIncr);
+      max2 = incrRoundUp(max2, maxIncr);
+    }
+    return [min2, max2];
+  }
+  function rangeAsinh(min2, max2, base, fullMags) {
+    let minMax = rangeLog(min2, max2, base, fullMags);
+    if (min2 == 0)
+      minMax[0] = 0;
+    if (max2 == 0)
+      minMax[1] = 0;
+    return minMax;
+  }
+  var rangePad = 0.1;
+  var autoRangePart = {
+    mode: 3,
+    pad: rangePad
+  };
+  var _eqRangePart = {
+    pad: 0,
+    soft: null,
+    mode: 0
+  };
+  var _eqRange = {
+    min: _eqRangePart,
+    max: _eqRangePart
+  };
+  function rangeNum(_min, _max, mult, extra) {
+    if (isObj(mult))
+      return _rangeNum(_min, _max, mult);
+    _eqRangePart.pad = mult;
+    _eqRangePart.soft = extra ? 0 : null;
+    _eqRangePart.mode = extra ? 3 : 0;
+    return _rangeNum(_min, _max, _eqRange);
+  }
+  function ifNull(lh, rh) {
+    return lh == null ? rh : lh;
+  }
+  function hasData(data, idx0, idx1) {
+    idx0 = ifNull(idx0, 0);
+    idx1 = ifNull(idx1, data.length - 1);
+    while (idx0 <= idx1) {
+      if (data[idx0] != null)
+        return true;
+      idx0++;
+    }
+    return false;
+  }
+  function _rangeNum(_min, _max, cfg) {
+    let cmin = cfg.min;
+    let cmax = cfg.max;
+    let padMin = ifNull(cmin.pad, 0);
+    let padMax = ifNull(cmax.pad, 0);
+    let hardMin = ifNull(cmin.hard, -inf);
+    let hardMax = ifNull(cmax.hard, inf);
+    let softMin = ifNull(cmin.soft, inf);
+    let softMax = ifNull(cmax.soft, -inf);
+    let softMinMode = ifNull(cmin.mode, 0);
+    let softMaxMode = ifNull(cmax.mode, 0);
+    let delta = _max - _min;
+    let deltaMag = log10(delta);
+    let scalarMax = max(abs(_min), abs(_max));
+    let scalarMag = log10(scalarMax);
+    let scalarMagDelta = abs(scalarMag - deltaMag);
+    if (delta < 1e-24 || scalarMagDelta > 10) {
+      delta = 0;
+      if (_min == 0 || _max == 0) {
+        delta = 1e-24;
+        if (softMinMode == 2 && softMin != inf)
+          padMin = 0;
+        if (softMaxMode == 2 && softMax != -inf)
+          padMax = 0;
+      }
+    }
+    let nonZeroDelta = delta || scalarMax || 1e3;
+    let mag = log10(nonZeroDelta);
+    let base = pow(10, floor(mag));
+    let _padMin = nonZeroDelta * (delta == 0 ? _min == 0 ? 0.1 : 1 : padMin);
+    let _newMin = roundDec(incrRoundDn(_min - _padMin, base / 10), 24);
+    let _softMin = _min >= softMin && (softMinMode == 1 || softMinMode == 3 && _newMin <= softMin || softMinMode == 2 && _newMin >= softMin) ? softMin : inf;
+    let minLim = max(hardMin, _newMin < _softMin && _min >= _softMin ? _softMin : min(_softMin, _newMin));
+    let _padMax = nonZeroDelta * (delta == 0 ? _max == 0 ? 0.1 : 1 : padMax);
+    let _newMax = roundDec(incrRoundUp(_max + _padMax, base / 10), 24);
+    let _softMax = _max <= softMax && (softMaxMode == 1 || softMaxMode == 3 && _newMax >= softMax || softMaxMode == 2 && _newMax <= softMax) ? softMax : -inf;
+    let maxLim = min(hardMax, _newMax > _softMax && _max <= _softMax ? _softMax : max(_softMax, _newMax));
+    if (minLim == maxLim && minLim == 0)
+      maxLim = 100;
+    return [minLim, maxLim];
+  }
+  var numFormatter = new Intl.NumberFormat(domEnv ? nav.language : "en-US");
+  var fmtNum = (val) => numFormatter.format(val);
+  var M = Math;
+  var PI = M.PI;
+  var abs = M.abs;
+  var floor = M.floor;
+  var round = M.round;
+  var ceil = M.ceil;
+  var min = M.min;
+  var max = M.max;
+  var pow = M.pow;
+  var sign = M.sign;
+  var log10 = M.log10;
+  var log2 = M.log2;
+  var sinh = (v, linthresh = 1) => M.sinh(v) * linthresh;
+  var asinh = (v, linthresh = 1) => M.asinh(v / linthresh);
+  var inf = Infinity;
+  function numIntDigits(x) {
+    return (log10((x ^ x >> 31) - (x >> 31)) | 0) + 1;
+  }
+  function clamp(num, _min, _max) {
+    return min(max(num, _min), _max);
+  }
+  function isFn(v) {
+    return typeof v == "function";
+  }
+  function fnOrSelf(v) {
+    return isFn(v) ? v : () => v;
+  }
+  var noop = () => {
+  };
+  var retArg0 = (_0) => _0;
+  var retArg1 = (_0, _1) => _1;
+  var retNull = (_2) => null;
+  var retTrue = (_2) => true;
+  var retEq = (a, b) => a == b;
+  var regex6 = /\.\d*?(?=9{6,}|0{6,})/gm;
+  var fixFloat = (val) => {
+    if (isInt(val) || fixedDec.has(val))
+      return val;
+    const str = `${val}`;
+    const match = str.match(regex6);
+    if (match == null)
+      return val;
+    let len = match[0].length - 1;
+    if (str.indexOf("e-") != -1) {
+      let [num, exp] = str.split("e");
+      return +`${fixFloat(num)}e${exp}`;
+    }
+    return roundDec(val, len);
+  };
+  function incrRound(num, incr) {
+    return fixFloat(roundDec(fixFloat(num / incr)) * incr);
+  }
+  function incrRoundUp(num, incr) {
+    return fixFloat(ceil(fixFloat(num / incr)) * incr);
+  }
+  function incrRoundDn(num, incr) {
+    return fixFloat(floor(fixFloat(num / incr)) * incr);
+  }
+  function roundDec(val, dec = 0) {
+    if (isInt(val))
+      return val;
+    let p = 10 ** dec;
+    let n = val * p * (1 + Number.EPSILON);
+    return round(n) / p;
+  }
+  var fixedDec = /* @__PURE__ */ new Map();
+  function guessDec(num) {
+    return (("" + num).split(".")[1] || "").length;
+  }
+  function genIncrs(base, minExp, maxExp, mults) {
+    let incrs = [];
+    let multDec = mults.map(guessDec);
+    for (let exp = minExp; exp < maxExp; exp++) {
+      let expa = abs(exp);
+      let mag = roundDec(pow(base, exp), expa);
+      for (let i = 0; i < mults.length; i++) {
+        let _incr = base == 10 ? +`${mults[i]}e${exp}` : mults[i] * mag;
+        let dec = (exp >= 0 ? 0 : expa) + (exp >= multDec[i] ? 0 : multDec[i]);
+        let incr = base == 10 ? _incr : roundDec(_incr, dec);
+        incrs.push(incr);
+        fixedDec.set(incr, dec);
+      }
+    }
+    return incrs;
+  }
+  var EMPTY_OBJ = {};
+  var EMPTY_ARR = [];
+  var nullNullTuple = [null, null];
+  var isArr = Array.isArray;
+  var isInt = Number.isInteger;
+  var isUndef = (v) => v === void 0;
+  function isStr(v) {
+    return typeof v == "string";
+  }
+  function isObj(v) {
+    let is = false;
+    if (v != null) {
+      let c = v.constructor;
+      is = c == null || c == Object;
+    }
+    return is;
+  }
+  function fastIsObj(v) {
+    return v != null && typeof v == "object";
+  }
+  var TypedArray = Object.getPrototypeOf(Uint8Array);
+  var __proto__ = "__proto__";
+  function copy(o, _isObj = isObj) {
+    let out;
+    if (isArr(o)) {
+      let val = o.find((v) => v != null);
+      if (isArr(val) || _isObj(val)) {
+        out = Array(o.length);
+        for (let i = 0; i < o.length; i++)
+          out[i] = copy(o[i], _isObj);
+      } else
+        out = o.slice();
+    } else if (o instanceof TypedArray)
+      out = o.slice();
+    else if (_isObj(o)) {
+      out = {};
+      for (let k in o) {
+        if (k != __proto__)
+          out[k] = copy(o[k], _isObj);
+      }
+    } else
+      out = o;
+    return out;
+  }
+  function assign(targ) {
+    let args = arguments;
+    for (let i = 1; i < args.length; i++) {
+      let src = args[i];
+      for (let key in src) {
+        if (key != __proto__) {
+          if (isObj(targ[key]))
+            assign(targ[key], copy(src[key]));
+          else
+            targ[key] = copy(src[key]);
+        }
+      }
+    }
+    return targ;
+  }
+  var NULL_REMOVE = 0;
+  var NULL_RETAIN = 1;
+  var NULL_EXPAND = 2;
+  function nullExpand(yVals, nullIdxs, alignedLen) {
+    for (let i = 0, xi, lastNullIdx = -1; i < nullIdxs.length; i++) {
+      let nullIdx = nullIdxs[i];
+      if (nullIdx > lastNullIdx) {
+        xi = nullIdx - 1;
+        while (xi >= 0 && yVals[xi] == null)
+          yVals[xi--] = null;
+        xi = nullIdx + 1;
+        while (xi < alignedLen && yVals[xi] == null)
+          yVals[lastNullIdx = xi++] = null;
+      }
+    }
+  }
+  function join(tables, nullModes) {
+    if (allHeadersSame(tables)) {
+      let table = tables[0].slice();
+      for (let i = 1; i < tables.length; i++)
+        table.push(...tables[i].slice(1));
+      if (!isAsc(table[0]))
+        table = sortCols(table);
+      return table;
+    }
+    let xVals = /* @__PURE__ */ new Set();
+    for (let ti = 0; ti < tables.length; ti++) {
+      let t = tables[ti];
+      let xs = t[0];
+      let len = xs.length;
+      for (let i = 0; i < len; i++)
+        xVals.add(xs[i]);
+    }
+    let data = [Array.from(xVals).sort((a, b) => a - b)];
+    let alignedLen = data[0].length;
+    let xIdxs = /* @__PURE__ */ new Map();
+    for (let i = 0; i < alignedLen; i++)
+      xIdxs.set(data[0][i], i);
+    for (let ti = 0; ti < tables.length; ti++) {
+      let t = tables[ti];
+      let xs = t[0];
+      for (let si = 1; si < t.length; si++) {
+        let ys = t[si];
+        let yVals = Array(alignedLen).fill(void 0);
+        let nullMode = nullModes ? nullModes[ti][si] : NULL_RETAIN;
+        let nullIdxs = [];
+        for (let i = 0; i < ys.length; i++) {
+          let yVal = ys[i];
+          let alignedIdx = xIdxs.get(xs[i]);
+          if (yVal === null) {
+            if (nullMode != NULL_REMOVE) {
+              yVals[alignedIdx] = yVal;
+              if (nullMode == NULL_EXPAND)
+                nullIdxs.push(alignedIdx);
+            }
+          } else
+            yVals[alignedIdx] = yVal;
+        }
+        nullExpand(yVals, nullIdxs, alignedLen);
+        data.push(yVals);
+      }
+    }
+    return data;
+  }
+  var microTask = typeof queueMicrotask == "undefined" ? (fn) => Promise.resolve().then(fn) : queueMicrotask;
+  function sortCols(table) {
+    let head = table[0];
+    let rlen = head.length;
+    let idxs = Array(rlen);
+    for (let i = 0; i < idxs.length; i++)
+      idxs[i] = i;
+    idxs.sort((i0, i1) => head[i0] - head[i1]);
+    let table2 = [];
+    for (let i = 0; i < table.length; i++) {
+      let row = table[i];
+      let row2 = Array(rlen);
+      for (let j = 0; j < rlen; j++)
+        row2[j] = row[idxs[j]];
+      table2.push(row2);
+    }
+    return table2;
+  }
+  function allHeadersSame(tables) {
+    let vals0 = tables[0][0];
+    let len0 = vals0.length;
+    for (let i = 1; i < tables.length; i++) {
+      let vals1 = tables[i][0];
+      if (vals1.length != len0)
+        return false;
+      if (vals1 != vals0) {
+        for (let j = 0; j < len0; j++) {
+          if (vals1[j] != vals0[j])
+            return false;
+        }
+      }
+    }
+    return true;
+  }
+  function isAsc(vals, samples = 100) {
+    const len = vals.length;
+    if (len <= 1)
+      return true;
+    let firstIdx = 0;
+    let lastIdx = len - 1;
+    while (firstIdx <= lastIdx && vals[firstIdx] == null)
+      firstIdx++;
+    while (lastIdx >= firstIdx && vals[lastIdx] == null)
+      lastIdx--;
+    if (lastIdx <= firstIdx)
+      return true;
+    const stride = max(1, floor((lastIdx - firstIdx + 1) / samples));
+    for (let prevVal = vals[firstIdx], i = firstIdx + stride; i <= lastIdx; i += stride) {
+      const v = vals[i];
+      if (v != null) {
+        if (v <= prevVal)
+          return false;
+        prevVal = v;
+      }
+    }
+    return true;
+  }
+  var months = [
+    "January",
+    "February",
+    "March",
+    "April",
+    "May",
+    "June",
+    "July",
+    "August",
+    "September",
+    "October",
+    "November",
+    "December"
+  ];
+  var days = [
+    "Sunday",
+    "Monday",
+    "Tuesday",
+    "Wednesday",
+    "Thursday",
+    "Friday",
+    "Saturday"
+  ];
+  function slice3(str) {
+    return str.slice(0, 3);
+  }
+  var days3 = days.map(slice3);
+  var months3 = months.map(slice3);
+  var engNames = {
+    MMMM: months,
+    MMM: months3,
+    WWWW: days,
+    WWW: days3
+  };
+  function zeroPad2(int) {
+    return (int < 10 ? "0" : "") + int;
+  }
+  function zeroPad3(int) {
+    return (int < 10 ? "00" : int < 100 ? "0" : "") + int;
+  }
+  var subs = {
+    // 2019
+    YYYY: (d) => d.getFullYear(),
+    // 19
+    YY: (d) => (d.getFullYear() + "").slice(2),
+    // July
+    MMMM: (d, names) => names.MMMM[d.getMonth()],
+    // Jul
+    MMM: (d, names) => names.MMM[d.getMonth()],
+    // 07
+    MM: (d) => zeroPad2(d.getMonth() + 1),
+    // 7
+    M: (d) => d.getMonth() + 1,
+    // 09
+    DD: (d) => zeroPad2(d.getDate()),
+    // 9
+    D: (d) => d.getDate(),
+    // Monday
+    WWWW: (d, names) => names.WWWW[d.getDay()],
+    // Mon
+    WWW: (d, names) => names.WWW[d.getDay()],
+    // 03
+    HH: (d) => zeroPad2(d.getHours()),
+    // 3
+    H: (d) => d.getHours(),
+    // 9 (12hr, unpadded)
+    h: (d) => {
+      let h = d.getHours();
+      return h == 0 ? 12 : h > 12 ? h - 12 : h;
+    },
+    // AM
+    AA: (d) => d.getHours() >= 12 ? "PM" : "AM",
+    // am
+    aa: (d) => d.getHours() >= 12 ? "pm" : "am",
+    // a
+    a: (d) => d.getHours() >= 12 ? "p" : "a",
+    // 09
+    mm: (d) => zeroPad2(d.getMinutes()),
+    // 9
+    m: (d) => d.getMinutes(),
+    // 09
+    ss: (d) => zeroPad2(d.getSeconds()),
+    // 9
+    s: (d) => d.getSeconds(),
+    // 374
+    fff: (d) => zeroPad3(d.getMilliseconds())
+  };
+  function fmtDate(tpl, names) {
+    names = names || engNames;
+    let parts = [];
+    let R = /\{([a-z]+)\}|[^{]+/gi, m;
+    while (m = R.exec(tpl))
+      parts.push(m[0][0] == "{" ? subs[m[1]] : m[0]);
+    return (d) => {
+      let out = "";
+      for (let i = 0; i < parts.length; i++)
+        out += typeof parts[i] == "string" ? parts[i] : parts[i](d, names);
+      return out;
+    };
+  }
+  var localTz = new Intl.DateTimeFormat().resolvedOptions().timeZone;
+  function tzDate(date, tz) {
+    let date2;
+    if (tz == "UTC" || tz == "Etc/UTC")
+      date2 = new Date(+date + date.getTimezoneOffset() * 6e4);
+    else if (tz == localTz)
+      date2 = date;
+    else {
+      date2 = new Date(date.toLocaleString("en-US", { timeZone: tz }));
+      date2.setMilliseconds(date.getMilliseconds());
+    }
+    return date2;
+  }
+  var onlyWhole = (v) => v % 1 == 0;
+  var allMults = [1, 2, 2.5, 5];
+  var decIncrs = genIncrs(10, -32, 0, allMults);
+  var oneIncrs = genIncrs(10, 0, 32, allMults);
+  var wholeIncrs = oneIncrs.filter(onlyWhole);
+  var numIncrs = decIncrs.concat(oneIncrs);
+  var NL = "\n";
+  var yyyy = "{YYYY}";
+  var NLyyyy = NL + yyyy;
+  var md = "{M}/{D}";
+  var NLmd = NL + md;
+  var NLmdyy = NLmd + "/{YY}";
+  var aa = "{aa}";
+  var hmm = "{h}:{mm}";
+  var hmmaa = hmm + aa;
+  var NLhmmaa = NL + hmmaa;
+  var ss = ":{ss}";
+  var _ = null;
+  function genTimeStuffs(ms) {
+    let s = ms * 1e3, m = s * 60, h = m * 60, d = h * 24, mo = d * 30, y = d * 365;
+    let subSecIncrs = ms == 1 ? genIncrs(10, 0, 3, allMults).filter(onlyWhole) : genIncrs(10, -3, 0, allMults);
+    let timeIncrs = subSecIncrs.concat([
+      // minute divisors (# of secs)
+      s,
+      s * 5,
+      s * 10,
+      s * 15,
+      s * 30,
+      // hour divisors (# of mins)
+      m,
+      m * 5,
+      m * 10,
+      m * 15,
+      m * 30,
+      // day divisors (# of hrs)
+      h,
+      h * 2,
+      h * 3,
+      h * 4,
+      h * 6,
+      h * 8,
+      h * 12,
+      // month divisors TODO: need more?
+      d,
+      d * 2,
+      d * 3,
+      d * 4,
+      d * 5,
+      d * 6,
+      d * 7,
+      d * 8,
+      d * 9,
+      d * 10,
+      d * 15,
+      // year divisors (# months, approx)
+      mo,
+      mo * 2,
+      mo * 3,
+      mo * 4,
+      mo * 6,
+      // century divisors
+      y,
+      y * 2,
+      y * 5,
+      y * 10,
+      y * 25,
+      y * 50,
+      y * 100
+    ]);
+    const _timeAxisStamps = [
+      //   tick incr    default          year                    month   day                   hour    min       sec   mode
+      [y, yyyy, _, _, _, _, _, _, 1],
+      [d * 28, "{MMM}", NLyyyy, _, _, _, _, _, 1],
+      [d, md, NLyyyy, _, _, _, _, _, 1],
+      [h, "{h}" + aa, NLmdyy, _, NLmd, _, _, _, 1],
+      [m, hmmaa, NLmdyy, _, NLmd, _, _, _, 1],
+      [s, ss, NLmdyy + " " + hmmaa, _, NLmd + " " + hmmaa, _, NLhmmaa, _, 1],
+      [ms, ss + ".{fff}", NLmdyy + " " + hmmaa, _, NLmd + " " + hmmaa, _, NLhmmaa, _, 1]
+    ];
+    function timeAxisSplits(tzDate2) {
+      return (self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace) => {
+        let splits = [];
+        let isYr = foundIncr >= y;
+        let isMo = foundIncr >= mo && foundIncr < y;
+        let minDate = tzDate2(scaleMin);
+        let minDateTs = roundDec(minDate * ms, 3);
+        let minMin = mkDate(minDate.getFullYear(), isYr ? 0 : minDate.getMonth(), isMo || isYr ? 1 : minDate.getDate());
+        let minMinTs = roundDec(minMin * ms, 3);
+        if (isMo || isYr) {
+          let moIncr = isMo ? foundIncr / mo : 0;
+          let yrIncr = isYr ? foundIncr / y : 0;
+          let split = minDateTs == minMinTs ? minDateTs : roundDec(mkDate(minMin.getFullYear() + yrIncr, minMin.getMonth() + moIncr, 1) * ms, 3);
+          let splitDate = new Date(round(split / ms));
+          let baseYear = splitDate.getFullYear();
+          let baseMonth = splitDate.getMonth();
+          for (let i = 0; split <= scaleMax; i++) {
+            let next = mkDate(baseYear + yrIncr * i, baseMonth + moIncr * i, 1);
+            let offs = next - tzDate2(roundDec(next * ms, 3));
+            split = roundDec((+next + offs) * ms, 3);
+            if (split <= scaleMax)
+              splits.push(split);
+          }
+        } else {
+          let incr0 = foundIncr >= d ? d : foundIncr;
+          let tzOffset = floor(scaleMin) - floor(minDateTs);
+          let split = minMinTs + tzOffset + incrRoundUp(minDateTs - minMinTs, incr0);
+          splits.push(split);
+          let date0 = tzDate2(split);
+          let prevHour = date0.getHours() + date0.getMinutes() / m + date0.getSeconds() / h;
+          let incrHours = foundIncr / h;
+          let minSpace = self.axes[axisIdx]._space;
+          let pctSpace = foundSpace / minSpace;
+          while (1) {
+            split = roundDec(split + foundIncr, ms == 1 ? 0 : 3);
+            if (split > scaleMax)
+              break;
+            if (incrHours > 1) {
+              let expectedHour = floor(roundDec(prevHour + incrHours, 6)) % 24;
+              let splitDate = tzDate2(split);
+              let actualHour = splitDate.getHours();
+              let dstShift = actualHour - expectedHour;
+              if (dstShift > 1)
+                dstShift = -1;
+              split -= dstShift * h;
+              prevHour = (prevHour + incrHours) % 24;
+              let prevSplit = splits[splits.length - 1];
+              let pctIncr = roundDec((split - prevSplit) / foundIncr, 3);
+              if (pctIncr * pctSpace >= 0.7)
+                splits.push(split);
+            } else
+              splits.push(split);
+          }
+        }
+        return splits;
+      };
+    }
+    return [
+      timeIncrs,
+      _timeAxisStamps,
+      timeAxisSplits
+    ];
+  }
+  var [timeIncrsMs, _timeAxisStampsMs, timeAxisSplitsMs] = genTimeStuffs(1);
+  var [timeIncrsS, _timeAxisStampsS, timeAxisSplitsS] = genTimeStuffs(1e-3);
+  genIncrs(2, -53, 53, [1]);
+  function timeAxisStamps(stampCfg, fmtDate2) {
+    return stampCfg.map((s) => s.map(
+      (v, i) => i == 0 || i == 8 || v == null ? v : fmtDate2(i == 1 || s[8] == 0 ? v : s[1] + v)
+    ));
+  }
+  function timeAxisVals(tzDate2, stamps) {
+    return (self, splits, axisIdx, foundSpace, foundIncr) => {
+      let s = stamps.find((s2) => foundIncr >= s2[0]) || stamps[stamps.length - 1];
+      let prevYear;
+      let prevMnth;
+      let prevDate;
+      let prevHour;
+      let prevMins;
+      let prevSecs;
+      return splits.map((split) => {
+        let date = tzDate2(split);
+        let newYear = date.getFullYear();
+        let newMnth = date.getMonth();
+        let newDate = date.getDate();
+        let newHour = date.getHours();
+        let newMins = date.getMinutes();
+        let newSecs = date.getSeconds();
+        let stamp = newYear != prevYear && s[2] || newMnth != prevMnth && s[3] || newDate != prevDate && s[4] || newHour != prevHour && s[5] || newMins != prevMins && s[6] || newSecs != prevSecs && s[7] || s[1];
+        prevYear = newYear;
+        prevMnth = newMnth;
+        prevDate = newDate;
+        prevHour = newHour;
+        prevMins = newMins;
+        prevSecs = newSecs;
+        return stamp(date);
+      });
+    };
+  }
+  function timeAxisVal(tzDate2, dateTpl) {
+    let stamp = fmtDate(dateTpl);
+    return (self, splits, axisIdx, foundSpace, foundIncr) => splits.map((split) => stamp(tzDate2(split)));
+  }
+  function mkDate(y, m, d) {
+    return new Date(y, m, d);
+  }
+  function timeSeriesStamp(stampCfg, fmtDate2) {
+    return fmtDate2(stampCfg);
+  }
+  var _timeSeriesStamp = "{YYYY}-{MM}-{DD} {h}:{mm}{aa}";
+  function timeSeriesVal(tzDate2, stamp) {
+    return (self, val, seriesIdx, dataIdx) => dataIdx == null ? LEGEND_DISP : stamp(tzDate2(val));
+  }
+  function legendStroke(self, seriesIdx) {
+    let s = self.series[seriesIdx];
+    return s.width ? s.stroke(self, seriesIdx) : s.points.width ? s.points.stroke(self, seriesIdx) : null;
+  }
+  function legendFill(self, seriesIdx) {
+    return self.series[seriesIdx].fill(self, seriesIdx);
+  }
+  var legendOpts = {
+    show: true,
+    live: true,
+    isolate: false,
+    mount: noop,
+    markers: {
+      show: true,
+      width: 2,
+      stroke: legendStroke,
+      fill: legendFill,
+      dash: "solid"
+    },
+    idx: null,
+    idxs: null,
+    values: []
+  };
+  function cursorPointShow(self, si) {
+    let o = self.cursor.points;
+    let pt = placeDiv();
+    let size = o.size(self, si);
+    setStylePx(pt, WIDTH, size);
+    setStylePx(pt, HEIGHT, size);
+    let mar = size / -2;
+    setStylePx(pt, "marginLeft", mar);
+    setStylePx(pt, "marginTop", mar);
+    let width = o.width(self, si, size);
+    width && setStylePx(pt, "borderWidth", width);
+    return pt;
+  }
+  function cursorPointFill(self, si) {
+    let sp = self.series[si].points;
+    return sp._fill || sp._stroke;
+  }
+  function cursorPointStroke(self, si) {
+    let sp = self.series[si].points;
+    return sp._stroke || sp._fill;
+  }
+  function cursorPointSize(self, si) {
+    let sp = self.series[si].points;
+    return sp.size;
+  }
+  var moveTuple = [0, 0];
+  function cursorMove(self, mouseLeft1, mouseTop1) {
+    moveTuple[0] = mouseLeft1;
+    moveTuple[1] = mouseTop1;
+    return moveTuple;
+  }
+  function filtBtn0(self, targ, handle, onlyTarg = true) {
+    return (e) => {
+      e.button == 0 && (!onlyTarg || e.target == targ) && handle(e);
+    };
+  }
+  function filtTarg(self, targ, handle, onlyTarg = true) {
+    return (e) => {
+      (!onlyTarg || e.target == targ) && handle(e);
+    };
+  }
+  var cursorOpts = {
+    show: true,
+    x: true,
+    y: true,
+    lock: false,
+    move: cursorMove,
+    points: {
+      one: false,
+      show: cursorPointShow,
+      size: cursorPointSize,
+      width: 0,
+      stroke: cursorPointStroke,
+      fill: cursorPointFill
+    },
+    bind: {
+      mousedown: filtBtn0,
+      mouseup: filtBtn0,
+      click: filtBtn0,
+      // legend clicks, not .u-over clicks
+      dblclick: filtBtn0,
+      mousemove: filtTarg,
+      mouseleave: filtTarg,
+      mouseenter: filtTarg
+    },
+    drag: {
+      setScale: true,
+      x: true,
+      y: false,
+      dist: 0,
+      uni: null,
+      click: (self, e) => {
+        e.stopPropagation();
+        e.stopImmediatePropagation();
+      },
+      _x: false,
+      _y: false
+    },
+    focus: {
+      dist: (self, seriesIdx, dataIdx, valPos, curPos) => valPos - curPos,
+      prox: -1,
+      bias: 0
+    },
+    hover: {
+      skip: [void 0],
+      prox: null,
+      bias: 0
+    },
+    left: -10,
+    top: -10,
+    idx: null,
+    dataIdx: null,
+    idxs: null,
+    event: null
+  };
+  var axisLines = {
+    show: true,
+    stroke: "rgba(0,0,0,0.07)",
+    width: 2
+    //	dash: [],
+  };
+  var grid = assign({}, axisLines, {
+    filter: retArg1
+  });
+  var ticks = assign({}, grid, {
+    size: 10
+  });
+  var border = assign({}, axisLines, {
+    show: false
+  });
+  var font = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, "Noto Sans", sans-serif, "Apple Color Emoji", "Segoe UI Emoji", "Segoe UI Symbol", "Noto Color Emoji"';
+  var labelFont = "bold " + font;
+  var lineGap = 1.5;
+  var xAxisOpts = {
+    show: true,
+    scale: "x",
+    stroke: hexBlack,
+    space: 50,
+    gap: 5,
+    alignTo: 1,
+    size: 50,
+    labelGap: 0,
+    labelSize: 30,
+    labelFont,
+    side: 2,
+    //	class: "x-vals",
+    //	incrs: timeIncrs,
+    //	values: timeVals,
+    //	filter: retArg1,
+    grid,
+    ticks,
+    border,
+    font,
+    lineGap,
+    rotate: 0
+  };
+  var numSeriesLabel = "Value";
+  var timeSeriesLabel = "Time";
+  var xSeriesOpts = {
+    show: true,
+    scale: "x",
+    auto: false,
+    sorted: 1,
+    //	label: "Time",
+    //	value: v => stamp(new Date(v * 1e3)),
+    // internal caches
+    min: inf,
+    max: -inf,
+    idxs: []
+  };
+  function numAxisVals(self, splits, axisIdx, foundSpace, foundIncr) {
+    return splits.map((v) => v == null ? "" : fmtNum(v));
+  }
+  function numAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
+    let splits = [];
+    let numDec = fixedDec.get(foundIncr) || 0;
+    scaleMin = forceMin ? scaleMin : roundDec(incrRoundUp(scaleMin, foundIncr), numDec);
+    for (let val = scaleMin; val <= scaleMax; val = roundDec(val + foundIncr, numDec))
+      splits.push(Object.is(val, -0) ? 0 : val);
+    return splits;
+  }
+  function logAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
+    const splits = [];
+    const logBase = self.scales[self.axes[axisIdx].scale].log;
+    const logFn = logBase == 10 ? log10 : log2;
+    const exp = floor(logFn(scaleMin));
+    foundIncr = pow(logBase, exp);
+    if (logBase == 10)
+      foundIncr = numIncrs[closestIdx(foundIncr, numIncrs)];
+    let split = scaleMin;
+    let nextMagIncr = foundIncr * logBase;
+    if (logBase == 10)
+      nextMagIncr = numIncrs[closestIdx(nextMagIncr, numIncrs)];
+    do {
+      splits.push(split);
+      split = split + foundIncr;
+      if (logBase == 10 && !fixedDec.has(split))
+        split = roundDec(split, fixedDec.get(foundIncr));
+      if (split >= nextMagIncr) {
+        foundIncr = split;
+        nextMagIncr = foundIncr * logBase;
+        if (logBase == 10)
+          nextMagIncr = numIncrs[closestIdx(nextMagIncr, numIncrs)];
+      }
+    } while (split <= scaleMax);
+    return splits;
+  }
+  function asinhAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
+    let sc = self.scales[self.axes[axisIdx].scale];
+    let linthresh = sc.asinh;
+    let posSplits = scaleMax > linthresh ? logAxisSplits(self, axisIdx, max(linthresh, scaleMin), scaleMax, foundIncr) : [linthresh];
+    let zero = scaleMax >= 0 && scaleMin <= 0 ? [0] : [];
+    let negSplits = scaleMin < -linthresh ? logAxisSplits(self, axisIdx, max(linthresh, -scaleMax), -scaleMin, foundIncr) : [linthresh];
+    return negSplits.reverse().map((v) => -v).concat(zero, posSplits);
+  }
+  var RE_ALL = /./;
+  var RE_12357 = /[12357]/;
+  var RE_125 = /[125]/;
+  var RE_1 = /1/;
+  var _filt = (splits, distr, re, keepMod) => splits.map((v, i) => distr == 4 && v == 0 || i % keepMod == 0 && re.test(v.toExponential()[v < 0 ? 1 : 0]) ? v : null);
+  function log10AxisValsFilt(self, splits, axisIdx, foundSpace, foundIncr) {
+    let axis = self.axes[axisIdx];
+    let scaleKey = axis.scale;
+    let sc = self.scales[scaleKey];
+    let valToPos = self.valToPos;
+    let minSpace = axis._space;
+    let _10 = valToPos(10, scaleKey);
+    let re = valToPos(9, scaleKey) - _10 >= minSpace ? RE_ALL : valToPos(7, scaleKey) - _10 >= minSpace ? RE_12357 : valToPos(5, scaleKey) - _10 >= minSpace ? RE_125 : RE_1;
+    if (re == RE_1) {
+      let magSpace = abs(valToPos(1, scaleKey) - _10);
+      if (magSpace < minSpace)
+        return _filt(splits.slice().reverse(), sc.distr, re, ceil(minSpace / magSpace)).reverse();
+    }
+    return _filt(splits, sc.distr, re, 1);
+  }
+  function log2AxisValsFilt(self, splits, axisIdx, foundSpace, foundIncr) {
+    let axis = self.axes[axisIdx];
+    let scaleKey = axis.scale;
+    let minSpace = axis._space;
+    let valToPos = self.valToPos;
+    let magSpace = abs(valToPos(1, scaleKey) - valToPos(2, scaleKey));
+    if (magSpace < minSpace)
+      return _filt(splits.slice().reverse(), 3, RE_ALL, ceil(minSpace / magSpace)).reverse();
+    return splits;
+  }
+  function numSeriesVal(self, val, seriesIdx, dataIdx) {
+    return dataIdx == null ? LEGEND_DISP : val == null ? "" : fmtNum(val);
+  }
+  var yAxisOpts = {
+    show: true,
+    scale: "y",
+    stroke: hexBlack,
+    space: 30,
+    gap: 5,
+    alignTo: 1,
+    size: 50,
+    labelGap: 0,
+    labelSize: 30,
+    labelFont,
+    side: 3,
+    //	class: "y-vals",
+    //	incrs: numIncrs,
+    //	values: (vals, space) => vals,
+    //	filter: retArg1,
+    grid,
+    ticks,
+    border,
+    font,
+    lineGap,
+    rotate: 0
+  };
+  function ptDia(width, mult) {
+    let dia = 3 + (width || 1) * 2;
+    return roundDec(dia * mult, 3);
+  }
+  function seriesPointsShow(self, si) {
+    let { scale, idxs } = self.series[0];
+    let xData = self._data[0];
+    let p0 = self.valToPos(xData[idxs[0]], scale, true);
+    let p1 = self.valToPos(xData[idxs[1]], scale, true);
+    let dim = abs(p1 - p0);
+    let s = self.series[si];
+    let maxPts = dim / (s.points.space * pxRatio);
+    return idxs[1] - idxs[0] <= maxPts;
+  }
+  var facet = {
+    scale: null,
+    auto: true,
+    sorted: 0,
+    // internal caches
+    min: inf,
+    max: -inf
+  };
+  var gaps = (self, seriesIdx, idx0, idx1, nullGaps) => nullGaps;
+  var xySeriesOpts = {
+    show: true,
+    auto: true,
+    sorted: 0,
+    gaps,
+    alpha: 1,
+    facets: [
+      assign({}, facet, { scale: "x" }),
+      assign({}, facet, { scale: "y" })
+    ]
+  };
+  var ySeriesOpts = {
+    scale: "y",
+    auto: true,
+    sorted: 0,
+    show: true,
+    spanGaps: false,
+    gaps,
+    alpha: 1,
+    points: {
+      show: seriesPointsShow,
+      filter: null
+      //  paths:
+      //	stroke: "#000",
+      //	fill: "#fff",
+      //	width: 1,
+      //	size: 10,
+    },
+    //	label: "Value",
+    //	value: v => v,
+    values: null,
+    // internal caches
+    min: inf,
+    max: -inf,
+    idxs: [],
+    path: null,
+    clip: null
+  };
+  function clampScale(self, val, scaleMin, scaleMax, scaleKey) {
+    return scaleMin / 10;
+  }
+  var xScaleOpts = {
+    time: FEAT_TIME,
+    auto: true,
+    distr: 1,
+    log: 10,
+    asinh: 1,
+    min: null,
+    max: null,
+    dir: 1,
+    ori: 0
+  };
+  var yScaleOpts = assign({}, xScaleOpts, {
+    time: false,
+    ori: 1
+  });
+  var syncs = {};
+  function _sync(key, opts) {
+    let s = syncs[key];
+    if (!s) {
+      s = {
+        key,
+        plots: [],
+        sub(plot) {
+          s.plots.push(plot);
+        },
+        unsub(plot) {
+          s.plots = s.plots.filter((c) => c != plot);
+        },
+        pub(type, self, x, y, w, h, i) {
+          for (let j = 0; j < s.plots.length; j++)
+            s.plots[j] != self && s.plots[j].pub(type, self, x, y, w, h, i);
+        }
+      };
+      if (key != null)
+        syncs[key] = s;
+    }
+    return s;
+  }
+  var BAND_CLIP_FILL = 1 << 0;
+  var BAND_CLIP_STROKE = 1 << 1;
+  function orient(u, seriesIdx, cb) {
+    const mode2 = u.mode;
+    const series = u.series[seriesIdx];
+    const data = mode2 == 2 ? u._data[seriesIdx] : u._data;
+    const scales = u.scales;
+    const bbox = u.bbox;
+    let dx = data[0], dy = mode2 == 2 ? data[1] : data[seriesIdx], sx = mode2 == 2 ? scales[series.facets[0].scale] : scales[u.series[0].scale], sy = mode2 == 2 ? scales[series.facets[1].scale] : scales[series.scale], l = bbox.left, t = bbox.top, w = bbox.width, h = bbox.height, H = u.valToPosH, V = u.valToPosV;
+    return sx.ori == 0 ? cb(
+      series,
+      dx,
+      dy,
+      sx,
+      sy,
+      H,
+      V,
+      l,
+      t,
+      w,
+      h,
+      moveToH,
+      lineToH,
+      rectH,
+      arcH,
+      bezierCurveToH
+    ) : cb(
+      series,
+      dx,
+      dy,
+      sx,
+      sy,
+      V,
+      H,
+      t,
+      l,
+      h,
+      w,
+      moveToV,
+      lineToV,
+      rectV,
+      arcV,
+      bezierCurveToV
+    );
+  }
+  function bandFillClipDirs(self, seriesIdx) {
+    let fillDir = 0;
+    let clipDirs = 0;
+    let bands = ifNull(self.bands, EMPTY_ARR);
+    for (let i = 0; i < bands.length; i++) {
+      let b = bands[i];
+      if (b.series[0] == seriesIdx)
+        fillDir = b.dir;
+      else if (b.series[1] == seriesIdx) {
+        if (b.dir == 1)
+          clipDirs |= 1;
+        else
+          clipDirs |= 2;
+      }
+    }
+    return [
+      fillDir,
+      clipDirs == 1 ? -1 : (
+        // neg only
+        clipDirs == 2 ? 1 : (
+          // pos only
+          clipDirs == 3 ? 2 : (
+            // both
+            0
+          )
+        )
+      )
+    ];
+  }
+  function seriesFillTo(self, seriesIdx, dataMin, dataMax, bandFillDir) {
+    let mode2 = self.mode;
+    let series = self.series[seriesIdx];
+    let scaleKey = mode2 == 2 ? series.facets[1].scale : series.scale;
+    let scale = self.scales[scaleKey];
+    return bandFillDir == -1 ? scale.min : bandFillDir == 1 ? scale.max : scale.distr == 3 ? scale.dir == 1 ? scale.min : scale.max : 0;
+  }
+  function clipBandLine(self, seriesIdx, idx0, idx1, strokePath, clipDir) {
+    return orient(self, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+      let pxRound = series.pxRound;
+      const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
+      const lineTo = scaleX.ori == 0 ? lineToH : lineToV;
+      let frIdx, toIdx;
+      if (dir == 1) {
+        frIdx = idx0;
+        toIdx = idx1;
+      } else {
+        frIdx = idx1;
+        toIdx = idx0;
+      }
+      let x0 = pxRound(valToPosX(dataX[frIdx], scaleX, xDim, xOff));
+      let y0 = pxRound(valToPosY(dataY[frIdx], scaleY, yDim, yOff));
+      let x1 = pxRound(valToPosX(dataX[toIdx], scaleX, xDim, xOff));
+      let yLimit = pxRound(valToPosY(clipDir == 1 ? scaleY.max : scaleY.min, scaleY, yDim, yOff));
+      let clip = new Path2D(strokePath);
+      lineTo(clip, x1, yLimit);
+      lineTo(clip, x0, yLimit);
+      lineTo(clip, x0, y0);
+      return clip;
+    });
+  }
+  function clipGaps(gaps2, ori, plotLft, plotTop, plotWid, plotHgt) {
+    let clip = null;
+    if (gaps2.length > 0) {
+      clip = new Path2D();
+      const rect2 = ori == 0 ? rectH : rectV;
+      let prevGapEnd = plotLft;
+      for (let i = 0; i < gaps2.length; i++) {
+        let g = gaps2[i];
+        if (g[1] > g[0]) {
+          let w2 = g[0] - prevGapEnd;
+          w2 > 0 && rect2(clip, prevGapEnd, plotTop, w2, plotTop + plotHgt);
+          prevGapEnd = g[1];
+        }
+      }
+      let w = plotLft + plotWid - prevGapEnd;
+      let maxStrokeWidth = 10;
+      w > 0 && rect2(clip, prevGapEnd, plotTop - maxStrokeWidth / 2, w, plotTop + plotHgt + maxStrokeWidth);
+    }
+    return clip;
+  }
+  function addGap(gaps2, fromX, toX) {
+    let prevGap = gaps2[gaps2.length - 1];
+    if (prevGap && prevGap[0] == fromX)
+      prevGap[1] = toX;
+    else
+      gaps2.push([fromX, toX]);
+  }
+  function findGaps(xs, ys, idx0, idx1, dir, pixelForX, align) {
+    let gaps2 = [];
+    let len = xs.length;
+    for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
+      let yVal = ys[i];
+      if (yVal === null) {
+        let fr = i, to = i;
+        if (dir == 1) {
+          while (++i <= idx1 && ys[i] === null)
+            to = i;
+        } else {
+          while (--i >= idx0 && ys[i] === null)
+            to = i;
+        }
+        let frPx = pixelForX(xs[fr]);
+        let toPx = to == fr ? frPx : pixelForX(xs[to]);
+        let fri2 = fr - dir;
+        let frPx2 = align <= 0 && fri2 >= 0 && fri2 < len ? pixelForX(xs[fri2]) : frPx;
+        frPx = frPx2;
+        let toi2 = to + dir;
+        let toPx2 = align >= 0 && toi2 >= 0 && toi2 < len ? pixelForX(xs[toi2]) : toPx;
+        toPx = toPx2;
+        if (toPx >= frPx)
+          gaps2.push([frPx, toPx]);
+      }
+    }
+    return gaps2;
+  }
+  function pxRoundGen(pxAlign) {
+    return pxAlign == 0 ? retArg0 : pxAlign == 1 ? round : (v) => incrRound(v, pxAlign);
+  }
+  function rect(ori) {
+    let moveTo = ori == 0 ? moveToH : moveToV;
+    let arcTo = ori == 0 ? (p, x1, y1, x2, y2, r) => {
+      p.arcTo(x1, y1, x2, y2, r);
+    } : (p, y1, x1, y2, x2, r) => {
+      p.arcTo(x1, y1, x2, y2, r);
+    };
+    let rect2 = ori == 0 ? (p, x, y, w, h) => {
+      p.rect(x, y, w, h);
+    } : (p, y, x, h, w) => {
+      p.rect(x, y, w, h);
+    };
+    return (p, x, y, w, h, endRad = 0, baseRad = 0) => {
+      if (endRad == 0 && baseRad == 0)
+        rect2(p, x, y, w, h);
+      else {
+        endRad = min(endRad, w / 2, h / 2);
+        baseRad = min(baseRad, w / 2, h / 2);
+        moveTo(p, x + endRad, y);
+        arcTo(p, x + w, y, x + w, y + h, endRad);
+        arcTo(p, x + w, y + h, x, y + h, baseRad);
+        arcTo(p, x, y + h, x, y, baseRad);
+        arcTo(p, x, y, x + w, y, endRad);
+        p.closePath();
+      }
+    };
+  }
+  var moveToH = (p, x, y) => {
+    p.moveTo(x, y);
+  };
+  var moveToV = (p, y, x) => {
+    p.moveTo(x, y);
+  };
+  var lineToH = (p, x, y) => {
+    p.lineTo(x, y);
+  };
+  var lineToV = (p, y, x) => {
+    p.lineTo(x, y);
+  };
+  var rectH = rect(0);
+  var rectV = rect(1);
+  var arcH = (p, x, y, r, startAngle, endAngle) => {
+    p.arc(x, y, r, startAngle, endAngle);
+  };
+  var arcV = (p, y, x, r, startAngle, endAngle) => {
+    p.arc(x, y, r, startAngle, endAngle);
+  };
+  var bezierCurveToH = (p, bp1x, bp1y, bp2x, bp2y, p2x, p2y) => {
+    p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y);
+  };
+  var bezierCurveToV = (p, bp1y, bp1x, bp2y, bp2x, p2y, p2x) => {
+    p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y);
+  };
+  function points(opts) {
+    return (u, seriesIdx, idx0, idx1, filtIdxs) => {
+      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+        let { pxRound, points: points2 } = series;
+        let moveTo, arc;
+        if (scaleX.ori == 0) {
+          moveTo = moveToH;
+          arc = arcH;
+        } else {
+          moveTo = moveToV;
+          arc = arcV;
+        }
+        const width = roundDec(points2.width * pxRatio, 3);
+        let rad = (points2.size - points2.width) / 2 * pxRatio;
+        let dia = roundDec(rad * 2, 3);
+        let fill = new Path2D();
+        let clip = new Path2D();
+        let { left: lft, top, width: wid, height: hgt } = u.bbox;
+        rectH(
+          clip,
+          lft - dia,
+          top - dia,
+          wid + dia * 2,
+          hgt + dia * 2
+        );
+        const drawPoint = (pi) => {
+          if (dataY[pi] != null) {
+            let x = pxRound(valToPosX(dataX[pi], scaleX, xDim, xOff));
+            let y = pxRound(valToPosY(dataY[pi], scaleY, yDim, yOff));
+            moveTo(fill, x + rad, y);
+            arc(fill, x, y, rad, 0, PI * 2);
+          }
+        };
+        if (filtIdxs)
+          filtIdxs.forEach(drawPoint);
+        else {
+          for (let pi = idx0; pi <= idx1; pi++)
+            drawPoint(pi);
+        }
+        return {
+          stroke: width > 0 ? fill : null,
+          fill,
+          clip,
+          flags: BAND_CLIP_FILL | BAND_CLIP_STROKE
+        };
+      });
+    };
+  }
+  function _drawAcc(lineTo) {
+    return (stroke, accX, minY, maxY, inY, outY) => {
+      if (minY != maxY) {
+        if (inY != minY && outY != minY)
+          lineTo(stroke, accX, minY);
+        if (inY != maxY && outY != maxY)
+          lineTo(stroke, accX, maxY);
+        lineTo(stroke, accX, outY);
+      }
+    };
+  }
+  var drawAccH = _drawAcc(lineToH);
+  var drawAccV = _drawAcc(lineToV);
+  function linear(opts) {
+    const alignGaps = ifNull(opts?.alignGaps, 0);
+    return (u, seriesIdx, idx0, idx1) => {
+      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
+        let pxRound = series.pxRound;
+        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
+        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
+        let lineTo, drawAcc;
+        if (scaleX.ori == 0) {
+          lineTo = lineToH;
+          drawAcc = drawAccH;
+        } else {
+          lineTo = lineToV;
+          drawAcc = drawAccV;
+        }
+        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
+        const _paths = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
+        const stroke = _paths.stroke;
+        let hasGap = false;
+        const decimate = idx1 - idx0 >= xDim * 4;
+        if (decimate) {
+          let xForPixel = (pos) => u.posToVal(pos, scaleX.key, true);
+          let minY = null, maxY = null, inY, outY, drawnAtX;
+          let accX = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
+          let idx0px = pixelForX(dataX[idx0]);
+          let idx1px = pixelForX(dataX[idx1]);
+          let nextAccXVal = xForPixel(dir == 1 ? idx0px + 1 : idx1px - 1);
+          for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
+            let xVal = dataX[i];
+            let reuseAccX = dir == 1 ? xVal < nextAccXVal : xVal > nextAccXVal;
+            let x = reuseAccX ? accX : pixelForX(xVal);
+            let yVal = dataY[i];
+            if (x == accX) {
+              if (yVal != null) {
+                outY = yVal;
+                if (minY == null) {
+                  lineTo(stroke, x, pixelForY(outY));
+                  inY = minY = maxY = outY;
+                } else {
+                  if (outY < minY)
+                    minY = outY;
+                  else if (outY > maxY)
+                    maxY = outY;
+                }
+              } else {
+                if (yVal === null)
+                  hasGap = true;
+              }
+            } else {
+              if (minY != null)
+                drawAcc(stroke, accX, pixelForY(minY), pixelForY(maxY), pixelForY(inY), pixelForY(outY));
+              if (yVal != null) {
+                outY = yVal;
+                lineTo(stroke, x, pixelForY(outY));
+                minY = maxY = inY = outY;
+              } else {
+                minY = maxY = null;
+                if (yVal === null)
+                  hasGap = true;
+              }
+              accX = x;
+              nextAccXVal = xForPixel(accX + dir);
+            }
+          }
+          if (minY != null && minY != maxY && drawnAtX != accX)
+            drawAcc(stroke, accX, pixelForY(minY), pixelForY(maxY), pixelForY(inY), pixelForY(outY));
+        } else {
+          for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
+            let yVal = dataY[i];
+            if (yVal === null)
+              hasGap = true;
+            else if (yVal != null)
+              lineTo(stroke, pixelForX(dataX[i]), pixelForY(yVal));
+          }
+        }
+        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
+        if (series.fill != null || bandFillDir != 0) {
+          let fill = _paths.fill = new Path2D(stroke);
+          let fillToVal = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
+          let fillToY = pixelForY(fillToVal);
+          let frX = pixelForX(dataX[idx0]);
+          let toX = pixelForX(dataX[idx1]);
+          if (dir == -1)
+            [toX, frX] = [frX, toX];
+          lineTo(fill, toX, fillToY);
+          lineTo(fill, frX, fillToY);
+        }
+        if (!series.spanGaps) {
+          let gaps2 = [];
+          hasGap && gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
+          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
+          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
+        }
+        if (bandClipDir != 0) {
+          _paths.band = bandClipDir == 2 ? [
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
+          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
+        }
+        return _paths;
+      });
+    };
+  }
+  function stepped(opts) {
+    const align = ifNull(opts.align, 1);
+    const ascDesc = ifNull(opts.ascDesc, false);
+    const alignGaps = ifNull(opts.alignGaps, 0);
+    const extend = ifNull(opts.extend, false);
+    return (u, seriesIdx, idx0, idx1) => {
+      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
+        let pxRound = series.pxRound;
+        let { left, width } = u.bbox;
+        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
+        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
+        let lineTo = scaleX.ori == 0 ? lineToH : lineToV;
+        const _paths = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
+        const stroke = _paths.stroke;
+        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
+        let prevYPos = pixelForY(dataY[dir == 1 ? idx0 : idx1]);
+        let firstXPos = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
+        let prevXPos = firstXPos;
+        let firstXPosExt = firstXPos;
+        if (extend && align == -1) {
+          firstXPosExt = left;
+          lineTo(stroke, firstXPosExt, prevYPos);
+        }
+        lineTo(stroke, firstXPos, prevYPos);
+        for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
+          let yVal1 = dataY[i];
+          if (yVal1 == null)
+            continue;
+          let x1 = pixelForX(dataX[i]);
+          let y1 = pixelForY(yVal1);
+          if (align == 1)
+            lineTo(stroke, x1, prevYPos);
+          else
+            lineTo(stroke, prevXPos, y1);
+          lineTo(stroke, x1, y1);
+          prevYPos = y1;
+          prevXPos = x1;
+        }
+        let prevXPosExt = prevXPos;
+        if (extend && align == 1) {
+          prevXPosExt = left + width;
+          lineTo(stroke, prevXPosExt, prevYPos);
+        }
+        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
+        if (series.fill != null || bandFillDir != 0) {
+          let fill = _paths.fill = new Path2D(stroke);
+          let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
+          let fillToY = pixelForY(fillTo);
+          lineTo(fill, prevXPosExt, fillToY);
+          lineTo(fill, firstXPosExt, fillToY);
+        }
+        if (!series.spanGaps) {
+          let gaps2 = [];
+          gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
+          let halfStroke = series.width * pxRatio / 2;
+          let startsOffset = ascDesc || align == 1 ? halfStroke : -halfStroke;
+          let endsOffset = ascDesc || align == -1 ? -halfStroke : halfStroke;
+          gaps2.forEach((g) => {
+            g[0] += startsOffset;
+            g[1] += endsOffset;
+          });
+          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
+          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
+        }
+        if (bandClipDir != 0) {
+          _paths.band = bandClipDir == 2 ? [
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
+          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
+        }
+        return _paths;
+      });
+    };
+  }
+  function findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid = inf) {
+    if (dataX.length > 1) {
+      let prevIdx = null;
+      for (let i = 0, minDelta = Infinity; i < dataX.length; i++) {
+        if (dataY[i] !== void 0) {
+          if (prevIdx != null) {
+            let delta = abs(dataX[i] - dataX[prevIdx]);
+            if (delta < minDelta) {
+              minDelta = delta;
+              colWid = abs(valToPosX(dataX[i], scaleX, xDim, xOff) - valToPosX(dataX[prevIdx], scaleX, xDim, xOff));
+            }
+          }
+          prevIdx = i;
+        }
+      }
+    }
+    return colWid;
+  }
+  function bars(opts) {
+    opts = opts || EMPTY_OBJ;
+    const size = ifNull(opts.size, [0.6, inf, 1]);
+    const align = opts.align || 0;
+    const _extraGap = opts.gap || 0;
+    let ro = opts.radius;
+    ro = // [valueRadius, baselineRadius]
+    ro == null ? [0, 0] : typeof ro == "number" ? [ro, 0] : ro;
+    const radiusFn = fnOrSelf(ro);
+    const gapFactor = 1 - size[0];
+    const _maxWidth = ifNull(size[1], inf);
+    const _minWidth = ifNull(size[2], 1);
+    const disp = ifNull(opts.disp, EMPTY_OBJ);
+    const _each = ifNull(opts.each, (_2) => {
+    });
+    const { fill: dispFills, stroke: dispStrokes } = disp;
+    return (u, seriesIdx, idx0, idx1) => {
+      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+        let pxRound = series.pxRound;
+        let _align = align;
+        let extraGap = _extraGap * pxRatio;
+        let maxWidth = _maxWidth * pxRatio;
+        let minWidth = _minWidth * pxRatio;
+        let valRadius, baseRadius;
+        if (scaleX.ori == 0)
+          [valRadius, baseRadius] = radiusFn(u, seriesIdx);
+        else
+          [baseRadius, valRadius] = radiusFn(u, seriesIdx);
+        const _dirX = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
+        let rect2 = scaleX.ori == 0 ? rectH : rectV;
+        let each = scaleX.ori == 0 ? _each : (u2, seriesIdx2, i, top, lft, hgt, wid) => {
+          _each(u2, seriesIdx2, i, lft, top, wid, hgt);
+        };
+        let band = ifNull(u.bands, EMPTY_ARR).find((b) => b.series[0] == seriesIdx);
+        let fillDir = band != null ? band.dir : 0;
+        let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, fillDir);
+        let fillToY = pxRound(valToPosY(fillTo, scaleY, yDim, yOff));
+        let xShift, barWid, fullGap, colWid = xDim;
+        let strokeWidth = pxRound(series.width * pxRatio);
+        let multiPath = false;
+        let fillColors = null;
+        let fillPaths = null;
+        let strokeColors = null;
+        let strokePaths = null;
+        if (dispFills != null && (strokeWidth == 0 || dispStrokes != null)) {
+          multiPath = true;
+          fillColors = dispFills.values(u, seriesIdx, idx0, idx1);
+          fillPaths = /* @__PURE__ */ new Map();
+          new Set(fillColors).forEach((color) => {
+            if (color != null)
+              fillPaths.set(color, new Path2D());
+          });
+          if (strokeWidth > 0) {
+            strokeColors = dispStrokes.values(u, seriesIdx, idx0, idx1);
+            strokePaths = /* @__PURE__ */ new Map();
+            new Set(strokeColors).forEach((color) => {
+              if (color != null)
+                strokePaths.set(color, new Path2D());
+            });
+          }
+        }
+        let { x0, size: size2 } = disp;
+        if (x0 != null && size2 != null) {
+          _align = 1;
+          dataX = x0.values(u, seriesIdx, idx0, idx1);
+          if (x0.unit == 2)
+            dataX = dataX.map((pct) => u.posToVal(xOff + pct * xDim, scaleX.key, true));
+          let sizes = size2.values(u, seriesIdx, idx0, idx1);
+          if (size2.unit == 2)
+            barWid = sizes[0] * xDim;
+          else
+            barWid = valToPosX(sizes[0], scaleX, xDim, xOff) - valToPosX(0, scaleX, xDim, xOff);
+          colWid = findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid);
+          let gapWid = colWid - barWid;
+          fullGap = gapWid + extraGap;
+        } else {
+          colWid = findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid);
+          let gapWid = colWid * gapFactor;
+          fullGap = gapWid + extraGap;
+          barWid = colWid - fullGap;
+        }
+        if (fullGap < 1)
+          fullGap = 0;
+        if (strokeWidth >= barWid / 2)
+          strokeWidth = 0;
+        if (fullGap < 5)
+          pxRound = retArg0;
+        let insetStroke = fullGap > 0;
+        let rawBarWid = colWid - fullGap - (insetStroke ? strokeWidth : 0);
+        barWid = pxRound(clamp(rawBarWid, minWidth, maxWidth));
+        xShift = (_align == 0 ? barWid / 2 : _align == _dirX ? 0 : barWid) - _align * _dirX * ((_align == 0 ? extraGap / 2 : 0) + (insetStroke ? strokeWidth / 2 : 0));
+        const _paths = { stroke: null, fill: null, clip: null, band: null, gaps: null, flags: 0 };
+        const stroke = multiPath ? null : new Path2D();
+        let dataY0 = null;
+        if (band != null)
+          dataY0 = u.data[band.series[1]];
+        else {
+          let { y0, y1 } = disp;
+          if (y0 != null && y1 != null) {
+            dataY = y1.values(u, seriesIdx, idx0, idx1);
+            dataY0 = y0.values(u, seriesIdx, idx0, idx1);
+          }
+        }
+        let radVal = valRadius * barWid;
+        let radBase = baseRadius * barWid;
+        for (let i = _dirX == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += _dirX) {
+          let yVal = dataY[i];
+          if (yVal == null)
+            continue;
+          if (dataY0 != null) {
+            let yVal0 = dataY0[i] ?? 0;
+            if (yVal - yVal0 == 0)
+              continue;
+            fillToY = valToPosY(yVal0, scaleY, yDim, yOff);
+          }
+          let xVal = scaleX.distr != 2 || disp != null ? dataX[i] : i;
+          let xPos = valToPosX(xVal, scaleX, xDim, xOff);
+          let yPos = valToPosY(ifNull(yVal, fillTo), scaleY, yDim, yOff);
+          let lft = pxRound(xPos - xShift);
+          let btm = pxRound(max(yPos, fillToY));
+          let top = pxRound(min(yPos, fillToY));
+          let barHgt = btm - top;
+          if (yVal != null) {
+            let rv = yVal < 0 ? radBase : radVal;
+            let rb = yVal < 0 ? radVal : radBase;
+            if (multiPath) {
+              if (strokeWidth > 0 && strokeColors[i] != null)
+                rect2(strokePaths.get(strokeColors[i]), lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
+              if (fillColors[i] != null)
+                rect2(fillPaths.get(fillColors[i]), lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
+            } else
+              rect2(stroke, lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
+            each(
+              u,
+              seriesIdx,
+              i,
+              lft - strokeWidth / 2,
+              top,
+              barWid + strokeWidth,
+              barHgt
+            );
+          }
+        }
+        if (strokeWidth > 0)
+          _paths.stroke = multiPath ? strokePaths : stroke;
+        else if (!multiPath) {
+          _paths._fill = series.width == 0 ? series._fill : series._stroke ?? series._fill;
+          _paths.width = 0;
+        }
+        _paths.fill = multiPath ? fillPaths : stroke;
+        return _paths;
+      });
+    };
+  }
+  function splineInterp(interp, opts) {
+    const alignGaps = ifNull(opts?.alignGaps, 0);
+    return (u, seriesIdx, idx0, idx1) => {
+      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
+        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
+        let pxRound = series.pxRound;
+        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
+        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
+        let moveTo, bezierCurveTo, lineTo;
+        if (scaleX.ori == 0) {
+          moveTo = moveToH;
+          lineTo = lineToH;
+          bezierCurveTo = bezierCurveToH;
+        } else {
+          moveTo = moveToV;
+          lineTo = lineToV;
+          bezierCurveTo = bezierCurveToV;
+        }
+        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
+        let firstXPos = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
+        let prevXPos = firstXPos;
+        let xCoords = [];
+        let yCoords = [];
+        for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
+          let yVal = dataY[i];
+          if (yVal != null) {
+            let xVal = dataX[i];
+            let xPos = pixelForX(xVal);
+            xCoords.push(prevXPos = xPos);
+            yCoords.push(pixelForY(dataY[i]));
+          }
+        }
+        const _paths = { stroke: interp(xCoords, yCoords, moveTo, lineTo, bezierCurveTo, pxRound), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
+        const stroke = _paths.stroke;
+        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
+        if (series.fill != null || bandFillDir != 0) {
+          let fill = _paths.fill = new Path2D(stroke);
+          let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
+          let fillToY = pixelForY(fillTo);
+          lineTo(fill, prevXPos, fillToY);
+          lineTo(fill, firstXPos, fillToY);
+        }
+        if (!series.spanGaps) {
+          let gaps2 = [];
+          gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
+          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
+          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
+        }
+        if (bandClipDir != 0) {
+          _paths.band = bandClipDir == 2 ? [
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
+            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
+          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
+        }
+        return _paths;
+      });
+    };
+  }
+  function monotoneCubic(opts) {
+    return splineInterp(_monotoneCubic, opts);
+  }
+  function _monotoneCubic(xs, ys, moveTo, lineTo, bezierCurveTo, pxRound) {
+    const n = xs.length;
+    if (n < 2)
+      return null;
+    const path = new Path2D();
+    moveTo(path, xs[0], ys[0]);
+    if (n == 2)
+      lineTo(path, xs[1], ys[1]);
+    else {
+      let ms = Array(n), ds = Array(n - 1), dys = Array(n - 1), dxs = Array(n - 1);
+      for (let i = 0; i < n - 1; i++) {
+        dys[i] = ys[i + 1] - ys[i];
+        dxs[i] = xs[i + 1] - xs[i];
+        ds[i] = dys[i] / dxs[i];
+      }
+      ms[0] = ds[0];
+      for (let i = 1; i < n - 1; i++) {
+        if (ds[i] === 0 || ds[i - 1] === 0 || ds[i - 1] > 0 !== ds[i] > 0)
+          ms[i] = 0;
+        else {
+          ms[i] = 3 * (dxs[i - 1] + dxs[i]) / ((2 * dxs[i] + dxs[i - 1]) / ds[i - 1] + (dxs[i] + 2 * dxs[i - 1]) / ds[i]);
+          if (!isFinite(ms[i]))
+            ms[i] = 0;
+        }
+      }
+      ms[n - 1] = ds[n - 2];
+      for (let i = 0; i < n - 1; i++) {
+        bezierCurveTo(
+          path,
+          xs[i] + dxs[i] / 3,
+          ys[i] + ms[i] * dxs[i] / 3,
+          xs[i + 1] - dxs[i] / 3,
+          ys[i + 1] - ms[i + 1] * dxs[i] / 3,
+          xs[i + 1],
+          ys[i + 1]
+        );
+      }
+    }
+    return path;
+  }
+  var cursorPlots = /* @__PURE__ */ new Set();
+  function invalidateRects() {
+    for (let u of cursorPlots)
+      u.syncRect(true);
+  }
+  if (domEnv) {
+    on(resize, win, invalidateRects);
+    on(scroll, win, invalidateRects, true);
+    on(dppxchange, win, () => {
+      uPlot.pxRatio = pxRatio;
+    });
+  }
+  var linearPath = linear();
+  var pointsPath = points();
+  function setDefaults(d, xo, yo, initY) {
+    let d2 = initY ? [d[0], d[1]].concat(d.slice(2)) : [d[0]].concat(d.slice(1));
+    return d2.map((o, i) => setDefault(o, i, xo, yo));
+  }
+  function setDefaults2(d, xyo) {
+    return d.map((o, i) => i == 0 ? {} : assign({}, xyo, o));
+  }
+  function setDefault(o, i, xo, yo) {
+    return assign({}, i == 0 ? xo : yo, o);
+  }
+  function snapNumX(self, dataMin, dataMax) {
+    return dataMin == null ? nullNullTuple : [dataMin, dataMax];
+  }
+  var snapTimeX = snapNumX;
+  function snapNumY(self, dataMin, dataMax) {
+    return dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, rangePad, true);
+  }
+  function snapLogY(self, dataMin, dataMax, scale) {
+    return dataMin == null ? nullNullTuple : rangeLog(dataMin, dataMax, self.scales[scale].log, false);
+  }
+  var snapLogX = snapLogY;
+  function snapAsinhY(self, dataMin, dataMax, scale) {
+    return dataMin == null ? nullNullTuple : rangeAsinh(dataMin, dataMax, self.scales[scale].log, false);
+  }
+  var snapAsinhX = snapAsinhY;
+  function findIncr(minVal, maxVal, incrs, dim, minSpace) {
+    let intDigits = max(numIntDigits(minVal), numIntDigits(maxVal));
+    let delta = maxVal - minVal;
+    let incrIdx = closestIdx(minSpace / dim * delta, incrs);
+    do {
+      let foundIncr = incrs[incrIdx];
+      let foundSpace = dim * foundIncr / delta;
+      if (foundSpace >= minSpace && intDigits + (foundIncr < 5 ? fixedDec.get(foundIncr) : 0) <= 17)
+        return [foundIncr, foundSpace];
+    } while (++incrIdx < incrs.length);
+    return [0, 0];
+  }
+  function pxRatioFont(font2) {
+    let fontSize, fontSizeCss;
+    font2 = font2.replace(/(\d+)px/, (m, p1) => (fontSize = round((fontSizeCss = +p1) * pxRatio)) + "px");
+    return [font2, fontSize, fontSizeCss];
+  }
+  function syncFontSize(axis) {
+    if (axis.show) {
+      [axis.font, axis.labelFont].forEach((f) => {
+        let size = roundDec(f[2] * pxRatio, 1);
+        f[0] = f[0].replace(/[0-9.]+px/, size + "px");
+        f[1] = size;
+      });
+    }
+  }
+  function uPlot(opts, data, then) {
+    const self = {
+      mode: ifNull(opts.mode, 1)
+    };
+    const mode2 = self.mode;
+    function getHPos(val, scale, dim, off2) {
+      let pct = scale.valToPct(val);
+      return off2 + dim * (scale.dir == -1 ? 1 - pct : pct);
+    }
+    function getVPos(val, scale, dim, off2) {
+      let pct = scale.valToPct(val);
+      return off2 + dim * (scale.dir == -1 ? pct : 1 - pct);
+    }
+    function getPos(val, scale, dim, off2) {
+      return scale.ori == 0 ? getHPos(val, scale, dim, off2) : getVPos(val, scale, dim, off2);
+    }
+    self.valToPosH = getHPos;
+    self.valToPosV = getVPos;
+    let ready = false;
+    self.status = 0;
+    const root = self.root = placeDiv(UPLOT);
+    if (opts.id != null)
+      root.id = opts.id;
+    addClass(root, opts.class);
+    if (opts.title) {
+      let title = placeDiv(TITLE, root);
+      title.textContent = opts.title;
+    }
+    const can = placeTag("canvas");
+    const ctx = self.ctx = can.getContext("2d");
+    const wrap = placeDiv(WRAP, root);
+    on("click", wrap, (e) => {
+      if (e.target === over) {
+        let didDrag = mouseLeft1 != mouseLeft0 || mouseTop1 != mouseTop0;
+        didDrag && drag.click(self, e);
+      }
+    }, true);
+    const under = self.under = placeDiv(UNDER, wrap);
+    wrap.appendChild(can);
+    const over = self.over = placeDiv(OVER, wrap);
+    opts = copy(opts);
+    const pxAlign = +ifNull(opts.pxAlign, 1);
+    const pxRound = pxRoundGen(pxAlign);
+    (opts.plugins || []).forEach((p) => {
+      if (p.opts)
+        opts = p.opts(self, opts) || opts;
+    });
+    const ms = opts.ms || 1e-3;
+    const series = self.series = mode2 == 1 ? setDefaults(opts.series || [], xSeriesOpts, ySeriesOpts, false) : setDefaults2(opts.series || [null], xySeriesOpts);
+    const axes = self.axes = setDefaults(opts.axes || [], xAxisOpts, yAxisOpts, true);
+    const scales = self.scales = {};
+    const bands = self.bands = opts.bands || [];
+    bands.forEach((b) => {
+      b.fill = fnOrSelf(b.fill || null);
+      b.dir = ifNull(b.dir, -1);
+    });
+    const xScaleKey = mode2 == 2 ? series[1].facets[0].scale : series[0].scale;
+    const drawOrderMap = {
+      axes: drawAxesGrid,
+      series: drawSeries
+    };
+    const drawOrder = (opts.drawOrder || ["axes", "series"]).map((key2) => drawOrderMap[key2]);
+    function initValToPct(sc) {
+      const getVal = sc.distr == 3 ? (val) => log10(val > 0 ? val : sc.clamp(self, val, sc.min, sc.max, sc.key)) : sc.distr == 4 ? (val) => asinh(val, sc.asinh) : sc.distr == 100 ? (val) => sc.fwd(val) : (val) => val;
+      return (val) => {
+        let _val = getVal(val);
+        let { _min, _max } = sc;
+        let delta = _max - _min;
+        return (_val - _min) / delta;
+      };
+    }
+    function initScale(scaleKey) {
+      let sc = scales[scaleKey];
+      if (sc == null) {
+        let scaleOpts = (opts.scales || EMPTY_OBJ)[scaleKey] || EMPTY_OBJ;
+        if (scaleOpts.from != null) {
+          initScale(scaleOpts.from);
+          let sc2 = assign({}, scales[scaleOpts.from], scaleOpts, { key: scaleKey });
+          sc2.valToPct = initValToPct(sc2);
+          scales[scaleKey] = sc2;
+        } else {
+          sc = scales[scaleKey] = assign({}, scaleKey == xScaleKey ? xScaleOpts : yScaleOpts, scaleOpts);
+          sc.key = scaleKey;
+          let isTime = sc.time;
+          let rn = sc.range;
+          let rangeIsArr = isArr(rn);
+          if (scaleKey != xScaleKey || mode2 == 2 && !isTime) {
+            if (rangeIsArr && (rn[0] == null || rn[1] == null)) {
+              rn = {
+                min: rn[0] == null ? autoRangePart : {
+                  mode: 1,
+                  hard: rn[0],
+                  soft: rn[0]
+                },
+                max: rn[1] == null ? autoRangePart : {
+                  mode: 1,
+                  hard: rn[1],
+                  soft: rn[1]
+                }
+              };
+              rangeIsArr = false;
+            }
+            if (!rangeIsArr && isObj(rn)) {
+              let cfg = rn;
+              rn = (self2, dataMin, dataMax) => dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, cfg);
+            }
+          }
+          sc.range = fnOrSelf(rn || (isTime ? snapTimeX : scaleKey == xScaleKey ? sc.distr == 3 ? snapLogX : sc.distr == 4 ? snapAsinhX : snapNumX : sc.distr == 3 ? snapLogY : sc.distr == 4 ? snapAsinhY : snapNumY));
+          sc.auto = fnOrSelf(rangeIsArr ? false : sc.auto);
+          sc.clamp = fnOrSelf(sc.clamp || clampScale);
+          sc._min = sc._max = null;
+          sc.valToPct = initValToPct(sc);
+        }
+      }
+    }
+    initScale("x");
+    initScale("y");
+    if (mode2 == 1) {
+      series.forEach((s) => {
+        initScale(s.scale);
+      });
+    }
+    axes.forEach((a) => {
+      initScale(a.scale);
+    });
+    for (let k in opts.scales)
+      initScale(k);
+    const scaleX = scales[xScaleKey];
+    const xScaleDistr = scaleX.distr;
+    let valToPosX, valToPosY;
+    if (scaleX.ori == 0) {
+      addClass(root, ORI_HZ);
+      valToPosX = getHPos;
+      valToPosY = getVPos;
+    } else {
+      addClass(root, ORI_VT);
+      valToPosX = getVPos;
+      valToPosY = getHPos;
+    }
+    const pendScales = {};
+    for (let k in scales) {
+      let sc = scales[k];
+      if (sc.min != null || sc.max != null) {
+        pendScales[k] = { min: sc.min, max: sc.max };
+        sc.min = sc.max = null;
+      }
+    }
+    const _tzDate = opts.tzDate || ((ts) => new Date(round(ts / ms)));
+    const _fmtDate = opts.fmtDate || fmtDate;
+    const _timeAxisSplits = ms == 1 ? timeAxisSplitsMs(_tzDate) : timeAxisSplitsS(_tzDate);
+    const _timeAxisVals = timeAxisVals(_tzDate, timeAxisStamps(ms == 1 ? _timeAxisStampsMs : _timeAxisStampsS, _fmtDate));
+    const _timeSeriesVal = timeSeriesVal(_tzDate, timeSeriesStamp(_timeSeriesStamp, _fmtDate));
+    const activeIdxs = [];
+    const legend = self.legend = assign({}, legendOpts, opts.legend);
+    const cursor = self.cursor = assign({}, cursorOpts, { drag: { y: mode2 == 2 } }, opts.cursor);
+    const showLegend = legend.show;
+    const showCursor = cursor.show;
+    const markers = legend.markers;
+    {
+      legend.idxs = activeIdxs;
+      markers.width = fnOrSelf(markers.width);
+      markers.dash = fnOrSelf(markers.dash);
+      markers.stroke = fnOrSelf(markers.stroke);
+      markers.fill = fnOrSelf(markers.fill);
+    }
+    let legendTable;
+    let legendHead;
+    let legendBody;
+    let legendRows = [];
+    let legendCells = [];
+    let legendCols;
+    let multiValLegend = false;
+    let NULL_LEGEND_VALUES = {};
+    if (legend.live) {
+      const getMultiVals = series[1] ? series[1].values : null;
+      multiValLegend = getMultiVals != null;
+      legendCols = multiValLegend ? getMultiVals(self, 1, 0) : { _: 0 };
+      for (let k in legendCols)
+        NULL_LEGEND_VALUES[k] = LEGEND_DISP;
+    }
+    if (showLegend) {
+      legendTable = placeTag("table", LEGEND, root);
+      legendBody = placeTag("tbody", null, legendTable);
+      legend.mount(self, legendTable);
+      if (multiValLegend) {
+        legendHead = placeTag("thead", null, legendTable, legendBody);
+        let head = placeTag("tr", null, legendHead);
+        placeTag("th", null, head);
+        for (var key in legendCols)
+          placeTag("th", LEGEND_LABEL, head).textContent = key;
+      } else {
+        addClass(legendTable, LEGEND_INLINE);
+        legend.live && addClass(legendTable, LEGEND_LIVE);
+      }
+    }
+    const son = { show: true };
+    const soff = { show: false };
+    function initLegendRow(s, i) {
+      if (i == 0 && (multiValLegend || !legend.live || mode2 == 2))
+        return nullNullTuple;
+      let cells = [];
+      let row = placeTag("tr", LEGEND_SERIES, legendBody, legendBody.childNodes[i]);
+      addClass(row, s.class);
+      if (!s.show)
+        addClass(row, OFF);
+      let label = placeTag("th", null, row);
+      if (markers.show) {
+        let indic = placeDiv(LEGEND_MARKER, label);
+        if (i > 0) {
+          let width = markers.width(self, i);
+          if (width)
+            indic.style.border = width + "px " + markers.dash(self, i) + " " + markers.stroke(self, i);
+          indic.style.background = markers.fill(self, i);
+        }
+      }
+      let text = placeDiv(LEGEND_LABEL, label);
+      if (s.label instanceof HTMLElement)
+        text.appendChild(s.label);
+      else
+        text.textContent = s.label;
+      if (i > 0) {
+        if (!markers.show)
+          text.style.color = s.width > 0 ? markers.stroke(self, i) : markers.fill(self, i);
+        onMouse("click", label, (e) => {
+          if (cursor._lock)
+            return;
+          setCursorEvent(e);
+          let seriesIdx = series.indexOf(s);
+          if ((e.ctrlKey || e.metaKey) != legend.isolate) {
+            let isolate = series.some((s2, i2) => i2 > 0 && i2 != seriesIdx && s2.show);
+            series.forEach((s2, i2) => {
+              i2 > 0 && setSeries(i2, isolate ? i2 == seriesIdx ? son : soff : son, true, syncOpts.setSeries);
+            });
+          } else
+            setSeries(seriesIdx, { show: !s.show }, true, syncOpts.setSeries);
+        }, false);
+        if (cursorFocus) {
+          onMouse(mouseenter, label, (e) => {
+            if (cursor._lock)
+              return;
+            setCursorEvent(e);
+            setSeries(series.indexOf(s), FOCUS_TRUE, true, syncOpts.setSeries);
+          }, false);
+        }
+      }
+      for (var key2 in legendCols) {
+        let v = placeTag("td", LEGEND_VALUE, row);
+        v.textContent = "--";
+        cells.push(v);
+      }
+      return [row, cells];
+    }
+    const mouseListeners = /* @__PURE__ */ new Map();
+    function onMouse(ev, targ, fn, onlyTarg = true) {
+      const targListeners = mouseListeners.get(targ) || {};
+      const listener = cursor.bind[ev](self, targ, fn, onlyTarg);
+      if (listener) {
+        on(ev, targ, targListeners[ev] = listener);
+        mouseListeners.set(targ, targListeners);
+      }
+    }
+    function offMouse(ev, targ, fn) {
+      const targListeners = mouseListeners.get(targ) || {};
+      for (let k in targListeners) {
+        if (ev == null || k == ev) {
+          off(k, targ, targListeners[k]);
+          delete targListeners[k];
+        }
+      }
+      if (ev == null)
+        mouseListeners.delete(targ);
+    }
+    let fullWidCss = 0;
+    let fullHgtCss = 0;
+    let plotWidCss = 0;
+    let plotHgtCss = 0;
+    let plotLftCss = 0;
+    let plotTopCss = 0;
+    let _plotLftCss = plotLftCss;
+    let _plotTopCss = plotTopCss;
+    let _plotWidCss = plotWidCss;
+    let _plotHgtCss = plotHgtCss;
+    let plotLft = 0;
+    let plotTop = 0;
+    let plotWid = 0;
+    let plotHgt = 0;
+    self.bbox = {};
+    let shouldSetScales = false;
+    let shouldSetSize = false;
+    let shouldConvergeSize = false;
+    let shouldSetCursor = false;
+    let shouldSetSelect = false;
+    let shouldSetLegend = false;
+    function _setSize(width, height, force) {
+      if (force || (width != self.width || height != self.height))
+        calcSize(width, height);
+      resetYSeries(false);
+      shouldConvergeSize = true;
+      shouldSetSize = true;
+      commit();
+    }
+    function calcSize(width, height) {
+      self.width = fullWidCss = plotWidCss = width;
+      self.height = fullHgtCss = plotHgtCss = height;
+      plotLftCss = plotTopCss = 0;
+      calcPlotRect();
+      calcAxesRects();
+      let bb = self.bbox;
+      plotLft = bb.left = incrRound(plotLftCss * pxRatio, 0.5);
+      plotTop = bb.top = incrRound(plotTopCss * pxRatio, 0.5);
+      plotWid = bb.width = incrRound(plotWidCss * pxRatio, 0.5);
+      plotHgt = bb.height = incrRound(plotHgtCss * pxRatio, 0.5);
+    }
+    const CYCLE_LIMIT = 3;
+    function convergeSize() {
+      let converged = false;
+      let cycleNum = 0;
+      while (!converged) {
+        cycleNum++;
+        let axesConverged = axesCalc(cycleNum);
+        let paddingConverged = paddingCalc(cycleNum);
+        converged = cycleNum == CYCLE_LIMIT || axesConverged && paddingConverged;
+        if (!converged) {
+          calcSize(self.width, self.height);
+          shouldSetSize = true;
+        }
+      }
+    }
+    function setSize({ width, height }) {
+      _setSize(width, height);
+    }
+    self.setSize = setSize;
+    function calcPlotRect() {
+      let hasTopAxis = false;
+      let hasBtmAxis = false;
+      let hasRgtAxis = false;
+      let hasLftAxis = false;
+      axes.forEach((axis, i) => {
+        if (axis.show && axis._show) {
+          let { side, _size } = axis;
+          let isVt = side % 2;
+          let labelSize = axis.label != null ? axis.labelSize : 0;
+          let fullSize = _size + labelSize;
+          if (fullSize > 0) {
+            if (isVt) {
+              plotWidCss -= fullSize;
+              if (side == 3) {
+                plotLftCss += fullSize;
+                hasLftAxis = true;
+              } else
+                hasRgtAxis = true;
+            } else {
+              plotHgtCss -= fullSize;
+              if (side == 0) {
+                plotTopCss += fullSize;
+                hasTopAxis = true;
+              } else
+                hasBtmAxis = true;
+            }
+          }
+        }
+      });
+      sidesWithAxes[0] = hasTopAxis;
+      sidesWithAxes[1] = hasRgtAxis;
+      sidesWithAxes[2] = hasBtmAxis;
+      sidesWithAxes[3] = hasLftAxis;
+      plotWidCss -= _padding[1] + _padding[3];
+      plotLftCss += _padding[3];
+      plotHgtCss -= _padding[2] + _padding[0];
+      plotTopCss += _padding[0];
+    }
+    function calcAxesRects() {
+      let off1 = plotLftCss + plotWidCss;
+      let off2 = plotTopCss + plotHgtCss;
+      let off3 = plotLftCss;
+      let off0 = plotTopCss;
+      function incrOffset(side, size) {
+        switch (side) {
+          case 1:
+            off1 += size;
+            return off1 - size;
+          case 2:
+            off2 += size;
+            return off2 - size;
+          case 3:
+            off3 -= size;
+            return off3 + size;
+          case 0:
+            off0 -= size;
+            return off0 + size;
+        }
+      }
+      axes.forEach((axis, i) => {
+        if (axis.show && axis._show) {
+          let side = axis.side;
+          axis._pos = incrOffset(side, axis._size);
+          if (axis.label != null)
+            axis._lpos = incrOffset(side, axis.labelSize);
+        }
+      });
+    }
+    if (cursor.dataIdx == null) {
+      let hov = cursor.hover;
+      let skip = hov.skip = new Set(hov.skip ?? []);
+      skip.add(void 0);
+      let prox = hov.prox = fnOrSelf(hov.prox);
+      let bias = hov.bias ??= 0;
+      cursor.dataIdx = (self2, seriesIdx, cursorIdx, valAtPosX) => {
+        if (seriesIdx == 0)
+          return cursorIdx;
+        let idx2 = cursorIdx;
+        let _prox = prox(self2, seriesIdx, cursorIdx, valAtPosX) ?? inf;
+        let withProx = _prox >= 0 && _prox < inf;
+        let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
+        let cursorLft = cursor.left;
+        let xValues = data[0];
+        let yValues = data[seriesIdx];
+        if (skip.has(yValues[cursorIdx])) {
+          idx2 = null;
+          let nonNullLft = null, nonNullRgt = null, j;
+          if (bias == 0 || bias == -1) {
+            j = cursorIdx;
+            while (nonNullLft == null && j-- > 0) {
+              if (!skip.has(yValues[j]))
+                nonNullLft = j;
+            }
+          }
+          if (bias == 0 || bias == 1) {
+            j = cursorIdx;
+            while (nonNullRgt == null && j++ < yValues.length) {
+              if (!skip.has(yValues[j]))
+                nonNullRgt = j;
+            }
+          }
+          if (nonNullLft != null || nonNullRgt != null) {
+            if (withProx) {
+              let lftPos = nonNullLft == null ? -Infinity : valToPosX(xValues[nonNullLft], scaleX, xDim, 0);
+              let rgtPos = nonNullRgt == null ? Infinity : valToPosX(xValues[nonNullRgt], scaleX, xDim, 0);
+              let lftDelta = cursorLft - lftPos;
+              let rgtDelta = rgtPos - cursorLft;
+              if (lftDelta <= rgtDelta) {
+                if (lftDelta <= _prox)
+                  idx2 = nonNullLft;
+              } else {
+                if (rgtDelta <= _prox)
+                  idx2 = nonNullRgt;
+              }
+            } else {
+              idx2 = nonNullRgt == null ? nonNullLft : nonNullLft == null ? nonNullRgt : cursorIdx - nonNullLft <= nonNullRgt - cursorIdx ? nonNullLft : nonNullRgt;
+            }
+          }
+        } else if (withProx) {
+          let dist = abs(cursorLft - valToPosX(xValues[cursorIdx], scaleX, xDim, 0));
+          if (dist > _prox)
+            idx2 = null;
+        }
+        return idx2;
+      };
+    }
+    const setCursorEvent = (e) => {
+      cursor.event = e;
+    };
+    cursor.idxs = activeIdxs;
+    cursor._lock = false;
+    let points2 = cursor.points;
+    points2.show = fnOrSelf(points2.show);
+    points2.size = fnOrSelf(points2.size);
+    points2.stroke = fnOrSelf(points2.stroke);
+    points2.width = fnOrSelf(points2.width);
+    points2.fill = fnOrSelf(points2.fill);
+    const focus = self.focus = assign({}, opts.focus || { alpha: 0.3 }, cursor.focus);
+    const cursorFocus = focus.prox >= 0;
+    const cursorOnePt = cursorFocus && points2.one;
+    let cursorPts = [];
+    let cursorPtsLft = [];
+    let cursorPtsTop = [];
+    function initCursorPt(s, si) {
+      let pt = points2.show(self, si);
+      if (pt instanceof HTMLElement) {
+        addClass(pt, CURSOR_PT);
+        addClass(pt, s.class);
+        elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
+        over.insertBefore(pt, cursorPts[si]);
+        return pt;
+      }
+    }
+    function initSeries(s, i) {
+      if (mode2 == 1 || i > 0) {
+        let isTime = mode2 == 1 && scales[s.scale].time;
+        let sv = s.value;
+        s.value = isTime ? isStr(sv) ? timeSeriesVal(_tzDate, timeSeriesStamp(sv, _fmtDate)) : sv || _timeSeriesVal : sv || numSeriesVal;
+        s.label = s.label || (isTime ? timeSeriesLabel : numSeriesLabel);
+      }
+      if (cursorOnePt || i > 0) {
+        s.width = s.width == null ? 1 : s.width;
+        s.paths = s.paths || linearPath || retNull;
+        s.fillTo = fnOrSelf(s.fillTo || seriesFillTo);
+        s.pxAlign = +ifNull(s.pxAlign, pxAlign);
+        s.pxRound = pxRoundGen(s.pxAlign);
+        s.stroke = fnOrSelf(s.stroke || null);
+        s.fill = fnOrSelf(s.fill || null);
+        s._stroke = s._fill = s._paths = s._focus = null;
+        let _ptDia = ptDia(max(1, s.width), 1);
+        let points3 = s.points = assign({}, {
+          size: _ptDia,
+          width: max(1, _ptDia * 0.2),
+          stroke: s.stroke,
+          space: _ptDia * 2,
+          paths: pointsPath,
+          _stroke: null,
+          _fill: null
+        }, s.points);
+        points3.show = fnOrSelf(points3.show);
+        points3.filter = fnOrSelf(points3.filter);
+        points3.fill = fnOrSelf(points3.fill);
+        points3.stroke = fnOrSelf(points3.stroke);
+        points3.paths = fnOrSelf(points3.paths);
+        points3.pxAlign = s.pxAlign;
+      }
+      if (showLegend) {
+        let rowCells = initLegendRow(s, i);
+        legendRows.splice(i, 0, rowCells[0]);
+        legendCells.splice(i, 0, rowCells[1]);
+        legend.values.push(null);
+      }
+      if (showCursor) {
+        activeIdxs.splice(i, 0, null);
+        let pt = null;
+        if (cursorOnePt) {
+          if (i == 0)
+            pt = initCursorPt(s, i);
+        } else if (i > 0)
+          pt = initCursorPt(s, i);
+        cursorPts.splice(i, 0, pt);
+        cursorPtsLft.splice(i, 0, 0);
+        cursorPtsTop.splice(i, 0, 0);
+      }
+      fire("addSeries", i);
+    }
+    function addSeries(opts2, si) {
+      si = si == null ? series.length : si;
+      opts2 = mode2 == 1 ? setDefault(opts2, si, xSeriesOpts, ySeriesOpts) : setDefault(opts2, si, {}, xySeriesOpts);
+      series.splice(si, 0, opts2);
+      initSeries(series[si], si);
+    }
+    self.addSeries = addSeries;
+    function delSeries(i) {
+      series.splice(i, 1);
+      if (showLegend) {
+        legend.values.splice(i, 1);
+        legendCells.splice(i, 1);
+        let tr = legendRows.splice(i, 1)[0];
+        offMouse(null, tr.firstChild);
+        tr.remove();
+      }
+      if (showCursor) {
+        activeIdxs.splice(i, 1);
+        cursorPts.splice(i, 1)[0].remove();
+        cursorPtsLft.splice(i, 1);
+        cursorPtsTop.splice(i, 1);
+      }
+      fire("delSeries", i);
+    }
+    self.delSeries = delSeries;
+    const sidesWithAxes = [false, false, false, false];
+    function initAxis(axis, i) {
+      axis._show = axis.show;
+      if (axis.show) {
+        let isVt = axis.side % 2;
+        let sc = scales[axis.scale];
+        if (sc == null) {
+          axis.scale = isVt ? series[1].scale : xScaleKey;
+          sc = scales[axis.scale];
+        }
+        let isTime = sc.time;
+        axis.size = fnOrSelf(axis.size);
+        axis.space = fnOrSelf(axis.space);
+        axis.rotate = fnOrSelf(axis.rotate);
+        if (isArr(axis.incrs)) {
+          axis.incrs.forEach((incr) => {
+            !fixedDec.has(incr) && fixedDec.set(incr, guessDec(incr));
+          });
+        }
+        axis.incrs = fnOrSelf(axis.incrs || (sc.distr == 2 ? wholeIncrs : isTime ? ms == 1 ? timeIncrsMs : timeIncrsS : numIncrs));
+        axis.splits = fnOrSelf(axis.splits || (isTime && sc.distr == 1 ? _timeAxisSplits : sc.distr == 3 ? logAxisSplits : sc.distr == 4 ? asinhAxisSplits : numAxisSplits));
+        axis.stroke = fnOrSelf(axis.stroke);
+        axis.grid.stroke = fnOrSelf(axis.grid.stroke);
+        axis.ticks.stroke = fnOrSelf(axis.ticks.stroke);
+        axis.border.stroke = fnOrSelf(axis.border.stroke);
+        let av = axis.values;
+        axis.values = // static array of tick values
+        isArr(av) && !isArr(av[0]) ? fnOrSelf(av) : (
+          // temporal
+          isTime ? (
+            // config array of fmtDate string tpls
+            isArr(av) ? timeAxisVals(_tzDate, timeAxisStamps(av, _fmtDate)) : (
+              // fmtDate string tpl
+              isStr(av) ? timeAxisVal(_tzDate, av) : av || _timeAxisVals
+            )
+          ) : av || numAxisVals
+        );
+        axis.filter = fnOrSelf(axis.filter || (sc.distr >= 3 && sc.log == 10 ? log10AxisValsFilt : sc.distr == 3 && sc.log == 2 ? log2AxisValsFilt : retArg1));
+        axis.font = pxRatioFont(axis.font);
+        axis.labelFont = pxRatioFont(axis.labelFont);
+        axis._size = axis.size(self, null, i, 0);
+        axis._space = axis._rotate = axis._incrs = axis._found = // foundIncrSpace
+        axis._splits = axis._values = null;
+        if (axis._size > 0) {
+          sidesWithAxes[i] = true;
+          axis._el = placeDiv(AXIS, wrap);
+        }
+      }
+    }
+    function autoPadSide(self2, side, sidesWithAxes2, cycleNum) {
+      let [hasTopAxis, hasRgtAxis, hasBtmAxis, hasLftAxis] = sidesWithAxes2;
+      let ori = side % 2;
+      let size = 0;
+      if (ori == 0 && (hasLftAxis || hasRgtAxis))
+        size = side == 0 && !hasTopAxis || side == 2 && !hasBtmAxis ? round(xAxisOpts.size / 3) : 0;
+      if (ori == 1 && (hasTopAxis || hasBtmAxis))
+        size = side == 1 && !hasRgtAxis || side == 3 && !hasLftAxis ? round(yAxisOpts.size / 2) : 0;
+      return size;
+    }
+    const padding = self.padding = (opts.padding || [autoPadSide, autoPadSide, autoPadSide, autoPadSide]).map((p) => fnOrSelf(ifNull(p, autoPadSide)));
+    const _padding = self._padding = padding.map((p, i) => p(self, i, sidesWithAxes, 0));
+    let dataLen;
+    let i0 = null;
+    let i1 = null;
+    const idxs = mode2 == 1 ? series[0].idxs : null;
+    let data0 = null;
+    let viaAutoScaleX = false;
+    function setData(_data, _resetScales) {
+      data = _data == null ? [] : _data;
+      self.data = self._data = data;
+      if (mode2 == 2) {
+        dataLen = 0;
+        for (let i = 1; i < series.length; i++)
+          dataLen += data[i][0].length;
+      } else {
+        if (data.length == 0)
+          self.data = self._data = data = [[]];
+        data0 = data[0];
+        dataLen = data0.length;
+        let scaleData = data;
+        if (xScaleDistr == 2) {
+          scaleData = data.slice();
+          let _data0 = scaleData[0] = Array(dataLen);
+          for (let i = 0; i < dataLen; i++)
+            _data0[i] = i;
+        }
+        self._data = data = scaleData;
+      }
+      resetYSeries(true);
+      fire("setData");
+      if (xScaleDistr == 2) {
+        shouldConvergeSize = true;
+      }
+      if (_resetScales !== false) {
+        let xsc = scaleX;
+        if (xsc.auto(self, viaAutoScaleX))
+          autoScaleX();
+        else
+          _setScale(xScaleKey, xsc.min, xsc.max);
+        shouldSetCursor = shouldSetCursor || cursor.left >= 0;
+        shouldSetLegend = true;
+        commit();
+      }
+    }
+    self.setData = setData;
+    function autoScaleX() {
+      viaAutoScaleX = true;
+      let _min, _max;
+      if (mode2 == 1) {
+        if (dataLen > 0) {
+          i0 = idxs[0] = 0;
+          i1 = idxs[1] = dataLen - 1;
+          _min = data[0][i0];
+          _max = data[0][i1];
+          if (xScaleDistr == 2) {
+            _min = i0;
+            _max = i1;
+          } else if (_min == _max) {
+            if (xScaleDistr == 3)
+              [_min, _max] = rangeLog(_min, _min, scaleX.log, false);
+            else if (xScaleDistr == 4)
+              [_min, _max] = rangeAsinh(_min, _min, scaleX.log, false);
+            else if (scaleX.time)
+              _max = _min + round(86400 / ms);
+            else
+              [_min, _max] = rangeNum(_min, _max, rangePad, true);
+          }
+        } else {
+          i0 = idxs[0] = _min = null;
+          i1 = idxs[1] = _max = null;
+        }
+      }
+      _setScale(xScaleKey, _min, _max);
+    }
+    let ctxStroke, ctxFill, ctxWidth, ctxDash, ctxJoin, ctxCap, ctxFont, ctxAlign, ctxBaseline;
+    let ctxAlpha;
+    function setCtxStyle(stroke, width, dash, cap, fill, join2) {
+      stroke ??= transparent;
+      dash ??= EMPTY_ARR;
+      cap ??= "butt";
+      fill ??= transparent;
+      join2 ??= "round";
+      if (stroke != ctxStroke)
+        ctx.strokeStyle = ctxStroke = stroke;
+      if (fill != ctxFill)
+        ctx.fillStyle = ctxFill = fill;
+      if (width != ctxWidth)
+        ctx.lineWidth = ctxWidth = width;
+      if (join2 != ctxJoin)
+        ctx.lineJoin = ctxJoin = join2;
+      if (cap != ctxCap)
+        ctx.lineCap = ctxCap = cap;
+      if (dash != ctxDash)
+        ctx.setLineDash(ctxDash = dash);
+    }
+    function setFontStyle(font2, fill, align, baseline) {
+      if (fill != ctxFill)
+        ctx.fillStyle = ctxFill = fill;
+      if (font2 != ctxFont)
+        ctx.font = ctxFont = font2;
+      if (align != ctxAlign)
+        ctx.textAlign = ctxAlign = align;
+      if (baseline != ctxBaseline)
+        ctx.textBaseline = ctxBaseline = baseline;
+    }
+    function accScale(wsc, psc, facet2, data2, sorted = 0) {
+      if (data2.length > 0 && wsc.auto(self, viaAutoScaleX) && (psc == null || psc.min == null)) {
+        let _i0 = ifNull(i0, 0);
+        let _i1 = ifNull(i1, data2.length - 1);
+        let minMax = facet2.min == null ? getMinMax(data2, _i0, _i1, sorted, wsc.distr == 3) : [facet2.min, facet2.max];
+        wsc.min = min(wsc.min, facet2.min = minMax[0]);
+        wsc.max = max(wsc.max, facet2.max = minMax[1]);
+      }
+    }
+    const AUTOSCALE = { min: null, max: null };
+    function setScales() {
+      for (let k in scales) {
+        let sc = scales[k];
+        if (pendScales[k] == null && // scales that have never been set (on init)
+        (sc.min == null || // or auto scales when the x scale was explicitly set
+        pendScales[xScaleKey] != null && sc.auto(self, viaAutoScaleX))) {
+          pendScales[k] = AUTOSCALE;
+        }
+      }
+      for (let k in scales) {
+        let sc = scales[k];
+        if (pendScales[k] == null && sc.from != null && pendScales[sc.from] != null)
+          pendScales[k] = AUTOSCALE;
+      }
+      if (pendScales[xScaleKey] != null)
+        resetYSeries(true);
+      let wipScales = {};
+      for (let k in pendScales) {
+        let psc = pendScales[k];
+        if (psc != null) {
+          let wsc = wipScales[k] = copy(scales[k], fastIsObj);
+          if (psc.min != null)
+            assign(wsc, psc);
+          else if (k != xScaleKey || mode2 == 2) {
+            if (dataLen == 0 && wsc.from == null) {
+              let minMax = wsc.range(self, null, null, k);
+              wsc.min = minMax[0];
+              wsc.max = minMax[1];
+            } else {
+              wsc.min = inf;
+              wsc.max = -inf;
+            }
+          }
+        }
+      }
+      if (dataLen > 0) {
+        series.forEach((s, i) => {
+          if (mode2 == 1) {
+            let k = s.scale;
+            let psc = pendScales[k];
+            if (psc == null)
+              return;
+            let wsc = wipScales[k];
+            if (i == 0) {
+              let minMax = wsc.range(self, wsc.min, wsc.max, k);
+              wsc.min = minMax[0];
+              wsc.max = minMax[1];
+              i0 = closestIdx(wsc.min, data[0]);
+              i1 = closestIdx(wsc.max, data[0]);
+              if (i1 - i0 > 1) {
+                if (data[0][i0] < wsc.min)
+                  i0++;
+                if (data[0][i1] > wsc.max)
+                  i1--;
+              }
+              s.min = data0[i0];
+              s.max = data0[i1];
+            } else if (s.show && s.auto)
+              accScale(wsc, psc, s, data[i], s.sorted);
+            s.idxs[0] = i0;
+            s.idxs[1] = i1;
+          } else {
+            if (i > 0) {
+              if (s.show && s.auto) {
+                let [xFacet, yFacet] = s.facets;
+                let xScaleKey2 = xFacet.scale;
+                let yScaleKey = yFacet.scale;
+                let [xData, yData] = data[i];
+                let wscx = wipScales[xScaleKey2];
+                let wscy = wipScales[yScaleKey];
+                wscx != null && accScale(wscx, pendScales[xScaleKey2], xFacet, xData, xFacet.sorted);
+                wscy != null && accScale(wscy, pendScales[yScaleKey], yFacet, yData, yFacet.sorted);
+                s.min = yFacet.min;
+                s.max = yFacet.max;
+              }
+            }
+          }
+        });
+        for (let k in wipScales) {
+          let wsc = wipScales[k];
+          let psc = pendScales[k];
+          if (wsc.from == null && (psc == null || psc.min == null)) {
+            let minMax = wsc.range(
+              self,
+              wsc.min == inf ? null : wsc.min,
+              wsc.max == -inf ? null : wsc.max,
+              k
+            );
+            wsc.min = minMax[0];
+            wsc.max = minMax[1];
+          }
+        }
+      }
+      for (let k in wipScales) {
+        let wsc = wipScales[k];
+        if (wsc.from != null) {
+          let base = wipScales[wsc.from];
+          if (base.min == null)
+            wsc.min = wsc.max = null;
+          else {
+            let minMax = wsc.range(self, base.min, base.max, k);
+            wsc.min = minMax[0];
+            wsc.max = minMax[1];
+          }
+        }
+      }
+      let changed = {};
+      let anyChanged = false;
+      for (let k in wipScales) {
+        let wsc = wipScales[k];
+        let sc = scales[k];
+        if (sc.min != wsc.min || sc.max != wsc.max) {
+          sc.min = wsc.min;
+          sc.max = wsc.max;
+          let distr = sc.distr;
+          sc._min = distr == 3 ? log10(sc.min) : distr == 4 ? asinh(sc.min, sc.asinh) : distr == 100 ? sc.fwd(sc.min) : sc.min;
+          sc._max = distr == 3 ? log10(sc.max) : distr == 4 ? asinh(sc.max, sc.asinh) : distr == 100 ? sc.fwd(sc.max) : sc.max;
+          changed[k] = anyChanged = true;
+        }
+      }
+      if (anyChanged) {
+        series.forEach((s, i) => {
+          if (mode2 == 2) {
+            if (i > 0 && changed.y)
+              s._paths = null;
+          } else {
+            if (changed[s.scale])
+              s._paths = null;
+          }
+        });
+        for (let k in changed) {
+          shouldConvergeSize = true;
+          fire("setScale", k);
+        }
+        if (showCursor && cursor.left >= 0)
+          shouldSetCursor = shouldSetLegend = true;
+      }
+      for (let k in pendScales)
+        pendScales[k] = null;
+    }
+    function getOuterIdxs(ydata) {
+      let _i0 = clamp(i0 - 1, 0, dataLen - 1);
+      let _i1 = clamp(i1 + 1, 0, dataLen - 1);
+      while (ydata[_i0] == null && _i0 > 0)
+        _i0--;
+      while (ydata[_i1] == null && _i1 < dataLen - 1)
+        _i1++;
+      return [_i0, _i1];
+    }
+    function drawSeries() {
+      if (dataLen > 0) {
+        let shouldAlpha = series.some((s) => s._focus) && ctxAlpha != focus.alpha;
+        if (shouldAlpha)
+          ctx.globalAlpha = ctxAlpha = focus.alpha;
+        series.forEach((s, i) => {
+          if (i > 0 && s.show) {
+            cacheStrokeFill(i, false);
+            cacheStrokeFill(i, true);
+            if (s._paths == null) {
+              let _ctxAlpha = ctxAlpha;
+              if (ctxAlpha != s.alpha)
+                ctx.globalAlpha = ctxAlpha = s.alpha;
+              let _idxs = mode2 == 2 ? [0, data[i][0].length - 1] : getOuterIdxs(data[i]);
+              s._paths = s.paths(self, i, _idxs[0], _idxs[1]);
+              if (ctxAlpha != _ctxAlpha)
+                ctx.globalAlpha = ctxAlpha = _ctxAlpha;
+            }
+          }
+        });
+        series.forEach((s, i) => {
+          if (i > 0 && s.show) {
+            let _ctxAlpha = ctxAlpha;
+            if (ctxAlpha != s.alpha)
+              ctx.globalAlpha = ctxAlpha = s.alpha;
+            s._paths != null && drawPath(i, false);
+            {
+              let _gaps = s._paths != null ? s._paths.gaps : null;
+              let show = s.points.show(self, i, i0, i1, _gaps);
+              let idxs2 = s.points.filter(self, i, show, _gaps);
+              if (show || idxs2) {
+                s.points._paths = s.points.paths(self, i, i0, i1, idxs2);
+                drawPath(i, true);
+              }
+            }
+            if (ctxAlpha != _ctxAlpha)
+              ctx.globalAlpha = ctxAlpha = _ctxAlpha;
+            fire("drawSeries", i);
+          }
+        });
+        if (shouldAlpha)
+          ctx.globalAlpha = ctxAlpha = 1;
+      }
+    }
+    function cacheStrokeFill(si, _points) {
+      let s = _points ? series[si].points : series[si];
+      s._stroke = s.stroke(self, si);
+      s._fill = s.fill(self, si);
+    }
+    function drawPath(si, _points) {
+      let s = _points ? series[si].points : series[si];
+      let {
+        stroke,
+        fill,
+        clip: gapsClip,
+        flags,
+        _stroke: strokeStyle = s._stroke,
+        _fill: fillStyle = s._fill,
+        _width: width = s.width
+      } = s._paths;
+      width = roundDec(width * pxRatio, 3);
+      let boundsClip = null;
+      let offset = width % 2 / 2;
+      if (_points && fillStyle == null)
+        fillStyle = width > 0 ? "#fff" : strokeStyle;
+      let _pxAlign = s.pxAlign == 1 && offset > 0;
+      _pxAlign && ctx.translate(offset, offset);
+      if (!_points) {
+        let lft = plotLft - width / 2, top = plotTop - width / 2, wid = plotWid + width, hgt = plotHgt + width;
+        boundsClip = new Path2D();
+        boundsClip.rect(lft, top, wid, hgt);
+      }
+      if (_points)
+        strokeFill(strokeStyle, width, s.dash, s.cap, fillStyle, stroke, fill, flags, gapsClip);
+      else
+        fillStroke(si, strokeStyle, width, s.dash, s.cap, fillStyle, stroke, fill, flags, boundsClip, gapsClip);
+      _pxAlign && ctx.translate(-offset, -offset);
+    }
+    function fillStroke(si, strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip) {
+      let didStrokeFill = false;
+      flags != 0 && bands.forEach((b, bi) => {
+        if (b.series[0] == si) {
+          let lowerEdge = series[b.series[1]];
+          let lowerData = data[b.series[1]];
+          let bandClip = (lowerEdge._paths || EMPTY_OBJ).band;
+          if (isArr(bandClip))
+            bandClip = b.dir == 1 ? bandClip[0] : bandClip[1];
+          let gapsClip2;
+          let _fillStyle = null;
+          if (lowerEdge.show && bandClip && hasData(lowerData, i0, i1)) {
+            _fillStyle = b.fill(self, bi) || fillStyle;
+            gapsClip2 = lowerEdge._paths.clip;
+          } else
+            bandClip = null;
+          strokeFill(strokeStyle, lineWidth, lineDash, lineCap, _fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip, gapsClip2, bandClip);
+          didStrokeFill = true;
+        }
+      });
+      if (!didStrokeFill)
+        strokeFill(strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip);
+    }
+    const CLIP_FILL_STROKE = BAND_CLIP_FILL | BAND_CLIP_STROKE;
+    function strokeFill(strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip, gapsClip2, bandClip) {
+      setCtxStyle(strokeStyle, lineWidth, lineDash, lineCap, fillStyle);
+      if (boundsClip || gapsClip || bandClip) {
+        ctx.save();
+        boundsClip && ctx.clip(boundsClip);
+        gapsClip && ctx.clip(gapsClip);
+      }
+      if (bandClip) {
+        if ((flags & CLIP_FILL_STROKE) == CLIP_FILL_STROKE) {
+          ctx.clip(bandClip);
+          gapsClip2 && ctx.clip(gapsClip2);
+          doFill(fillStyle, fillPath);
+          doStroke(strokeStyle, strokePath, lineWidth);
+        } else if (flags & BAND_CLIP_STROKE) {
+          doFill(fillStyle, fillPath);
+          ctx.clip(bandClip);
+          doStroke(strokeStyle, strokePath, lineWidth);
+        } else if (flags & BAND_CLIP_FILL) {
+          ctx.save();
+          ctx.clip(bandClip);
+          gapsClip2 && ctx.clip(gapsClip2);
+          doFill(fillStyle, fillPath);
+          ctx.restore();
+          doStroke(strokeStyle, strokePath, lineWidth);
+        }
+      } else {
+        doFill(fillStyle, fillPath);
+        doStroke(strokeStyle, strokePath, lineWidth);
+      }
+      if (boundsClip || gapsClip || bandClip)
+        ctx.restore();
+    }
+    function doStroke(strokeStyle, strokePath, lineWidth) {
+      if (lineWidth > 0) {
+        if (strokePath instanceof Map) {
+          strokePath.forEach((strokePath2, strokeStyle2) => {
+            ctx.strokeStyle = ctxStroke = strokeStyle2;
+            ctx.stroke(strokePath2);
+          });
+        } else
+          strokePath != null && strokeStyle && ctx.stroke(strokePath);
+      }
+    }
+    function doFill(fillStyle, fillPath) {
+      if (fillPath instanceof Map) {
+        fillPath.forEach((fillPath2, fillStyle2) => {
+          ctx.fillStyle = ctxFill = fillStyle2;
+          ctx.fill(fillPath2);
+        });
+      } else
+        fillPath != null && fillStyle && ctx.fill(fillPath);
+    }
+    function getIncrSpace(axisIdx, min2, max2, fullDim) {
+      let axis = axes[axisIdx];
+      let incrSpace;
+      if (fullDim <= 0)
+        incrSpace = [0, 0];
+      else {
+        let minSpace = axis._space = axis.space(self, axisIdx, min2, max2, fullDim);
+        let incrs = axis._incrs = axis.incrs(self, axisIdx, min2, max2, fullDim, minSpace);
+        incrSpace = findIncr(min2, max2, incrs, fullDim, minSpace);
+      }
+      return axis._found = incrSpace;
+    }
+    function drawOrthoLines(offs, filts, ori, side, pos0, len, width, stroke, dash, cap) {
+      let offset = width % 2 / 2;
+      pxAlign == 1 && ctx.translate(offset, offset);
+      setCtxStyle(stroke, width, dash, cap, stroke);
+      ctx.beginPath();
+      let x0, y0, x1, y1, pos1 = pos0 + (side == 0 || side == 3 ? -len : len);
+      if (ori == 0) {
+        y0 = pos0;
+        y1 = pos1;
+      } else {
+        x0 = pos0;
+        x1 = pos1;
+      }
+      for (let i = 0; i < offs.length; i++) {
+        if (filts[i] != null) {
+          if (ori == 0)
+            x0 = x1 = offs[i];
+          else
+            y0 = y1 = offs[i];
+          ctx.moveTo(x0, y0);
+          ctx.lineTo(x1, y1);
+        }
+      }
+      ctx.stroke();
+      pxAlign == 1 && ctx.translate(-offset, -offset);
+    }
+    function axesCalc(cycleNum) {
+      let converged = true;
+      axes.forEach((axis, i) => {
+        if (!axis.show)
+          return;
+        let scale = scales[axis.scale];
+        if (scale.min == null) {
+          if (axis._show) {
+            converged = false;
+            axis._show = false;
+            resetYSeries(false);
+          }
+          return;
+        } else {
+          if (!axis._show) {
+            converged = false;
+            axis._show = true;
+            resetYSeries(false);
+          }
+        }
+        let side = axis.side;
+        let ori = side % 2;
+        let { min: min2, max: max2 } = scale;
+        let [_incr, _space] = getIncrSpace(i, min2, max2, ori == 0 ? plotWidCss : plotHgtCss);
+        if (_space == 0)
+          return;
+        let forceMin = scale.distr == 2;
+        let _splits = axis._splits = axis.splits(self, i, min2, max2, _incr, _space, forceMin);
+        let splits = scale.distr == 2 ? _splits.map((i2) => data0[i2]) : _splits;
+        let incr = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
+        let values = axis._values = axis.values(self, axis.filter(self, splits, i, _space, incr), i, _space, incr);
+        axis._rotate = side == 2 ? axis.rotate(self, values, i, _space) : 0;
+        let oldSize = axis._size;
+        axis._size = ceil(axis.size(self, values, i, cycleNum));
+        if (oldSize != null && axis._size != oldSize)
+          converged = false;
+      });
+      return converged;
+    }
+    function paddingCalc(cycleNum) {
+      let converged = true;
+      padding.forEach((p, i) => {
+        let _p = p(self, i, sidesWithAxes, cycleNum);
+        if (_p != _padding[i])
+          converged = false;
+        _padding[i] = _p;
+      });
+      return converged;
+    }
+    function drawAxesGrid() {
+      for (let i = 0; i < axes.length; i++) {
+        let axis = axes[i];
+        if (!axis.show || !axis._show)
+          continue;
+        let side = axis.side;
+        let ori = side % 2;
+        let x, y;
+        let fillStyle = axis.stroke(self, i);
+        let shiftDir = side == 0 || side == 3 ? -1 : 1;
+        let [_incr, _space] = axis._found;
+        if (axis.label != null) {
+          let shiftAmt2 = axis.labelGap * shiftDir;
+          let baseLpos = round((axis._lpos + shiftAmt2) * pxRatio);
+          setFontStyle(axis.labelFont[0], fillStyle, "center", side == 2 ? TOP : BOTTOM);
+          ctx.save();
+          if (ori == 1) {
+            x = y = 0;
+            ctx.translate(
+              baseLpos,
+              round(plotTop + plotHgt / 2)
+            );
+            ctx.rotate((side == 3 ? -PI : PI) / 2);
+          } else {
+            x = round(plotLft + plotWid / 2);
+            y = baseLpos;
+          }
+          let _label = isFn(axis.label) ? axis.label(self, i, _incr, _space) : axis.label;
+          ctx.fillText(_label, x, y);
+          ctx.restore();
+        }
+        if (_space == 0)
+          continue;
+        let scale = scales[axis.scale];
+        let plotDim = ori == 0 ? plotWid : plotHgt;
+        let plotOff = ori == 0 ? plotLft : plotTop;
+        let _splits = axis._splits;
+        let splits = scale.distr == 2 ? _splits.map((i2) => data0[i2]) : _splits;
+        let incr = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
+        let ticks2 = axis.ticks;
+        let border2 = axis.border;
+        let _tickSize = ticks2.show ? ticks2.size : 0;
+        let tickSize = round(_tickSize * pxRatio);
+        let axisGap = round((axis.alignTo == 2 ? axis._size - _tickSize - axis.gap : axis.gap) * pxRatio);
+        let angle = axis._rotate * -PI / 180;
+        let basePos = pxRound(axis._pos * pxRatio);
+        let shiftAmt = (tickSize + axisGap) * shiftDir;
+        let finalPos = basePos + shiftAmt;
+        y = ori == 0 ? finalPos : 0;
+        x = ori == 1 ? finalPos : 0;
+        let font2 = axis.font[0];
+        let textAlign = axis.align == 1 ? LEFT : axis.align == 2 ? RIGHT : angle > 0 ? LEFT : angle < 0 ? RIGHT : ori == 0 ? "center" : side == 3 ? RIGHT : LEFT;
+        let textBaseline = angle || ori == 1 ? "middle" : side == 2 ? TOP : BOTTOM;
+        setFontStyle(font2, fillStyle, textAlign, textBaseline);
+        let lineHeight = axis.font[1] * axis.lineGap;
+        let canOffs = _splits.map((val) => pxRound(getPos(val, scale, plotDim, plotOff)));
+        let _values = axis._values;
+        for (let i2 = 0; i2 < _values.length; i2++) {
+          let val = _values[i2];
+          if (val != null) {
+            if (ori == 0)
+              x = canOffs[i2];
+            else
+              y = canOffs[i2];
+            val = "" + val;
+            let _parts = val.indexOf("\n") == -1 ? [val] : val.split(/\n/gm);
+            for (let j = 0; j < _parts.length; j++) {
+              let text = _parts[j];
+              if (angle) {
+                ctx.save();
+                ctx.translate(x, y + j * lineHeight);
+                ctx.rotate(angle);
+                ctx.fillText(text, 0, 0);
+                ctx.restore();
+              } else
+                ctx.fillText(text, x, y + j * lineHeight);
+            }
+          }
+        }
+        if (ticks2.show) {
+          drawOrthoLines(
+            canOffs,
+            ticks2.filter(self, splits, i, _space, incr),
+            ori,
+            side,
+            basePos,
+            tickSize,
+            roundDec(ticks2.width * pxRatio, 3),
+            ticks2.stroke(self, i),
+            ticks2.dash,
+            ticks2.cap
+          );
+        }
+        let grid2 = axis.grid;
+        if (grid2.show) {
+          drawOrthoLines(
+            canOffs,
+            grid2.filter(self, splits, i, _space, incr),
+            ori,
+            ori == 0 ? 2 : 1,
+            ori == 0 ? plotTop : plotLft,
+            ori == 0 ? plotHgt : plotWid,
+            roundDec(grid2.width * pxRatio, 3),
+            grid2.stroke(self, i),
+            grid2.dash,
+            grid2.cap
+          );
+        }
+        if (border2.show) {
+          drawOrthoLines(
+            [basePos],
+            [1],
+            ori == 0 ? 1 : 0,
+            ori == 0 ? 1 : 2,
+            ori == 1 ? plotTop : plotLft,
+            ori == 1 ? plotHgt : plotWid,
+            roundDec(border2.width * pxRatio, 3),
+            border2.stroke(self, i),
+            border2.dash,
+            border2.cap
+          );
+        }
+      }
+      fire("drawAxes");
+    }
+    function resetYSeries(minMax) {
+      series.forEach((s, i) => {
+        if (i > 0) {
+          s._paths = null;
+          if (minMax) {
+            if (mode2 == 1) {
+              s.min = null;
+              s.max = null;
+            } else {
+              s.facets.forEach((f) => {
+                f.min = null;
+                f.max = null;
+              });
+            }
+          }
+        }
+      });
+    }
+    let queuedCommit = false;
+    let deferHooks = false;
+    let hooksQueue = [];
+    function flushHooks() {
+      deferHooks = false;
+      for (let i = 0; i < hooksQueue.length; i++)
+        fire(...hooksQueue[i]);
+      hooksQueue.length = 0;
+    }
+    function commit() {
+      if (!queuedCommit) {
+        microTask(_commit);
+        queuedCommit = true;
+      }
+    }
+    function batch(fn, _deferHooks = false) {
+      queuedCommit = true;
+      deferHooks = _deferHooks;
+      fn(self);
+      _commit();
+      if (_deferHooks && hooksQueue.length > 0)
+        queueMicrotask(flushHooks);
+    }
+    self.batch = batch;
+    function _commit() {
+      if (shouldSetScales) {
+        setScales();
+        shouldSetScales = false;
+      }
+      if (shouldConvergeSize) {
+        convergeSize();
+        shouldConvergeSize = false;
+      }
+      if (shouldSetSize) {
+        setStylePx(under, LEFT, plotLftCss);
+        setStylePx(under, TOP, plotTopCss);
+        setStylePx(under, WIDTH, plotWidCss);
+        setStylePx(under, HEIGHT, plotHgtCss);
+        setStylePx(over, LEFT, plotLftCss);
+        setStylePx(over, TOP, plotTopCss);
+        setStylePx(over, WIDTH, plotWidCss);
+        setStylePx(over, HEIGHT, plotHgtCss);
+        setStylePx(wrap, WIDTH, fullWidCss);
+        setStylePx(wrap, HEIGHT, fullHgtCss);
+        can.width = round(fullWidCss * pxRatio);
+        can.height = round(fullHgtCss * pxRatio);
+        axes.forEach(({ _el, _show, _size, _pos, side }) => {
+          if (_el != null) {
+            if (_show) {
+              let posOffset = side === 3 || side === 0 ? _size : 0;
+              let isVt = side % 2 == 1;
+              setStylePx(_el, isVt ? "left" : "top", _pos - posOffset);
+              setStylePx(_el, isVt ? "width" : "height", _size);
+              setStylePx(_el, isVt ? "top" : "left", isVt ? plotTopCss : plotLftCss);
+              setStylePx(_el, isVt ? "height" : "width", isVt ? plotHgtCss : plotWidCss);
+              remClass(_el, OFF);
+            } else
+              addClass(_el, OFF);
+          }
+        });
+        ctxStroke = ctxFill = ctxWidth = ctxJoin = ctxCap = ctxFont = ctxAlign = ctxBaseline = ctxDash = null;
+        ctxAlpha = 1;
+        syncRect(true);
+        if (plotLftCss != _plotLftCss || plotTopCss != _plotTopCss || plotWidCss != _plotWidCss || plotHgtCss != _plotHgtCss) {
+          resetYSeries(false);
+          let pctWid = plotWidCss / _plotWidCss;
+          let pctHgt = plotHgtCss / _plotHgtCss;
+          if (showCursor && !shouldSetCursor && cursor.left >= 0) {
+            cursor.left *= pctWid;
+            cursor.top *= pctHgt;
+            vCursor && elTrans(vCursor, round(cursor.left), 0, plotWidCss, plotHgtCss);
+            hCursor && elTrans(hCursor, 0, round(cursor.top), plotWidCss, plotHgtCss);
+            for (let i = 0; i < cursorPts.length; i++) {
+              let pt = cursorPts[i];
+              if (pt != null) {
+                cursorPtsLft[i] *= pctWid;
+                cursorPtsTop[i] *= pctHgt;
+                elTrans(pt, ceil(cursorPtsLft[i]), ceil(cursorPtsTop[i]), plotWidCss, plotHgtCss);
+              }
+            }
+          }
+          if (select.show && !shouldSetSelect && select.left >= 0 && select.width > 0) {
+            select.left *= pctWid;
+            select.width *= pctWid;
+            select.top *= pctHgt;
+            select.height *= pctHgt;
+            for (let prop in _hideProps)
+              setStylePx(selectDiv, prop, select[prop]);
+          }
+          _plotLftCss = plotLftCss;
+          _plotTopCss = plotTopCss;
+          _plotWidCss = plotWidCss;
+          _plotHgtCss = plotHgtCss;
+        }
+        fire("setSize");
+        shouldSetSize = false;
+      }
+      if (fullWidCss > 0 && fullHgtCss > 0) {
+        ctx.clearRect(0, 0, can.width, can.height);
+        fire("drawClear");
+        drawOrder.forEach((fn) => fn());
+        fire("draw");
+      }
+      if (select.show && shouldSetSelect) {
+        setSelect(select);
+        shouldSetSelect = false;
+      }
+      if (showCursor && shouldSetCursor) {
+        updateCursor(null, true, false);
+        shouldSetCursor = false;
+      }
+      if (legend.show && legend.live && shouldSetLegend) {
+        setLegend();
+        shouldSetLegend = false;
+      }
+      if (!ready) {
+        ready = true;
+        self.status = 1;
+        fire("ready");
+      }
+      viaAutoScaleX = false;
+      queuedCommit = false;
+    }
+    self.redraw = (rebuildPaths, recalcAxes) => {
+      shouldConvergeSize = recalcAxes || false;
+      if (rebuildPaths !== false)
+        _setScale(xScaleKey, scaleX.min, scaleX.max);
+      else
+        commit();
+    };
+    function setScale(key2, opts2) {
+      let sc = scales[key2];
+      if (sc.from == null) {
+        if (dataLen == 0) {
+          let minMax = sc.range(self, opts2.min, opts2.max, key2);
+          opts2.min = minMax[0];
+          opts2.max = minMax[1];
+        }
+        if (opts2.min > opts2.max) {
+          let _min = opts2.min;
+          opts2.min = opts2.max;
+          opts2.max = _min;
+        }
+        if (dataLen > 1 && opts2.min != null && opts2.max != null && opts2.max - opts2.min < 1e-16)
+          return;
+        if (key2 == xScaleKey) {
+          if (sc.distr == 2 && dataLen > 0) {
+            opts2.min = closestIdx(opts2.min, data[0]);
+            opts2.max = closestIdx(opts2.max, data[0]);
+            if (opts2.min == opts2.max)
+              opts2.max++;
+          }
+        }
+        pendScales[key2] = opts2;
+        shouldSetScales = true;
+        commit();
+      }
+    }
+    self.setScale = setScale;
+    let xCursor;
+    let yCursor;
+    let vCursor;
+    let hCursor;
+    let rawMouseLeft0;
+    let rawMouseTop0;
+    let mouseLeft0;
+    let mouseTop0;
+    let rawMouseLeft1;
+    let rawMouseTop1;
+    let mouseLeft1;
+    let mouseTop1;
+    let dragging = false;
+    const drag = cursor.drag;
+    let dragX = drag.x;
+    let dragY = drag.y;
+    if (showCursor) {
+      if (cursor.x)
+        xCursor = placeDiv(CURSOR_X, over);
+      if (cursor.y)
+        yCursor = placeDiv(CURSOR_Y, over);
+      if (scaleX.ori == 0) {
+        vCursor = xCursor;
+        hCursor = yCursor;
+      } else {
+        vCursor = yCursor;
+        hCursor = xCursor;
+      }
+      mouseLeft1 = cursor.left;
+      mouseTop1 = cursor.top;
+    }
+    const select = self.select = assign({
+      show: true,
+      over: true,
+      left: 0,
+      width: 0,
+      top: 0,
+      height: 0
+    }, opts.select);
+    const selectDiv = select.show ? placeDiv(SELECT, select.over ? over : under) : null;
+    function setSelect(opts2, _fire) {
+      if (select.show) {
+        for (let prop in opts2) {
+          select[prop] = opts2[prop];
+          if (prop in _hideProps)
+            setStylePx(selectDiv, prop, opts2[prop]);
+        }
+        _fire !== false && fire("setSelect");
+      }
+    }
+    self.setSelect = setSelect;
+    function toggleDOM(i) {
+      let s = series[i];
+      if (s.show)
+        showLegend && remClass(legendRows[i], OFF);
+      else {
+        showLegend && addClass(legendRows[i], OFF);
+        if (showCursor) {
+          let pt = cursorOnePt ? cursorPts[0] : cursorPts[i];
+          pt != null && elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
+        }
+      }
+    }
+    function _setScale(key2, min2, max2) {
+      setScale(key2, { min: min2, max: max2 });
+    }
+    function setSeries(i, opts2, _fire, _pub) {
+      if (opts2.focus != null)
+        setFocus(i);
+      if (opts2.show != null) {
+        series.forEach((s, si) => {
+          if (si > 0 && (i == si || i == null)) {
+            s.show = opts2.show;
+            toggleDOM(si);
+            if (mode2 == 2) {
+              _setScale(s.facets[0].scale, null, null);
+              _setScale(s.facets[1].scale, null, null);
+            } else
+              _setScale(s.scale, null, null);
+            commit();
+          }
+        });
+      }
+      _fire !== false && fire("setSeries", i, opts2);
+      _pub && pubSync("setSeries", self, i, opts2);
+    }
+    self.setSeries = setSeries;
+    function setBand(bi, opts2) {
+      assign(bands[bi], opts2);
+    }
+    function addBand(opts2, bi) {
+      opts2.fill = fnOrSelf(opts2.fill || null);
+      opts2.dir = ifNull(opts2.dir, -1);
+      bi = bi == null ? bands.length : bi;
+      bands.splice(bi, 0, opts2);
+    }
+    function delBand(bi) {
+      if (bi == null)
+        bands.length = 0;
+      else
+        bands.splice(bi, 1);
+    }
+    self.addBand = addBand;
+    self.setBand = setBand;
+    self.delBand = delBand;
+    function setAlpha(i, value) {
+      series[i].alpha = value;
+      if (showCursor && cursorPts[i] != null)
+        cursorPts[i].style.opacity = value;
+      if (showLegend && legendRows[i])
+        legendRows[i].style.opacity = value;
+    }
+    let closestDist;
+    let closestSeries;
+    let focusedSeries;
+    const FOCUS_TRUE = { focus: true };
+    function setFocus(i) {
+      if (i != focusedSeries) {
+        let allFocused = i == null;
+        let _setAlpha = focus.alpha != 1;
+        series.forEach((s, i2) => {
+          if (mode2 == 1 || i2 > 0) {
+            let isFocused = allFocused || i2 == 0 || i2 == i;
+            s._focus = allFocused ? null : isFocused;
+            _setAlpha && setAlpha(i2, isFocused ? 1 : focus.alpha);
+          }
+        });
+        focusedSeries = i;
+        _setAlpha && commit();
+      }
+    }
+    if (showLegend && cursorFocus) {
+      onMouse(mouseleave, legendTable, (e) => {
+        if (cursor._lock)
+          return;
+        setCursorEvent(e);
+        if (focusedSeries != null)
+          setSeries(null, FOCUS_TRUE, true, syncOpts.setSeries);
+      });
+    }
+    function posToVal(pos, scale, can2) {
+      let sc = scales[scale];
+      if (can2)
+        pos = pos / pxRatio - (sc.ori == 1 ? plotTopCss : plotLftCss);
+      let dim = plotWidCss;
+      if (sc.ori == 1) {
+        dim = plotHgtCss;
+        pos = dim - pos;
+      }
+      if (sc.dir == -1)
+        pos = dim - pos;
+      let _min = sc._min, _max = sc._max, pct = pos / dim;
+      let sv = _min + (_max - _min) * pct;
+      let distr = sc.distr;
+      return distr == 3 ? pow(10, sv) : distr == 4 ? sinh(sv, sc.asinh) : distr == 100 ? sc.bwd(sv) : sv;
+    }
+    function closestIdxFromXpos(pos, can2) {
+      let v = posToVal(pos, xScaleKey, can2);
+      return closestIdx(v, data[0], i0, i1);
+    }
+    self.valToIdx = (val) => closestIdx(val, data[0]);
+    self.posToIdx = closestIdxFromXpos;
+    self.posToVal = posToVal;
+    self.valToPos = (val, scale, can2) => scales[scale].ori == 0 ? getHPos(
+      val,
+      scales[scale],
+      can2 ? plotWid : plotWidCss,
+      can2 ? plotLft : 0
+    ) : getVPos(
+      val,
+      scales[scale],
+      can2 ? plotHgt : plotHgtCss,
+      can2 ? plotTop : 0
+    );
+    self.setCursor = (opts2, _fire, _pub) => {
+      mouseLeft1 = opts2.left;
+      mouseTop1 = opts2.top;
+      updateCursor(null, _fire, _pub);
+    };
+    function setSelH(off2, dim) {
+      setStylePx(selectDiv, LEFT, select.left = off2);
+      setStylePx(selectDiv, WIDTH, select.width = dim);
+    }
+    function setSelV(off2, dim) {
+      setStylePx(selectDiv, TOP, select.top = off2);
+      setStylePx(selectDiv, HEIGHT, select.height = dim);
+    }
+    let setSelX = scaleX.ori == 0 ? setSelH : setSelV;
+    let setSelY = scaleX.ori == 1 ? setSelH : setSelV;
+    function syncLegend() {
+      if (showLegend && legend.live) {
+        for (let i = mode2 == 2 ? 1 : 0; i < series.length; i++) {
+          if (i == 0 && multiValLegend)
+            continue;
+          let vals = legend.values[i];
+          let j = 0;
+          for (let k in vals)
+            legendCells[i][j++].firstChild.nodeValue = vals[k];
+        }
+      }
+    }
+    function setLegend(opts2, _fire) {
+      if (opts2 != null) {
+        if (opts2.idxs) {
+          opts2.idxs.forEach((didx, sidx) => {
+            activeIdxs[sidx] = didx;
+          });
+        } else if (!isUndef(opts2.idx))
+          activeIdxs.fill(opts2.idx);
+        legend.idx = activeIdxs[0];
+      }
+      if (showLegend && legend.live) {
+        for (let sidx = 0; sidx < series.length; sidx++) {
+          if (sidx > 0 || mode2 == 1 && !multiValLegend)
+            setLegendValues(sidx, activeIdxs[sidx]);
+        }
+        syncLegend();
+      }
+      shouldSetLegend = false;
+      _fire !== false && fire("setLegend");
+    }
+    self.setLegend = setLegend;
+    function setLegendValues(sidx, idx) {
+      let s = series[sidx];
+      let src = sidx == 0 && xScaleDistr == 2 ? data0 : data[sidx];
+      let val;
+      if (multiValLegend)
+        val = s.values(self, sidx, idx) ?? NULL_LEGEND_VALUES;
+      else {
+        val = s.value(self, idx == null ? null : src[idx], sidx, idx);
+        val = val == null ? NULL_LEGEND_VALUES : { _: val };
+      }
+      legend.values[sidx] = val;
+    }
+    function updateCursor(src, _fire, _pub) {
+      rawMouseLeft1 = mouseLeft1;
+      rawMouseTop1 = mouseTop1;
+      [mouseLeft1, mouseTop1] = cursor.move(self, mouseLeft1, mouseTop1);
+      cursor.left = mouseLeft1;
+      cursor.top = mouseTop1;
+      if (showCursor) {
+        vCursor && elTrans(vCursor, round(mouseLeft1), 0, plotWidCss, plotHgtCss);
+        hCursor && elTrans(hCursor, 0, round(mouseTop1), plotWidCss, plotHgtCss);
+      }
+      let idx;
+      let noDataInRange = i0 > i1;
+      closestDist = inf;
+      closestSeries = null;
+      let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
+      let yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss;
+      if (mouseLeft1 < 0 || dataLen == 0 || noDataInRange) {
+        idx = cursor.idx = null;
+        for (let i = 0; i < series.length; i++) {
+          let pt = cursorPts[i];
+          pt != null && elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
+        }
+        if (cursorFocus)
+          setSeries(null, FOCUS_TRUE, true, src == null && syncOpts.setSeries);
+        if (legend.live) {
+          activeIdxs.fill(idx);
+          shouldSetLegend = true;
+        }
+      } else {
+        let mouseXPos, valAtPosX, xPos;
+        if (mode2 == 1) {
+          mouseXPos = scaleX.ori == 0 ? mouseLeft1 : mouseTop1;
+          valAtPosX = posToVal(mouseXPos, xScaleKey);
+          idx = cursor.idx = closestIdx(valAtPosX, data[0], i0, i1);
+          xPos = valToPosX(data[0][idx], scaleX, xDim, 0);
+        }
+        let _ptLft = -10;
+        let _ptTop = -10;
+        let _ptWid = 0;
+        let _ptHgt = 0;
+        let _centered = true;
+        let _ptFill = "";
+        let _ptStroke = "";
+        for (let i = mode2 == 2 ? 1 : 0; i < series.length; i++) {
+          let s = series[i];
+          let idx1 = activeIdxs[i];
+          let yVal1 = idx1 == null ? null : mode2 == 1 ? data[i][idx1] : data[i][1][idx1];
+          let idx2 = cursor.dataIdx(self, i, idx, valAtPosX);
+          let yVal2 = idx2 == null ? null : mode2 == 1 ? data[i][idx2] : data[i][1][idx2];
+          shouldSetLegend = shouldSetLegend || yVal2 != yVal1 || idx2 != idx1;
+          activeIdxs[i] = idx2;
+          if (i > 0 && s.show) {
+            let xPos2 = idx2 == null ? -10 : idx2 == idx ? xPos : valToPosX(mode2 == 1 ? data[0][idx2] : data[i][0][idx2], scaleX, xDim, 0);
+            let yPos = yVal2 == null ? -10 : valToPosY(yVal2, mode2 == 1 ? scales[s.scale] : scales[s.facets[1].scale], yDim, 0);
+            if (cursorFocus && yVal2 != null) {
+              let mouseYPos = scaleX.ori == 1 ? mouseLeft1 : mouseTop1;
+              let dist = abs(focus.dist(self, i, idx2, yPos, mouseYPos));
+              if (dist < closestDist) {
+                let bias = focus.bias;
+                if (bias != 0) {
+                  let mouseYVal = posToVal(mouseYPos, s.scale);
+                  let seriesYValSign = yVal2 >= 0 ? 1 : -1;
+                  let mouseYValSign = mouseYVal >= 0 ? 1 : -1;
+                  if (mouseYValSign == seriesYValSign && (mouseYValSign == 1 ? bias == 1 ? yVal2 >= mouseYVal : yVal2 <= mouseYVal : (
+                    // >= 0
+                    bias == 1 ? yVal2 <= mouseYVal : yVal2 >= mouseYVal
+                  ))) {
+                    closestDist = dist;
+                    closestSeries = i;
+                  }
+                } else {
+                  closestDist = dist;
+                  closestSeries = i;
+                }
+              }
+            }
+            if (shouldSetLegend || cursorOnePt) {
+              let hPos, vPos;
+              if (scaleX.ori == 0) {
+                hPos = xPos2;
+                vPos = yPos;
+              } else {
+                hPos = yPos;
+                vPos = xPos2;
+              }
+              let ptWid, ptHgt, ptLft, ptTop, ptStroke, ptFill, centered = true, getBBox = points2.bbox;
+              if (getBBox != null) {
+                centered = false;
+                let bbox = getBBox(self, i);
+                ptLft = bbox.left;
+                ptTop = bbox.top;
+                ptWid = bbox.width;
+                ptHgt = bbox.height;
+              } else {
+                ptLft = hPos;
+                ptTop = vPos;
+                ptWid = ptHgt = points2.size(self, i);
+              }
+              ptFill = points2.fill(self, i);
+              ptStroke = points2.stroke(self, i);
+              if (cursorOnePt) {
+                if (i == closestSeries && closestDist <= focus.prox) {
+                  _ptLft = ptLft;
+                  _ptTop = ptTop;
+                  _ptWid = ptWid;
+                  _ptHgt = ptHgt;
+                  _centered = centered;
+                  _ptFill = ptFill;
+                  _ptStroke = ptStroke;
+                }
+              } else {
+                let pt = cursorPts[i];
+                if (pt != null) {
+                  cursorPtsLft[i] = ptLft;
+                  cursorPtsTop[i] = ptTop;
+                  elSize(pt, ptWid, ptHgt, centered);
+                  elColor(pt, ptFill, ptStroke);
+                  elTrans(pt, ceil(ptLft), ceil(ptTop), plotWidCss, plotHgtCss);
+                }
+              }
+            }
+          }
+        }
+        if (cursorOnePt) {
+          let p = focus.prox;
+          let focusChanged = focusedSeries == null ? closestDist <= p : closestDist > p || closestSeries != focusedSeries;
+          if (shouldSetLegend || focusChanged) {
+            let pt = cursorPts[0];
+            if (pt != null) {
+              cursorPtsLft[0] = _ptLft;
+              cursorPtsTop[0] = _ptTop;
+              elSize(pt, _ptWid, _ptHgt, _centered);
+              elColor(pt, _ptFill, _ptStroke);
+              elTrans(pt, ceil(_ptLft), ceil(_ptTop), plotWidCss, plotHgtCss);
+            }
+          }
+        }
+      }
+      if (select.show && dragging) {
+        if (src != null) {
+          let [xKey, yKey] = syncOpts.scales;
+          let [matchXKeys, matchYKeys] = syncOpts.match;
+          let [xKeySrc, yKeySrc] = src.cursor.sync.scales;
+          let sdrag = src.cursor.drag;
+          dragX = sdrag._x;
+          dragY = sdrag._y;
+          if (dragX || dragY) {
+            let { left, top, width, height } = src.select;
+            let sori = src.scales[xKeySrc].ori;
+            let sPosToVal = src.posToVal;
+            let sOff, sDim, sc, a, b;
+            let matchingX = xKey != null && matchXKeys(xKey, xKeySrc);
+            let matchingY = yKey != null && matchYKeys(yKey, yKeySrc);
+            if (matchingX && dragX) {
+              if (sori == 0) {
+                sOff = left;
+                sDim = width;
+              } else {
+                sOff = top;
+                sDim = height;
+              }
+              sc = scales[xKey];
+              a = valToPosX(sPosToVal(sOff, xKeySrc), sc, xDim, 0);
+              b = valToPosX(sPosToVal(sOff + sDim, xKeySrc), sc, xDim, 0);
+              setSelX(min(a, b), abs(b - a));
+            } else
+              setSelX(0, xDim);
+            if (matchingY && dragY) {
+              if (sori == 1) {
+                sOff = left;
+                sDim = width;
+              } else {
+                sOff = top;
+                sDim = height;
+              }
+              sc = scales[yKey];
+              a = valToPosY(sPosToVal(sOff, yKeySrc), sc, yDim, 0);
+              b = valToPosY(sPosToVal(sOff + sDim, yKeySrc), sc, yDim, 0);
+              setSelY(min(a, b), abs(b - a));
+            } else
+              setSelY(0, yDim);
+          } else
+            hideSelect();
+        } else {
+          let rawDX = abs(rawMouseLeft1 - rawMouseLeft0);
+          let rawDY = abs(rawMouseTop1 - rawMouseTop0);
+          if (scaleX.ori == 1) {
+            let _rawDX = rawDX;
+            rawDX = rawDY;
+            rawDY = _rawDX;
+          }
+          dragX = drag.x && rawDX >= drag.dist;
+          dragY = drag.y && rawDY >= drag.dist;
+          let uni = drag.uni;
+          if (uni != null) {
+            if (dragX && dragY) {
+              dragX = rawDX >= uni;
+              dragY = rawDY >= uni;
+              if (!dragX && !dragY) {
+                if (rawDY > rawDX)
+                  dragY = true;
+                else
+                  dragX = true;
+              }
+            }
+          } else if (drag.x && drag.y && (dragX || dragY))
+            dragX = dragY = true;
+          let p0, p1;
+          if (dragX) {
+            if (scaleX.ori == 0) {
+              p0 = mouseLeft0;
+              p1 = mouseLeft1;
+            } else {
+              p0 = mouseTop0;
+              p1 = mouseTop1;
+            }
+            setSelX(min(p0, p1), abs(p1 - p0));
+            if (!dragY)
+              setSelY(0, yDim);
+          }
+          if (dragY) {
+            if (scaleX.ori == 1) {
+              p0 = mouseLeft0;
+              p1 = mouseLeft1;
+            } else {
+              p0 = mouseTop0;
+              p1 = mouseTop1;
+            }
+            setSelY(min(p0, p1), abs(p1 - p0));
+            if (!dragX)
+              setSelX(0, xDim);
+          }
+          if (!dragX && !dragY) {
+            setSelX(0, 0);
+            setSelY(0, 0);
+          }
+        }
+      }
+      drag._x = dragX;
+      drag._y = dragY;
+      if (src == null) {
+        if (_pub) {
+          if (syncKey != null) {
+            let [xSyncKey, ySyncKey] = syncOpts.scales;
+            syncOpts.values[0] = xSyncKey != null ? posToVal(scaleX.ori == 0 ? mouseLeft1 : mouseTop1, xSyncKey) : null;
+            syncOpts.values[1] = ySyncKey != null ? posToVal(scaleX.ori == 1 ? mouseLeft1 : mouseTop1, ySyncKey) : null;
+          }
+          pubSync(mousemove, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, idx);
+        }
+        if (cursorFocus) {
+          let shouldPub = _pub && syncOpts.setSeries;
+          let p = focus.prox;
+          if (focusedSeries == null) {
+            if (closestDist <= p)
+              setSeries(closestSeries, FOCUS_TRUE, true, shouldPub);
+          } else {
+            if (closestDist > p)
+              setSeries(null, FOCUS_TRUE, true, shouldPub);
+            else if (closestSeries != focusedSeries)
+              setSeries(closestSeries, FOCUS_TRUE, true, shouldPub);
+          }
+        }
+      }
+      if (shouldSetLegend) {
+        legend.idx = idx;
+        setLegend();
+      }
+      _fire !== false && fire("setCursor");
+    }
+    let rect2 = null;
+    Object.defineProperty(self, "rect", {
+      get() {
+        if (rect2 == null)
+          syncRect(false);
+        return rect2;
+      }
+    });
+    function syncRect(defer = false) {
+      if (defer)
+        rect2 = null;
+      else {
+        rect2 = over.getBoundingClientRect();
+        fire("syncRect", rect2);
+      }
+    }
+    function mouseMove(e, src, _l, _t, _w, _h, _i) {
+      if (cursor._lock)
+        return;
+      if (dragging && e != null && e.movementX == 0 && e.movementY == 0)
+        return;
+      cacheMouse(e, src, _l, _t, _w, _h, _i, false, e != null);
+      if (e != null)
+        updateCursor(null, true, true);
+      else
+        updateCursor(src, true, false);
+    }
+    function cacheMouse(e, src, _l, _t, _w, _h, _i, initial, snap) {
+      if (rect2 == null)
+        syncRect(false);
+      setCursorEvent(e);
+      if (e != null) {
+        _l = e.clientX - rect2.left;
+        _t = e.clientY - rect2.top;
+      } else {
+        if (_l < 0 || _t < 0) {
+          mouseLeft1 = -10;
+          mouseTop1 = -10;
+          return;
+        }
+        let [xKey, yKey] = syncOpts.scales;
+        let syncOptsSrc = src.cursor.sync;
+        let [xValSrc, yValSrc] = syncOptsSrc.values;
+        let [xKeySrc, yKeySrc] = syncOptsSrc.scales;
+        let [matchXKeys, matchYKeys] = syncOpts.match;
+        let rotSrc = src.axes[0].side % 2 == 1;
+        let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss, yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss, _xDim = rotSrc ? _h : _w, _yDim = rotSrc ? _w : _h, _xPos = rotSrc ? _t : _l, _yPos = rotSrc ? _l : _t;
+        if (xKeySrc != null)
+          _l = matchXKeys(xKey, xKeySrc) ? getPos(xValSrc, scales[xKey], xDim, 0) : -10;
+        else
+          _l = xDim * (_xPos / _xDim);
+        if (yKeySrc != null)
+          _t = matchYKeys(yKey, yKeySrc) ? getPos(yValSrc, scales[yKey], yDim, 0) : -10;
+        else
+          _t = yDim * (_yPos / _yDim);
+        if (scaleX.ori == 1) {
+          let __l = _l;
+          _l = _t;
+          _t = __l;
+        }
+      }
+      if (snap && (src == null || src.cursor.event.type == mousemove)) {
+        if (_l <= 1 || _l >= plotWidCss - 1)
+          _l = incrRound(_l, plotWidCss);
+        if (_t <= 1 || _t >= plotHgtCss - 1)
+          _t = incrRound(_t, plotHgtCss);
+      }
+      if (initial) {
+        rawMouseLeft0 = _l;
+        rawMouseTop0 = _t;
+        [mouseLeft0, mouseTop0] = cursor.move(self, _l, _t);
+      } else {
+        mouseLeft1 = _l;
+        mouseTop1 = _t;
+      }
+    }
+    const _hideProps = {
+      width: 0,
+      height: 0,
+      left: 0,
+      top: 0
+    };
+    function hideSelect() {
+      setSelect(_hideProps, false);
+    }
+    let downSelectLeft;
+    let downSelectTop;
+    let downSelectWidth;
+    let downSelectHeight;
+    function mouseDown(e, src, _l, _t, _w, _h, _i) {
+      dragging = true;
+      dragX = dragY = drag._x = drag._y = false;
+      cacheMouse(e, src, _l, _t, _w, _h, _i, true, false);
+      if (e != null) {
+        onMouse(mouseup, doc, mouseUp, false);
+        pubSync(mousedown, self, mouseLeft0, mouseTop0, plotWidCss, plotHgtCss, null);
+      }
+      let { left, top, width, height } = select;
+      downSelectLeft = left;
+      downSelectTop = top;
+      downSelectWidth = width;
+      downSelectHeight = height;
+    }
+    function mouseUp(e, src, _l, _t, _w, _h, _i) {
+      dragging = drag._x = drag._y = false;
+      cacheMouse(e, src, _l, _t, _w, _h, _i, false, true);
+      let { left, top, width, height } = select;
+      let hasSelect = width > 0 || height > 0;
+      let chgSelect = downSelectLeft != left || downSelectTop != top || downSelectWidth != width || downSelectHeight != height;
+      hasSelect && chgSelect && setSelect(select);
+      if (drag.setScale && hasSelect && chgSelect) {
+        let xOff = left, xDim = width, yOff = top, yDim = height;
+        if (scaleX.ori == 1) {
+          xOff = top, xDim = height, yOff = left, yDim = width;
+        }
+        if (dragX) {
+          _setScale(
+            xScaleKey,
+            posToVal(xOff, xScaleKey),
+            posToVal(xOff + xDim, xScaleKey)
+          );
+        }
+        if (dragY) {
+          for (let k in scales) {
+            let sc = scales[k];
+            if (k != xScaleKey && sc.from == null && sc.min != inf) {
+              _setScale(
+                k,
+                posToVal(yOff + yDim, k),
+                posToVal(yOff, k)
+              );
+            }
+          }
+        }
+        hideSelect();
+      } else if (cursor.lock) {
+        cursor._lock = !cursor._lock;
+        updateCursor(src, true, e != null);
+      }
+      if (e != null) {
+        offMouse(mouseup, doc);
+        pubSync(mouseup, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, null);
+      }
+    }
+    function mouseLeave(e, src, _l, _t, _w, _h, _i) {
+      if (cursor._lock)
+        return;
+      setCursorEvent(e);
+      let _dragging = dragging;
+      if (dragging) {
+        let snapH = true;
+        let snapV = true;
+        let snapProx = 10;
+        let dragH, dragV;
+        if (scaleX.ori == 0) {
+          dragH = dragX;
+          dragV = dragY;
+        } else {
+          dragH = dragY;
+          dragV = dragX;
+        }
+        if (dragH && dragV) {
+          snapH = mouseLeft1 <= snapProx || mouseLeft1 >= plotWidCss - snapProx;
+          snapV = mouseTop1 <= snapProx || mouseTop1 >= plotHgtCss - snapProx;
+        }
+        if (dragH && snapH)
+          mouseLeft1 = mouseLeft1 < mouseLeft0 ? 0 : plotWidCss;
+        if (dragV && snapV)
+          mouseTop1 = mouseTop1 < mouseTop0 ? 0 : plotHgtCss;
+        updateCursor(null, true, true);
+        dragging = false;
+      }
+      mouseLeft1 = -10;
+      mouseTop1 = -10;
+      activeIdxs.fill(null);
+      updateCursor(null, true, true);
+      if (_dragging)
+        dragging = _dragging;
+    }
+    function dblClick(e, src, _l, _t, _w, _h, _i) {
+      if (cursor._lock)
+        return;
+      setCursorEvent(e);
+      autoScaleX();
+      hideSelect();
+      if (e != null)
+        pubSync(dblclick, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, null);
+    }
+    function syncPxRatio() {
+      axes.forEach(syncFontSize);
+      _setSize(self.width, self.height, true);
+    }
+    on(dppxchange, win, syncPxRatio);
+    const events = {};
+    events.mousedown = mouseDown;
+    events.mousemove = mouseMove;
+    events.mouseup = mouseUp;
+    events.dblclick = dblClick;
+    events["setSeries"] = (e, src, idx, opts2) => {
+      let seriesIdxMatcher2 = syncOpts.match[2];
+      idx = seriesIdxMatcher2(self, src, idx);
+      idx != -1 && setSeries(idx, opts2, true, false);
+    };
+    if (showCursor) {
+      onMouse(mousedown, over, mouseDown);
+      onMouse(mousemove, over, mouseMove);
+      onMouse(mouseenter, over, (e) => {
+        setCursorEvent(e);
+        syncRect(false);
+      });
+      onMouse(mouseleave, over, mouseLeave);
+      onMouse(dblclick, over, dblClick);
+      cursorPlots.add(self);
+      self.syncRect = syncRect;
+    }
+    const hooks = self.hooks = opts.hooks || {};
+    function fire(evName, a1, a2) {
+      if (deferHooks)
+        hooksQueue.push([evName, a1, a2]);
+      else {
+        if (evName in hooks) {
+          hooks[evName].forEach((fn) => {
+            fn.call(null, self, a1, a2);
+          });
+        }
+      }
+    }
+    (opts.plugins || []).forEach((p) => {
+      for (let evName in p.hooks)
+        hooks[evName] = (hooks[evName] || []).concat(p.hooks[evName]);
+    });
+    const seriesIdxMatcher = (self2, src, srcSeriesIdx) => srcSeriesIdx;
+    const syncOpts = assign({
+      key: null,
+      setSeries: false,
+      filters: {
+        pub: retTrue,
+        sub: retTrue
+      },
+      scales: [xScaleKey, series[1] ? series[1].scale : null],
+      match: [retEq, retEq, seriesIdxMatcher],
+      values: [null, null]
+    }, cursor.sync);
+    if (syncOpts.match.length == 2)
+      syncOpts.match.push(seriesIdxMatcher);
+    cursor.sync = syncOpts;
+    const syncKey = syncOpts.key;
+    const sync = _sync(syncKey);
+    function pubSync(type, src, x, y, w, h, i) {
+      if (syncOpts.filters.pub(type, src, x, y, w, h, i))
+        sync.pub(type, src, x, y, w, h, i);
+    }
+    sync.sub(self);
+    function pub(type, src, x, y, w, h, i) {
+      if (syncOpts.filters.sub(type, src, x, y, w, h, i))
+        events[type](null, src, x, y, w, h, i);
+    }
+    self.pub = pub;
+    function destroy() {
+      sync.unsub(self);
+      cursorPlots.delete(self);
+      mouseListeners.clear();
+      off(dppxchange, win, syncPxRatio);
+      root.remove();
+      legendTable?.remove();
+      fire("destroy");
+    }
+    self.destroy = destroy;
+    function _init() {
+      fire("init", opts, data);
+      setData(data || opts.data, false);
+      if (pendScales[xScaleKey])
+        setScale(xScaleKey, pendScales[xScaleKey]);
+      else
+        autoScaleX();
+      shouldSetSelect = select.show && (select.width > 0 || select.height > 0);
+      shouldSetCursor = shouldSetLegend = true;
+      _setSize(opts.width, opts.height);
+    }
+    series.forEach(initSeries);
+    axes.forEach(initAxis);
+    if (then) {
+      if (then instanceof HTMLElement) {
+        then.appendChild(root);
+        _init();
+      } else
+        then(self, _init);
+    } else
+      _init();
+    return self;
+  }
+  uPlot.assign = assign;
+  uPlot.fmtNum = fmtNum;
+  uPlot.rangeNum = rangeNum;
+  uPlot.rangeLog = rangeLog;
+  uPlot.rangeAsinh = rangeAsinh;
+  uPlot.orient = orient;
+  uPlot.pxRatio = pxRatio;
+  {
+    uPlot.join = join;
+  }
+  {
+    uPlot.fmtDate = fmtDate;
+    uPlot.tzDate = tzDate;
+  }
+  uPlot.sync = _sync;
+  {
+    uPlot.addGap = addGap;
+    uPlot.clipGaps = clipGaps;
+    let paths = uPlot.paths = {
+      points
+    };
+    paths.linear = linear;
+    paths.stepped = stepped;
+    paths.bars = bars;
+    paths.spline = monotoneCubic;
+  }
+
+  // src/chart.js
+  var MOST_CHIPS = 14;
+  var FONT = "12px system-ui, sans-serif";
+  var LABEL = 13;
+  var optionsOf = (plot, width, height) => ({
+    width,
+    height,
+    legend: { show: false },
+    padding: [6, 16, 0, 0],
+    scales: {
+      x: { time: false, range: () => [0, plot.plots.span()] },
+      y: { range: (u, low, high) => rangeY(plot.spec.bounds, u.height, low, high) }
+    },
+    axes: axesOf(plot.spec.unit),
+    series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
+    focus: { alpha: 0.22 },
+    cursor: {
+      drag: { x: false, y: false },
+      points: { show: plot.spec.total <= MOST_CHIPS, size: 6 },
+      focus: { prox: 14 },
+      sync: { key: "gne", setSeries: false, scales: ["x", null] }
+    },
+    hooks: {
+      drawAxes: [(u) => drawMarks(u, plot)],
+      draw: [() => plot.setTime(plot.plots.now)],
+      // the axis is another one only by now
+      setCursor: [(u) => plot.hover(u)],
+      // uPlot's types do not know what it tells here
+      setSeries: [(_2, k, how) => plot.focusedByMouse(
+        k,
+        /** @type {any} */
+        how
+      )]
+    }
+  });
+  var axesOf = (unit) => {
+    const axis = {
+      stroke: colour("muted"),
+      font: FONT,
+      grid: { stroke: colour("plot-grid"), width: 1 },
+      ticks: { stroke: colour("plot-grid"), width: 1, size: 4 }
+    };
+    return [
+      {
+        ...axis,
+        size: 24,
+        gap: 2,
+        space: 60,
+        values: (_2, ticks2) => ticks2.map((v) => `${number(v, 6)} s`)
+      },
+      {
+        ...axis,
+        size: 50,
+        gap: 3,
+        space: 24,
+        label: unit || void 0,
+        labelSize: 18,
+        labelGap: 0,
+        labelFont: FONT,
+        values: (_2, ticks2) => ticks2.map((v) => number(v, 6))
+      }
+    ];
+  };
+  var seriesOf = (plot, label, k) => {
+    const look = plot.lineOf(k);
+    return {
+      label,
+      stroke: look.colour,
+      dash: look.dash.length ? look.dash : void 0,
+      width: plot.spec.columns.length > MOST_CHIPS ? 1 : 1.75,
+      points: { show: false },
+      spanGaps: false
+    };
+  };
+  var rangeY = (bounds, height, low, high) => {
+    for (const { value } of bounds) {
+      low = low === null ? value : Math.min(low, value);
+      high = high === null ? value : Math.max(high, value);
+    }
+    if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
+    const size = high - low || Math.abs(high) || 1;
+    const room = bounds.length ? 18 / Math.max(height - 36, 40) : 0.08;
+    return [low - 0.07 * size, high + room * size * 1.2];
+  };
+  var drawMarks = (u, plot) => {
+    const { ctx: context, bbox } = u;
+    context.save();
+    context.beginPath();
+    context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    context.clip();
+    drawInterventions(u, plot.plots.source.interventions);
+    drawBounds(u, plot.spec);
+    context.restore();
+  };
+  var drawInterventions = (u, interventions) => {
+    const { ctx: context, bbox } = u;
+    context.strokeStyle = colour("muted");
+    context.lineWidth = 1;
+    context.setLineDash([2, 4]);
+    for (const { time } of interventions) {
+      const x = u.valToPos(time, "x", true);
+      context.beginPath();
+      context.moveTo(x, bbox.top);
+      context.lineTo(x, bbox.top + bbox.height);
+      context.stroke();
+    }
+  };
+  var drawBounds = (u, { bounds, unit }) => {
+    const { ctx: context, bbox } = u;
+    const ratio = uPlot.pxRatio;
+    context.strokeStyle = context.fillStyle = colour("limit");
+    context.lineWidth = 1.5 * ratio;
+    context.font = `${12 * ratio}px system-ui, sans-serif`;
+    context.textBaseline = "bottom";
+    context.textAlign = "right";
+    context.setLineDash([6 * ratio, 4 * ratio]);
+    let last = Infinity;
+    for (const { value, note } of bounds) {
+      const y = u.valToPos(value, "y", true);
+      context.beginPath();
+      context.moveTo(bbox.left, y);
+      context.lineTo(bbox.left + bbox.width, y);
+      context.stroke();
+      if (last - y < LABEL * ratio) continue;
+      last = y;
+      const text = `bound ${withUnit(value, unit)}${note}`;
+      context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+    }
+  };
+
+  // src/plot.js
+  var symbolOf = (tex) => {
+    const plain = tex.replace(/\\(lVert|rVert|Vert|\|)/g, "‖").replace(/\\(left|right|,|;|mathrm|text)/g, "").replace(/-/g, "−");
+    if (!plain || /[\\^]/.test(plain)) return null;
+    const made = element("span", { class: "symbol" });
+    for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
+      made.append(other ?? element("sub", { text: sub ?? one }));
+    return made;
+  };
+  var captionOf = (spec, note) => element(
+    "figcaption",
+    {},
+    element("span", { class: "plot-system", text: spec.system.name }),
+    element("span", { class: "plot-title", text: spec.title }),
+    symbolOf(spec.symbol),
+    note
+  );
+  var exitLine = () => element(
+    "div",
+    { class: "exit-line", hidden: true },
+    element("span", { text: "left the set" })
+  );
+  var swatchOf = (look) => {
+    const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      made.getContext("2d")
+    );
+    Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
+    context.setLineDash(look.dash.map((length) => 1.6 * length));
+    context.moveTo(0, 3);
+    context.lineTo(28, 3);
+    context.stroke();
+    return made;
+  };
+  var TimeLine = class {
+    /** @param {HTMLElement} root */
+    constructor(root) {
+      this.root = root;
+      this.x = NaN;
+    }
+    /**
+     * @param {uPlot} u
+     * @param {number} time
+     */
+    place(u, time) {
+      const x = Math.round(u.valToPos(time, "x"));
+      if (this.x === x) return;
+      this.x = x;
+      this.root.style.transform = `translateX(${x}px)`;
+      this.root.style.visibility = Number.isFinite(x) ? "visible" : "hidden";
+    }
+  };
+  var Plot = class {
+    /**
+     * @param {Plots} plots
+     * @param {Spec} spec
+     */
+    constructor(plots, spec) {
+      this.plots = plots;
+      this.spec = spec;
+      this.hovered = null;
+      this.focused = null;
+      this.uplot = null;
+      this.mouseInside = false;
+      this.chips = element("div", { class: "plot-chips" });
+      this.chart = element("div", { class: "chart" });
+      const shown = spec.columns.length;
+      this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
+      this.note = element("span", { class: "plot-note", text: this.several });
+      const name = `${spec.system.name}: ${spec.title} over time`;
+      this.root = element("figure", { class: "plot", "aria-label": name });
+      this.root.append(captionOf(spec, this.note), this.chips, this.chart);
+      this.timeLine = new TimeLine(element("div", { class: "time-line" }));
+      this.exitLine = new TimeLine(exitLine());
+      this.values = shown > MOST_CHIPS ? [] : spec.labels.map((_2, k) => this.addChip(k));
+      this.readout = element("span", { class: "readout" });
+      if (!this.values.length) this.chips.append(this.readout);
+    }
+    /**
+     * Colour and dash of the k-th line.
+     * @param {number} k
+     */
+    lineOf(k) {
+      const { spec } = this;
+      if (spec.total === 1) return { colour: colour("text"), dash: [] };
+      return line(spec.agents[k] ?? spec.columns[k]);
+    }
+    /**
+     * The chip of the k-th line; returns where its value is written.
+     * @param {number} k
+     */
+    addChip(k) {
+      const { spec } = this;
+      const value = element("span", { class: "chip-value" });
+      const attributes = {
+        class: "plot-chip",
+        title: `${spec.noun} ${spec.labels[k]}`.trim(),
+        onmouseenter: () => this.point(k),
+        onmouseleave: () => this.point(null)
+      };
+      const text = spec.total === 1 ? "" : spec.shorts[k];
+      this.chips.append(element("span", attributes, swatchOf(this.lineOf(k)), text, value));
+      return value;
+    }
+    /**
+     * One line is pointed at: it stands out, and so does its agent in the scene.
+     * @param {number | null} k
+     */
+    point(k) {
+      this.focus(k);
+      this.tell(k);
+    }
+    /** @param {number | null} k */
+    tell(k) {
+      const agent = k === null ? null : this.spec.agents[k];
+      const which = agent === null ? null : { system: this.spec.system.name, agent };
+      this.plots.callbacks.highlight(which, this);
+    }
+    /** @param {number | null} k */
+    focus(k) {
+      if (this.focused === k) return;
+      this.focused = k;
+      this.markChip(k);
+      this.uplot?.setSeries(k === null ? (
+        /** @type {any} */
+        null
+      ) : k + 1, { focus: true });
+    }
+    /** @param {number | null} k */
+    markChip(k) {
+      this.values.forEach(
+        (value, each) => value.parentElement?.classList.toggle("chosen", each === k)
+      );
+    }
+    /** @param {Agent | null} which */
+    highlight(which) {
+      const own = which?.system === this.spec.system.name;
+      const k = own ? this.spec.agents.indexOf(which.agent) : -1;
+      this.focus(k < 0 ? null : k);
+    }
+    // ---- uPlot
+    /**
+     * @param {number} width
+     * @param {number} height
+     */
+    setSize(width, height) {
+      if (this.uplot) return this.uplot.setSize({ width, height });
+      this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
+      this.uplot.over.append(this.timeLine.root, this.exitLine.root);
+      this.listen(this.uplot, this.uplot.over);
+    }
+    /** @returns {uPlot.AlignedData} */
+    data() {
+      const { store } = this.plots.source;
+      return [store.time, ...this.spec.columns.map((k) => store.column(this.spec.array, k))];
+    }
+    /**
+     * The mouse is somewhere over this plot, or over one beside it.
+     * @param {uPlot} u
+     */
+    hover(u) {
+      const { idx = null, left = -1 } = u.cursor;
+      this.hovered = left >= 0 ? idx : null;
+      this.writeValues();
+    }
+    /**
+     * @param {number | null} k
+     * @param {{focus?: boolean}} how
+     */
+    focusedByMouse(k, how) {
+      if (how?.focus === void 0 || this.uplot?.cursor.left === void 0) return;
+      if (!this.mouseInside) return;
+      const focused = k === null || k === void 0 ? null : k - 1;
+      if (focused === this.focused) return;
+      this.focused = focused;
+      this.markChip(focused);
+      this.tell(focused);
+    }
+    /**
+     * @param {uPlot} u
+     * @param {HTMLElement} over
+     */
+    listen(u, over) {
+      let dragging = false;
+      const seek = (event) => {
+        const left = event.clientX - over.getBoundingClientRect().left;
+        this.plots.callbacks.seek(u.posToVal(left, "x"));
+      };
+      over.addEventListener("pointerdown", (event) => {
+        if (event.button !== 0 || !this.plots.source.seekable) return;
+        dragging = true;
+        over.setPointerCapture(event.pointerId);
+        seek(event);
+      });
+      over.addEventListener("pointermove", (event) => dragging && seek(event));
+      over.addEventListener("pointerup", () => dragging = false);
+      over.addEventListener("pointercancel", () => dragging = false);
+      over.addEventListener("mouseenter", () => this.mouseInside = true);
+      over.addEventListener("mouseleave", () => {
+        this.mouseInside = false;
+        this.point(null);
+      });
+    }
+    refresh() {
+      this.uplot?.setData(this.data(), true);
+      this.writeValues();
+    }
+    /** @param {number} t */
+    setTime(t) {
+      if (!this.uplot) return;
+      this.timeLine.place(this.uplot, t);
+      const exit = this.plots.source.exits[this.spec.system.name];
+      const { root } = this.exitLine;
+      root.hidden = !Number.isFinite(exit);
+      if (root.hidden) return;
+      this.exitLine.place(this.uplot, exit);
+      root.classList.toggle("leftward", exit > 0.7 * this.plots.span());
+    }
+    /** Values at the mouse, or now. */
+    writeValues() {
+      const u = this.uplot;
+      if (!u) return;
+      const digits = decimals(this.plots.source.store.greatest(this.spec.array));
+      const i = this.hovered ?? u.valToIdx(this.plots.now);
+      const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
+      this.note.textContent = [this.several, hover].filter(Boolean).join(" · ");
+      const value = (k2) => fixed(u.data[k2 + 1][i] ?? null, digits);
+      this.values.forEach((place, k2) => place.textContent = value(k2));
+      if (this.values.length) return;
+      const { spec, focused: k } = this;
+      this.readout.textContent = k === null ? "point at a line for its value" : `${spec.noun} ${spec.labels[k]}: ${value(k)} ${spec.unit}`.trim();
+    }
+  };
+
+  // src/specs.js
+  var MOST_LINES = 40;
+  var shortOf = (labels) => {
+    if (labels.length < 2) return labels;
+    const [first] = labels;
+    let n = 0;
+    while (n < first.length && labels.every((each) => each[n] === first[n])) n++;
+    const common = first.slice(0, n).lastIndexOf(" ") + 1;
+    return labels.map(
+      (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_2, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
+    );
+  };
+  var actionsOf = (system) => {
+    const { action, agent_name: agent } = system;
+    return [...new Set(action.axis)].map((axis) => {
+      const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
+      return {
+        system,
+        name: "action",
+        axis,
+        array: `${system.name}/action`,
+        unit: action.unit,
+        columns,
+        title: axis ? `${action.name}, ${axis}` : action.name,
+        symbol: "",
+        labels: columns.map((k) => String(action.owner[k])),
+        agents: columns.map((k) => action.owner[k] - 1),
+        noun: agent,
+        bounds: []
+      };
+    });
+  };
+  var quantityOf = (system, quantity) => {
+    const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
+    return {
+      system,
+      name: quantity.name,
+      axis: "",
+      array: `${system.name}/quantity/${quantity.name}`,
+      unit: quantity.unit,
+      columns: [...quantity.labels.keys()],
+      title: quantity.long_name,
+      symbol: quantity.symbol,
+      labels: quantity.labels.map((each) => each || quantity.long_name),
+      agents: quantity.labels.map((_2, k) => ofAgents ? k : null),
+      noun: ofAgents ? system.agent_name : "",
+      bounds: boundsOf(quantity)
+    };
+  };
+  var boundsOf = ({ bound, lower_bound, labels }) => {
+    const found = /* @__PURE__ */ new Map();
+    const shorts = shortOf(labels);
+    for (const values of [bound, lower_bound])
+      (values ?? []).forEach((value, k) => {
+        if (value === null || !Number.isFinite(value)) return;
+        found.set(value, [...found.get(value) ?? [], shorts[k]]);
+      });
+    return [...found].map(([value, whose]) => {
+      const note = `: ${whose.join(", ")}`;
+      return { value, note: whose.length < labels.length && note.length < 20 ? note : "" };
+    }).sort((a, b) => a.value - b.value);
+  };
+  var evenly = (n, most) => {
+    if (n <= most) return [...Array(n).keys()];
+    return [...Array(most).keys()].map((k) => Math.round(k * (n - 1) / (most - 1)));
+  };
+  var thinned = (spec) => {
+    const total = spec.columns.length;
+    const chosen = evenly(total, MOST_LINES);
+    const pick = (values) => chosen.map((k) => values[k]);
+    return {
+      ...spec,
+      total,
+      columns: pick(spec.columns),
+      shorts: pick(shortOf(spec.labels)),
+      labels: pick(spec.labels),
+      agents: pick(spec.agents)
+    };
+  };
+  var specsOf = (system) => [
+    ...actionsOf(system),
+    ...system.quantities.map((quantity) => quantityOf(system, quantity))
+  ].map(thinned);
+
+  // src/plots.js
+  var niceSpan = (t) => {
+    const ten = 10 ** Math.floor(Math.log10(t));
+    return ten * ([1, 1.5, 2, 3, 5, 7.5].find((step) => step * ten >= t) ?? 10);
+  };
+  var Plots = class {
+    /**
+     * @param {HTMLElement} column where they are put
+     * @param {object} callbacks
+     * @param {(time: number) => void} callbacks.seek
+     * @param {(which: Agent | null, plot: Plot) => void} callbacks.highlight
+     */
+    constructor(column, callbacks) {
+      this.column = column;
+      this.callbacks = callbacks;
+      this.plots = [];
+      this.meta = null;
+      this.source = /** @type {any} */
+      null;
+      this.now = 0;
+      this.size = "";
+      new ResizeObserver(() => this.resize()).observe(column);
+    }
+    /**
+     * Plots for a scene.
+     * @param {Scene} meta
+     * @param {Source} source
+     */
+    setScene(meta, source) {
+      this.meta = meta;
+      this.source = source;
+      this.plots = meta.systems.flatMap(specsOf).map((spec) => new Plot(this, spec));
+      this.column.replaceChildren(...this.plots.map((plot) => plot.root));
+      this.size = "";
+      this.resize();
+    }
+    /** @param {Source} source */
+    setSource(source) {
+      this.source = source;
+      this.refresh();
+    }
+    restyle() {
+      if (this.meta) this.setScene(this.meta, this.source);
+    }
+    /** Right end of the time axis: the run's, or live a round number beyond what is there. */
+    span() {
+      const { exits, seekable, store } = this.source;
+      const last = store.time.at(-1) ?? 0;
+      const duration = this.meta?.duration;
+      const exit = Math.max(0, ...Object.values(exits));
+      if (seekable) return Math.max(last, 1.06 * exit, 1e-6);
+      const nice = niceSpan(Math.max(last, 2));
+      return duration && last <= duration ? Math.min(nice, duration) : nice;
+    }
+    resize() {
+      if (!this.meta || !this.column.clientWidth) return;
+      const width = this.column.clientWidth - 24;
+      const count = Math.max(this.plots.length, 1);
+      const extra = this.plots.reduce(
+        (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
+        0
+      );
+      const room = (this.column.clientHeight - extra - 16) / count;
+      const height = Math.floor(Math.min(Math.max(room, 112), 300));
+      const size = `${width} ${height}`;
+      if (size === this.size) return;
+      this.size = size;
+      for (const plot of this.plots) plot.setSize(width, height);
+      for (const plot of this.plots) plot.setTime(this.now);
+    }
+    refresh() {
+      for (const plot of this.plots) plot.refresh();
+    }
+    /** @param {number} t */
+    setTime(t) {
+      this.now = t;
+      for (const plot of this.plots) plot.setTime(t);
+    }
+    writeValues() {
+      for (const plot of this.plots) plot.writeValues();
+    }
+    /**
+     * @param {Agent | null} which
+     * @param {Plot} [except]
+     */
+    highlight(which, except) {
+      for (const plot of this.plots) if (plot !== except) plot.highlight(which);
+    }
+    describe() {
+      return this.plots.map(({ spec, uplot }) => ({
+        system: spec.system.name,
+        name: spec.name,
+        axis: spec.axis,
+        title: spec.title,
+        series: [...spec.labels],
+        total: spec.total,
+        bounds: spec.bounds.map(({ value }) => value),
+        width: uplot?.width ?? 0,
+        samples: uplot?.data[0].length ?? 0
+      }));
+    }
+  };
+
+  // src/meshcat.js
+  var { THREE, Viewer } = MeshCat;
+
+  // src/bars.js
+  var PITCH = 0.62;
+  var WIDTH2 = 0.4;
+  var GAUGE = 1.7;
+  var TALL = 1.9;
+  var BOX = new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5);
+  var EDGES = new THREE.EdgesGeometry(BOX);
+  var mesh = (color, opacity = 1) => new THREE.Mesh(
+    BOX,
+    new THREE.MeshPhongMaterial({
+      color,
+      transparent: opacity < 1,
+      opacity,
+      shininess: 12
+    })
+  );
+  var setHeight = (object, height) => {
+    object.scale.z = Math.abs(height) < 1e-4 ? 1e-4 : height;
+  };
+  var Bars = class {
+    /**
+     * @param {Three} parent
+     * @param {System} system
+     */
+    constructor(parent, system) {
+      this.system = system;
+      this.group = new THREE.Group();
+      parent.add(this.group);
+      const m = system.action.owner.length;
+      this.perRow = m <= 24 ? m : Math.ceil(Math.sqrt(4 * m));
+      this.rows = Math.ceil(m / this.perRow);
+      const bounded = this.boundedNumbers();
+      this.width = PITCH * this.perRow + GAUGE * bounded.length;
+      this.depth = PITCH * this.rows;
+      this.bars = system.action.owner.map((_2, k) => this.addBar(k));
+      this.gauges = bounded.map((quantity, k) => this.addGauge(quantity, k));
+      this.origin = [0, 0, 0];
+      this.scale = 1;
+      this.reference = 1;
+      this.values = [];
+      this.addSlab();
+      this.restyle();
+    }
+    boundedNumbers() {
+      return this.system.quantities.filter(
+        ({ bound, labels }) => labels.length === 1 && typeof bound?.[0] === "number"
+      );
+    }
+    /**
+     * Where the k-th bar stands, from the middle of the group.
+     * @param {number} k
+     */
+    spot(k) {
+      const row = Math.floor(k / this.perRow);
+      return [PITCH * (k % this.perRow + 0.5) - this.width / 2, PITCH * row];
+    }
+    /** @param {number} k */
+    addBar(k) {
+      const bar = mesh(8947848);
+      const [x, y] = this.spot(k);
+      bar.position.set(x, y, 0);
+      bar.scale.set(WIDTH2, WIDTH2, 1);
+      this.group.add(bar);
+      return bar;
+    }
+    /**
+     * @param {Quantity} quantity
+     * @param {number} k
+     */
+    addGauge(quantity, k) {
+      const x = PITCH * this.perRow + GAUGE * (k + 0.5) + 0.1 - this.width / 2;
+      const place = (object, width, z = 0) => {
+        object.position.set(x, 0, z);
+        object.scale.set(width, width, 1);
+        this.group.add(object);
+        return object;
+      };
+      const bar = place(mesh(8947848), 0.7);
+      const frame = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 0.72);
+      setHeight(frame, TALL);
+      const plate = place(mesh(16777215, 0.55), 1.15, TALL);
+      setHeight(plate, 0.03);
+      const rim = place(new THREE.LineSegments(EDGES, new THREE.LineBasicMaterial()), 1.15, TALL);
+      setHeight(rim, 0.03);
+      const limit = quantity.bound?.[0] ?? NaN;
+      return { quantity, limit, bar, frame, plate, rim, x, value: NaN, share: NaN };
+    }
+    addSlab() {
+      this.slab = mesh(8947848, 0.5);
+      this.slab.scale.set(this.width + 0.3, this.depth + 0.5, 0.03);
+      this.slab.position.set(0, (this.depth - PITCH) / 2, -0.032);
+      this.group.add(this.slab);
+    }
+    restyle() {
+      this.slab.material.color.set(colour("slab"));
+      for (const { frame, plate, rim } of this.gauges) {
+        frame.material.color.set(colour("muted"));
+        plate.material.color.set(colour("limit"));
+        rim.material.color.set(colour("limit"));
+      }
+    }
+    remove() {
+      this.group.parent?.remove(this.group);
+    }
+    /**
+     * @param {Instant} instant
+     * @param {Store} store
+     * @param {Point} origin
+     * @param {number} scale
+     */
+    update(instant, store, [x, y, z], scale) {
+      const own = instant.systems[this.system.name];
+      this.reference = store.greatest(`${this.system.name}/action`) || 1;
+      this.origin = [x, y, z];
+      this.scale = scale;
+      this.group.position.set(x, y, z + 0.035);
+      this.group.scale.setScalar(scale);
+      this.values = own.action || [];
+      this.bars.forEach((bar, k) => {
+        const agent = this.system.action.owner[k] - 1;
+        bar.material.color.setRGB(...ramp(own.share?.[agent] ?? NaN));
+        setHeight(bar, this.heightOf(this.values[k]));
+      });
+      for (const gauge of this.gauges) this.updateGauge(gauge, own);
+    }
+    /**
+     * @param {ReturnType<Bars["addGauge"]>} gauge
+     * @param {Record<string, Numbers | undefined>} own arrays of the system
+     */
+    updateGauge(gauge, own) {
+      gauge.value = own[`quantity/${gauge.quantity.name}`]?.[0] ?? NaN;
+      gauge.share = gauge.value / gauge.limit;
+      setHeight(gauge.bar, TALL * (Number.isFinite(gauge.share) ? gauge.share : 0));
+      gauge.bar.material.color.setRGB(...ramp(gauge.share));
+    }
+    /** @param {number} value */
+    heightOf(value) {
+      return Number.isFinite(value) ? TALL * value / this.reference : 0;
+    }
+    /**
+     * A point of the group, in MuJoCo's coordinates.
+     * @returns {Point}
+     * @param {number} x
+     * @param {number} y
+     * @param {number} z
+     */
+    point(x, y, z) {
+      const [ox, oy, oz] = this.origin;
+      return [ox + this.scale * x, oy + this.scale * y, oz + 0.035 + this.scale * z];
+    }
+    /** @param {number} k */
+    top(k) {
+      const [x, y] = this.spot(k);
+      return this.point(x, y, Math.max(0, this.heightOf(this.values[k])));
+    }
+    /** @param {number} agent */
+    topOfAgent(agent) {
+      return this.top(this.system.action.owner.indexOf(agent + 1));
+    }
+    /** @param {number} k */
+    foot(k) {
+      const [x, y] = this.spot(k);
+      return this.point(x, y - WIDTH2 / 2, 0);
+    }
+    corners() {
+      const [w, d] = [this.width / 2 + 0.3, this.depth];
+      return [
+        [-w, -0.4, -0.35],
+        [w, -0.4, -0.35],
+        [-w, d, TALL + 0.5],
+        [w, d, TALL + 0.5],
+        [w, -0.4, TALL + 0.5]
+      ].map(([x, y, z]) => this.point(x, y, z));
+    }
+    /**
+     * What the bars are.
+     * @returns {Text}
+     */
+    title() {
+      const { name, action } = this.system;
+      const [x, y] = this.spot(0);
+      const unit = action.unit ? ` / ${action.unit}` : "";
+      const point = this.point(x - WIDTH2 / 2, y, TALL);
+      return {
+        point,
+        text: `${name}: ${action.name}${unit}`,
+        shift: -34,
+        align: "left",
+        title: true
+      };
+    }
+    /**
+     * Value on top, what it is below, the limit beside its plate.
+     * @returns {Text[]}
+     */
+    gaugeTexts() {
+      return this.gauges.flatMap(({ quantity, limit, x, value, share }) => [
+        {
+          point: this.point(x, 0, Math.max(TALL * (share || 0), TALL) + 0.1),
+          text: withUnit(value, quantity.unit),
+          bold: true,
+          bad: share > 1,
+          shift: -14
+        },
+        {
+          point: this.point(x + 0.6, 0, TALL),
+          text: `limit ${withUnit(limit, quantity.unit)}`,
+          limit: true,
+          align: "left"
+        },
+        { point: this.point(x, -0.45, -0.05), text: quantity.long_name, shift: 12 }
+      ]);
+    }
+  };
+
+  // src/batches.js
+  var FEW = 150;
+  var HIDDEN = new THREE.Matrix4().makeScale(0, 0, 0);
+  var checksum = (geometry) => {
+    const values = geometry.attributes.position?.array || [];
+    let sum = 0;
+    for (let i = 0; i < values.length; i++) sum += values[i] * (i % 7 + 1);
+    return `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
+  };
+  var signature = ({ geometry, material: m }) => {
+    const shape = geometry.parameters ? JSON.stringify(geometry.parameters) : checksum(geometry);
+    return [
+      geometry.type,
+      shape,
+      m.type,
+      m.opacity,
+      m.transparent,
+      m.side,
+      m.wireframe,
+      m.shininess
+    ].join("|");
+  };
+  var batchable = (mesh2) => mesh2.isMesh && !mesh2.isInstancedMesh && !Array.isArray(mesh2.material) && !mesh2.material.map && !mesh2.material.vertexColors;
+  var coarser = (geometry, count) => {
+    const p = geometry.parameters;
+    const around = count > 100 ? 10 : 14;
+    if (geometry.type === "SphereGeometry") return new THREE.SphereGeometry(p.radius, around, 7);
+    if (geometry.type === "CylinderGeometry")
+      return new THREE.CylinderGeometry(
+        p.radiusTop,
+        p.radiusBottom,
+        p.height,
+        around,
+        1,
+        p.openEnded
+      );
+    return geometry;
+  };
+  var Batches = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      this.scene = scene;
+      this.group = new THREE.Group();
+      scene.updateMatrix();
+      this.group.matrixAutoUpdate = false;
+      this.group.matrix.copy(scene.matrix).invert();
+      scene.add(this.group);
+      this.all = [];
+    }
+    clear() {
+      for (const { instanced, meshes } of this.all) {
+        this.group.remove(instanced);
+        instanced.dispose();
+        for (const mesh2 of meshes) mesh2.layers.enable(0);
+      }
+      this.all = [];
+    }
+    /**
+     * Batches the meshes below these objects, if they are many.
+     * @param {Three[]} roots
+     */
+    build(roots) {
+      this.clear();
+      const groups = /* @__PURE__ */ new Map();
+      let count = 0;
+      for (const root of roots)
+        root?.traverse((mesh2) => {
+          if (!batchable(mesh2)) return;
+          const key = signature(mesh2);
+          if (!groups.has(key)) groups.set(key, []);
+          groups.get(key).push(mesh2);
+          count++;
+        });
+      if (count <= FEW) return;
+      for (const meshes of groups.values()) if (meshes.length > 4) this.add(meshes);
+    }
+    /** @param {Three[]} meshes */
+    add(meshes) {
+      const material = meshes[0].material.clone();
+      material.color.setRGB(1, 1, 1);
+      const shape = coarser(meshes[0].geometry, meshes.length);
+      const instanced = new THREE.InstancedMesh(shape, material, meshes.length);
+      instanced.frustumCulled = false;
+      this.group.add(instanced);
+      for (const mesh2 of meshes) mesh2.layers.disableAll();
+      this.all.push({ instanced, meshes });
+    }
+    update() {
+      if (!this.all.length) return;
+      this.scene.updateMatrixWorld();
+      for (const { instanced, meshes } of this.all) {
+        meshes.forEach((mesh2, k) => {
+          instanced.setMatrixAt(k, this.visible(mesh2) ? mesh2.matrixWorld : HIDDEN);
+          instanced.setColorAt(k, mesh2.material.color);
+        });
+        instanced.instanceMatrix.needsUpdate = true;
+        instanced.instanceColor.needsUpdate = true;
+      }
+    }
+    /** @param {Three} mesh */
+    visible(mesh2) {
+      for (let at = mesh2; at; at = at.parent) if (!at.visible) return false;
+      return true;
+    }
+  };
+
+  // src/viewer.js
+  var OWN = ["Background", "Cameras", "Lights", "Grid", "Axes"];
+  var DEGREE = Math.PI / 180;
+  var toView = (point) => new THREE.Vector3(point[0], point[2], -point[1]);
+  var folder = () => ({
+    domElement: document.createElement("div"),
+    __folders: {},
+    addFolder: folder,
+    removeFolder() {
+    },
+    add: () => ({
+      min() {
+        return this;
+      },
+      max() {
+        return this;
+      },
+      step() {
+        return this;
+      },
+      onChange() {
+        return this;
+      },
+      updateDisplay() {
+      }
+    }),
+    remove() {
+    }
+  });
+  var viewerIn = (pane, changed) => {
+    const viewer = new Viewer(pane, false);
+    const set = viewer.set_object.bind(viewer);
+    viewer.set_object = (path, object) => {
+      set(path, object);
+      changed();
+    };
+    const resize2 = viewer.set_3d_pane_size.bind(viewer);
+    viewer.set_3d_pane_size = () => {
+      const { clientWidth: w, clientHeight: h } = pane;
+      if (w && h) resize2(w, h);
+    };
+    viewer.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    viewer.gui.domElement.style.display = "none";
+    viewer.scene_tree.folder = folder();
+    for (const name of ["Grid", "Axes", "Lights"]) viewer.set_property([name], "visible", false);
+    viewer.hide_background();
+    light2(viewer.scene);
+    return viewer;
+  };
+  var light2 = (scene) => {
+    const sky = new THREE.HemisphereLight(16777215, 8949920, 0.72);
+    sky.position.set(0, 0, 1);
+    const sun = new THREE.DirectionalLight(16777215, 0.5);
+    sun.position.set(-3, -7, 9);
+    scene.add(sky, sun, sun.target);
+  };
+  var nodeAt = (viewer, path) => {
+    let node = viewer.scene_tree;
+    for (const name of path.split("/").filter(Boolean)) node = node?.children[name];
+    return node;
+  };
+  var drawnIn = (viewer) => Object.entries(viewer.scene_tree.children).filter(([name]) => !OWN.includes(name)).map(([name, node]) => [name, node.object]);
+  var empty = (viewer) => {
+    for (const [name, object] of drawnIn(viewer)) {
+      object.traverse(dispose);
+      viewer.delete_path([name]);
+    }
+  };
+  var dispose = ({ geometry, material }) => {
+    geometry?.dispose();
+    for (const each of [material].flat()) {
+      each?.map?.dispose();
+      each?.dispose();
+    }
+  };
+  var matrixIn = (viewer, object) => {
+    const matrix = new THREE.Matrix4();
+    for (let at = object; at && at !== viewer.scene; at = at.parent) {
+      at.updateMatrix();
+      matrix.premultiply(at.matrix);
+    }
+    return matrix;
+  };
+
+  // src/camera.js
+  var Camera = class {
+    /**
+     * @param {Three} viewer meshcat's
+     * @param {HTMLElement} pane
+     * @param {Layout} layout
+     */
+    constructor(viewer, pane, layout) {
+      this.viewer = viewer;
+      this.pane = pane;
+      this.layout = layout;
+      this.lens = viewer.camera;
+      Object.assign(this.lens, { fov: 38, near: 0.05, far: 4e3 });
+      this.controls = viewer.controls;
+      Object.assign(this.controls, {
+        maxPolarAngle: 89 * DEGREE,
+        minDistance: 0.8,
+        maxDistance: 1500
+      });
+      this.controls.addEventListener("change", () => {
+        if (!this.rendering) this.rememberZoom();
+      });
+      this.rendering = false;
+      this.follow = { kind: "fleet" };
+      this.following = true;
+      this.zoom = 1;
+      this.placed = false;
+      this.followPoint = new THREE.Vector3();
+    }
+    followed() {
+      const { kind, system, agent = 0 } = this.follow;
+      if (kind === "agent") {
+        const fleet = this.layout.fleets.find((each) => each.name === system);
+        if (fleet) return toView(this.layout.agentAt(fleet, agent));
+      }
+      return this.layout.middle();
+    }
+    /**
+     * Distance from the target at which all points are in view from a direction.
+     * @param {Three} direction
+     * @param {Three} target
+     */
+    fitDistance(direction, target) {
+      const view = new THREE.Matrix4().lookAt(
+        direction,
+        new THREE.Vector3(),
+        new THREE.Vector3(0, 1, 0)
+      );
+      const [right, up, back] = [0, 1, 2].map(
+        (k) => new THREE.Vector3().setFromMatrixColumn(view, k)
+      );
+      const tangent = Math.tan(this.lens.fov / 2 * DEGREE);
+      const wide = tangent * (this.pane.clientWidth / Math.max(this.pane.clientHeight, 1));
+      let distance = 2.5;
+      for (const point of this.layout.points()) {
+        const p = point.sub(target);
+        const nearer = p.dot(back);
+        distance = Math.max(
+          distance,
+          Math.abs(p.dot(right)) / (0.88 * wide) + nearer,
+          Math.abs(p.dot(up)) / (0.76 * tangent) + nearer
+        );
+      }
+      return distance;
+    }
+    /** From the side, and for a long lane nearly along it, so that the near ones stay large. */
+    defaultDirection() {
+      const { box, bars: bars2, planar } = this.layout;
+      const length = box ? box.high[0] - box.low[0] : 0;
+      const long = Math.min(Math.max((length - 40) / 60, 0), 1);
+      const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
+      const rows = Math.max(0, ...bars2.map((each) => each.rows));
+      const ofBars = rows > 1 ? 32 : 12;
+      const ofFleet = planar ? 36 : 20 - 13 * long;
+      const elevation = (box ? ofFleet : ofBars) * DEGREE;
+      const flat = Math.cos(elevation);
+      return toView([Math.cos(azimuth) * flat, Math.sin(azimuth) * flat, Math.sin(elevation)]);
+    }
+    fit() {
+      if (!this.layout.known) return;
+      if (this.follow.kind !== "agent") this.follow = { kind: "fleet" };
+      const target = this.followed();
+      const direction = this.defaultDirection();
+      const near = this.follow.kind === "agent" ? 6 : this.fitDistance(direction, target);
+      this.look(target, direction, near);
+      this.zoom = 1;
+      this.followPoint = target;
+      this.placed = true;
+    }
+    /**
+     * @param {Three} target
+     * @param {Three} direction
+     * @param {number} distance
+     */
+    look(target, direction, distance) {
+      this.controls.target.copy(target);
+      this.lens.position.copy(target).addScaledVector(direction, distance);
+      this.lens.lookAt(target);
+      this.viewer.set_dirty();
+    }
+    arm() {
+      const arm = this.lens.position.clone().sub(this.controls.target);
+      const distance = arm.length();
+      return { direction: arm.divideScalar(distance || 1), distance };
+    }
+    rememberZoom() {
+      if (!this.layout.known) return;
+      const { direction, distance } = this.arm();
+      this.zoom = distance / this.fitDistance(direction, this.controls.target);
+    }
+    /** Camera and target go with what is followed; for a fleet the distance keeps it in view. */
+    move() {
+      if (!this.placed) return this.fit();
+      if (!this.following) return;
+      const point = this.followed();
+      const target = this.controls.target.clone().add(point).sub(this.followPoint);
+      const { direction, distance } = this.arm();
+      const fleet = this.follow.kind === "fleet";
+      this.look(
+        target,
+        direction,
+        fleet ? this.zoom * this.fitDistance(direction, target) : distance
+      );
+      this.followPoint = point;
+    }
+    /** @param {Follow} follow */
+    setFollow(follow) {
+      this.following = follow.kind !== "none";
+      if (!this.following) return;
+      this.follow = follow;
+      this.fit();
+    }
+    /**
+     * Turns about the target (degrees) and zooms (factor), for the keyboard.
+     * @param {number} turn
+     * @param {number} factor
+     */
+    nudge(turn, factor) {
+      const { direction, distance } = this.arm();
+      direction.applyAxisAngle(new THREE.Vector3(0, 1, 0), turn * DEGREE);
+      this.look(this.controls.target.clone(), direction, distance * factor);
+      this.rememberZoom();
+    }
+    render() {
+      this.rendering = true;
+      this.viewer.render();
+      this.rendering = false;
+    }
+    /**
+     * Where a point is in the pane, in CSS pixels; null behind the camera.
+     * @param {ArrayLike<number>} point
+     */
+    project(point) {
+      const p = toView(point).project(this.lens);
+      if (p.z > 1 || p.z < -1) return null;
+      return {
+        x: (p.x + 1) / 2 * this.pane.clientWidth,
+        y: (1 - p.y) / 2 * this.pane.clientHeight
+      };
+    }
+  };
+
+  // src/ghosts.js
+  var EDGES2 = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5));
+  var SECOND = 1;
+  var DIRECTIONS = { "": 0, x: 0, y: 1, z: 2 };
+  var Ghosts = class {
+    /** @param {Scene} scene */
+    constructor(scene) {
+      this.scene = scene;
+      this.group = new THREE.Group();
+      scene.viewer.scene.add(this.group);
+      this.shown = null;
+      this.copies = /* @__PURE__ */ new Map();
+    }
+    /** Makes the copies anew when they are next needed. */
+    forget() {
+      for (const mesh2 of [...this.group.children]) this.group.remove(mesh2);
+      this.copies.clear();
+    }
+    /** @param {Agent | null} shown */
+    show(shown) {
+      this.forget();
+      this.shown = shown;
+      if (this.scene.instant) this.apply(this.scene.instant);
+      this.scene.dirty();
+    }
+    /** @param {Instant} instant */
+    apply(instant) {
+      const { shown } = this;
+      const system = this.scene.meta?.systems.find((each) => each.name === shown?.system);
+      const { estimate, action } = (system && instant.systems[system.name]) ?? {};
+      this.group.visible = Boolean(system && shown && estimate && action);
+      if (!system || !shown || !estimate || !action) return;
+      const m = action.length;
+      const row = estimate.subarray(shown.agent * m, (shown.agent + 1) * m);
+      if (system.drawn_as === "bars") this.outlines(system, shown.agent, row);
+      else this.shadows(system, shown.agent, row, action);
+    }
+    /**
+     * @param {System} system
+     * @param {number} holder who has the estimates
+     * @param {Numbers} row of estimates
+     */
+    outlines(system, holder, row) {
+      const bars2 = this.scene.layout.barsOf(system);
+      system.action.owner.forEach((owner, k) => {
+        if (owner === holder + 1) return;
+        const [outline] = this.copiesOf(k, () => [this.outline()]);
+        const [x, y] = bars2.spot(k);
+        outline.position.set(...bars2.point(x, y, 0));
+        const height = bars2.scale * bars2.heightOf(row[k]);
+        outline.scale.set(0.5 * bars2.scale, 0.5 * bars2.scale, height || 1e-4);
+      });
+    }
+    /**
+     * What stands for an agent or a bar, made when it is first needed.
+     * @param {number} k
+     * @param {() => Three[]} make
+     */
+    copiesOf(k, make) {
+      const copies = this.copies.get(k) ?? make();
+      this.copies.set(k, copies);
+      return copies;
+    }
+    outline() {
+      const material = new THREE.LineBasicMaterial({ color: colour("ghost") });
+      const lines = new THREE.LineSegments(EDGES2, material);
+      this.group.add(lines);
+      return lines;
+    }
+    /**
+     * @param {System} system
+     * @param {number} holder
+     * @param {Numbers} row
+     * @param {Numbers} action
+     */
+    shadows(system, holder, row, action) {
+      for (let agent = 0; agent < system.agents; agent++) {
+        if (agent === holder) continue;
+        const ahead = this.ahead(system, agent, row, action);
+        const sources = this.scene.tinted.get(system.name)?.[agent] ?? [];
+        const copies = this.copiesOf(agent, () => sources.map((mesh2) => this.copy(mesh2)));
+        copies.forEach((copy2, k) => {
+          copy2.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
+          ahead.forEach((v, axis) => copy2.matrix.elements[12 + axis] += v);
+          copy2.visible = Math.hypot(...ahead) > 0.01;
+        });
+      }
+    }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @param {Numbers} row
+     * @param {Numbers} action
+     */
+    ahead(system, agent, row, action) {
+      const ahead = [0, 0, 0];
+      system.action.owner.forEach((owner, k) => {
+        const wrong = (row[k] - action[k]) * SECOND;
+        if (owner === agent + 1 && Number.isFinite(wrong))
+          ahead[DIRECTIONS[system.action.axis[k]] ?? 0] += wrong;
+      });
+      return ahead;
+    }
+    /** @param {Three} mesh */
+    copy(mesh2) {
+      const material = new THREE.MeshPhongMaterial({
+        color: colour("ghost"),
+        transparent: true,
+        opacity: 0.5,
+        depthWrite: false
+      });
+      material.emissive.set(colour("ghost")).multiplyScalar(0.35);
+      const copy2 = new THREE.Mesh(mesh2.geometry, material);
+      copy2.matrixAutoUpdate = false;
+      this.group.add(copy2);
+      return copy2;
+    }
+  };
+
+  // src/ground.js
+  var VERTEX = `
+  varying vec2 at;
+  uniform float size;
+  void main() {
+    at = position.xy * size;
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  }`;
+  var FRAGMENT = `
+  varying vec2 at;
+  uniform vec3 colour;
+  uniform vec2 middle;
+  uniform float minor, major, reach, lane, laneWidth, strength;
+  float lines(float spacing) {
+    vec2 width = fwidth(at / spacing);
+    vec2 away = abs(fract(at / spacing - 0.5) - 0.5) / max(width, 1e-6);
+    vec2 drawn = (1.0 - min(away, 1.0)) * clamp(0.5 / width - 0.5, 0.0, 1.0);
+    return max(drawn.x, drawn.y);
+  }
+  void main() {
+    float alpha = max(0.35 * lines(minor), 0.8 * lines(major));
+    float inside = laneWidth > 0.0 ? 1.0 - step(laneWidth, abs(at.y - lane)) : 0.0;
+    alpha = max(alpha, 0.16 * inside);
+    float fade = 1.0 - smoothstep(0.25, 1.0, length(at - middle) / reach);
+    gl_FragColor = vec4(colour, strength * alpha * fade);
+  }`;
+  var Ground = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      const uniform = (value) => ({ value });
+      this.uniforms = {
+        size: uniform(1),
+        colour: uniform(new THREE.Color()),
+        middle: uniform(new THREE.Vector2()),
+        minor: uniform(1),
+        major: uniform(10),
+        reach: uniform(30),
+        lane: uniform(0),
+        laneWidth: uniform(0),
+        strength: uniform(0.6)
+      };
+      const material = new THREE.ShaderMaterial({
+        uniforms: this.uniforms,
+        vertexShader: VERTEX,
+        fragmentShader: FRAGMENT,
+        transparent: true,
+        depthWrite: false,
+        side: THREE.DoubleSide,
+        extensions: { derivatives: true }
+      });
+      this.mesh = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), material);
+      this.mesh.renderOrder = -1;
+      this.mesh.frustumCulled = false;
+      scene.add(this.mesh);
+      this.major = 10;
+    }
+    /**
+     * Follows the point that the camera looks at, in whole squares, so that lines stand still.
+     * @param {number[]} target
+     * @param {number} distance
+     * @param {number} floor
+     * @param {number | null} lane
+     */
+    place(target, distance, floor2, lane) {
+      const u = this.uniforms;
+      const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
+      this.major = 10 * minor;
+      const { major } = this;
+      const snap = (v) => Math.round(v / major) * major;
+      const reach = Math.max(8, 4 * distance);
+      const origin = [snap(target[0]), snap(target[1])];
+      this.mesh.position.set(origin[0], origin[1], floor2 - 0.02);
+      this.mesh.scale.setScalar(2 * reach + major);
+      u.size.value = 2 * reach + major;
+      [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
+      u.middle.value.set(target[0] - origin[0], target[1] - origin[1]);
+      u.laneWidth.value = lane === null ? 0 : 0.75;
+      u.lane.value = (lane ?? 0) - origin[1];
+    }
+  };
+
+  // src/layout.js
+  var Layout = class {
+    constructor() {
+      this.fleets = [];
+      this.bars = [];
+      this.floor = 0;
+      this.known = false;
+      this.spill = 0;
+      this.spillTime = 0;
+      this.box = null;
+      this.poses = new Float64Array(0);
+    }
+    /**
+     * Another scene.
+     * @param {System[]} fleets
+     * @param {Bars[]} bars
+     */
+    begin(fleets, bars2) {
+      this.fleets = fleets;
+      this.bars = bars2;
+      this.known = false;
+      this.spill = 0;
+      this.box = null;
+    }
+    /** @param {Instant} instant */
+    update(instant) {
+      this.poses = instant.poses ?? new Float64Array(0);
+      this.known = true;
+      this.box = this.boxOf();
+      if (this.box) this.noteSpill(this.box, instant.time);
+    }
+    /**
+     * Where an agent of a fleet is.
+     * @param {System} system
+     * @param {number} agent
+     */
+    agentAt(system, agent) {
+      const p = 8 * system.anchors[agent];
+      return this.poses.slice(p, p + 3);
+    }
+    /**
+     * Where links of an agent begin: above a robot, on top of a bar.
+     * @param {System} system
+     * @param {number} agent
+     * @returns {Point}
+     */
+    headOf(system, agent) {
+      if (system.drawn_as === "bars") return this.barsOf(system).topOfAgent(agent);
+      const [x, y, z] = this.agentAt(system, agent);
+      return [x, y, z + 0.8 * system.height];
+    }
+    /**
+     * The bars of a system that is drawn as such.
+     * @param {System} system
+     */
+    barsOf(system) {
+      return (
+        /** @type {Bars} */
+        this.bars.find((bars2) => bars2.system === system)
+      );
+    }
+    boxOf() {
+      const low = [Infinity, Infinity];
+      const high = [-Infinity, -Infinity];
+      for (const system of this.fleets)
+        for (const anchor of system.anchors)
+          for (const axis of [0, 1]) {
+            const v = this.poses[8 * anchor + axis];
+            low[axis] = Math.min(low[axis], v);
+            high[axis] = Math.max(high[axis], v);
+          }
+      return Number.isFinite(low[0]) ? { low, high } : null;
+    }
+    /**
+     * What has swung out is forgotten slowly: the view must not breathe.
+     * @param {{low: number[], high: number[]}} box
+     * @param {number} time s
+     */
+    noteSpill({ low, high }, time) {
+      if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
+      this.spillTime = time;
+      const { poses } = this;
+      for (let p = 0; p < poses.length; p += 8)
+        for (const axis of [0, 1]) {
+          const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]);
+          if (poses[p + 7] !== 0 && out > this.spill) this.spill = out;
+        }
+    }
+    /** The y of robots in a row, or null. */
+    get lane() {
+      if (!this.box) return null;
+      const { low, high } = this.box;
+      return high[1] - low[1] < 0.3 ? (low[1] + high[1]) / 2 : null;
+    }
+    get planar() {
+      return this.lane === null ? 1 : 0;
+    }
+    /** The points that should be in view, as three.js sees them. */
+    points() {
+      const points2 = [];
+      for (const system of this.fleets)
+        for (let agent = 0; agent < system.agents; agent++) {
+          const [x, y, z] = this.agentAt(system, agent);
+          points2.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
+        }
+      if (this.box) {
+        const { low, high } = this.box;
+        for (const x of [low[0] - this.spill, high[0] + this.spill])
+          for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
+            points2.push([x, y, this.floor]);
+      }
+      for (const bars2 of this.bars) points2.push(...bars2.corners());
+      return points2.length ? points2.map(toView) : [new THREE.Vector3()];
+    }
+    /** The middle of the agents, without what swings about them, as three.js sees it. */
+    middle() {
+      const box = new THREE.Box3();
+      for (const system of this.fleets)
+        for (let agent = 0; agent < system.agents; agent++) {
+          const [x, y, z] = this.agentAt(system, agent);
+          box.expandByPoint(toView([x, y, this.floor]));
+          box.expandByPoint(toView([x, y, z + system.height]));
+        }
+      for (const bars2 of this.bars)
+        for (const corner of bars2.corners()) box.expandByPoint(toView(corner));
+      return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
+    }
+  };
+
+  // src/scene.js
+  var AGAIN2 = 500;
+  var Scene = class {
+    /** @param {HTMLElement} pane */
+    constructor(pane) {
+      this.viewer = viewerIn(pane, () => this.stale = true);
+      this.layout = new Layout();
+      this.camera = new Camera(this.viewer, pane, this.layout);
+      this.ground = new Ground(this.viewer.scene);
+      this.batches = new Batches(this.viewer.scene);
+      this.ghosts = new Ghosts(this);
+      this.bars = [];
+      this.objects = [];
+      this.tinted = /* @__PURE__ */ new Map();
+      this.statics = [];
+      this.meta = null;
+      this.instant = null;
+      this.fleets = [];
+      this.complete = false;
+      this.floorKnown = false;
+      this.quality = 1;
+      this.stale = true;
+      this.nextLook = 0;
+      this.restyle();
+      new ResizeObserver(() => this.resized()).observe(pane);
+    }
+    resized() {
+      this.viewer.set_3d_pane_size();
+      if (this.layout.known && this.meta) this.camera.move();
+    }
+    restyle() {
+      this.ground.uniforms.colour.value.set(colour("grid"));
+      this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
+      for (const bars2 of this.bars) bars2.restyle();
+      this.dimStatics();
+      this.ghosts.forget();
+      this.dirty();
+    }
+    dirty() {
+      this.viewer.set_dirty();
+    }
+    /**
+     * One of meshcat's commands.
+     * @param {Uint8Array} bytes
+     */
+    command(bytes) {
+      this.viewer.handle_command_bytearray(bytes);
+      this.stale = true;
+    }
+    /** Forgets a scene, as another one comes. */
+    clear() {
+      empty(this.viewer);
+      for (const bars2 of this.bars) bars2.remove();
+      this.ghosts.show(null);
+      this.batches.clear();
+      this.bars = [];
+      this.meta = null;
+      this.instant = null;
+      this.stale = true;
+    }
+    /** @param {Meta} meta */
+    setMeta(meta) {
+      this.meta = meta;
+      this.fleets = meta.systems.filter((system) => system.drawn_as === "fleet");
+      for (const bars2 of this.bars) bars2.remove();
+      this.bars = meta.systems.filter((system) => system.drawn_as === "bars").map((system) => new Bars(this.viewer.scene, system));
+      this.instant = null;
+      this.ghosts.show(null);
+      this.layout.begin(this.fleets, this.bars);
+      this.camera.placed = false;
+      this.floorKnown = false;
+      this.stale = true;
+    }
+    /**
+     * Finds the objects of the scene, again when some have come or are missing.
+     * @param {Meta} meta
+     */
+    resolve(meta) {
+      const now = Date.now();
+      if (!this.stale && (this.complete || now < this.nextLook)) return;
+      this.objects = meta.items.map((path) => nodeAt(this.viewer, path)?.object);
+      this.tinted = new Map(this.fleets.map((system) => [system.name, this.tintedOf(system)]));
+      this.statics = this.staticMeshes();
+      this.dimStatics();
+      this.complete = !this.objects.includes(void 0);
+      this.nextLook = now + AGAIN2;
+      this.stale = false;
+      this.ghosts.forget();
+      this.batches.build(this.objects);
+    }
+    staticMeshes() {
+      const moving = new Set(this.objects);
+      const found = [];
+      const collect = (object) => {
+        if (moving.has(object)) return;
+        if (object.isMesh && object.material.color) found.push(object);
+        object.children.forEach(collect);
+      };
+      for (const [, object] of drawnIn(this.viewer)) collect(object);
+      return found;
+    }
+    /** A white floor would outshine a dark page and all that stands on it. */
+    dimStatics() {
+      const part = theme() === "dark" ? 0.3 : 1;
+      for (const { material, userData } of this.statics) {
+        userData.colour ??= material.color.clone();
+        material.color.copy(userData.colour).multiplyScalar(part);
+      }
+    }
+    /** @param {System} system */
+    tintedOf(system) {
+      return system.tints.map((paths) => {
+        const meshes = [];
+        for (const path of paths)
+          nodeAt(this.viewer, path)?.object.traverse((object) => {
+            if (object.material?.color) meshes.push(object);
+          });
+        return meshes;
+      });
+    }
+    /**
+     * Where an item is, in MuJoCo's coordinates; null if there is none at this path.
+     * @param {string} path
+     */
+    position(path) {
+      const node = nodeAt(this.viewer, path);
+      return node ? matrixIn(this.viewer, node.object).elements.slice(12, 15) : null;
+    }
+    // ---- an instant
+    /**
+     * @param {Instant} instant
+     * @param {Store} store
+     */
+    apply(instant, store) {
+      if (!this.meta) return;
+      this.resolve(this.meta);
+      this.instant = instant;
+      this.applyPoses(instant.poses);
+      this.applyTints(instant);
+      this.findFloor();
+      this.layout.update(instant);
+      this.placeBars(instant, store);
+      this.batches.update();
+      this.ghosts.apply(instant);
+      this.camera.move();
+      this.dirty();
+    }
+    /** @param {Numbers | undefined} poses */
+    applyPoses(poses) {
+      if (!poses) return;
+      for (let k = 0; k < this.objects.length; k++) {
+        const object = this.objects[k];
+        if (!object) continue;
+        const p = 8 * k;
+        object.position.set(poses[p], poses[p + 1], poses[p + 2]);
+        object.quaternion.set(poses[p + 4], poses[p + 5], poses[p + 6], poses[p + 3]);
+        object.visible = poses[p + 7] !== 0;
+        object.scale.set(1, 1, poses[p + 7] || 1);
+      }
+    }
+    /** @param {Instant} instant */
+    applyTints(instant) {
+      for (const [name, agents] of this.tinted) {
+        const shares = instant.systems[name].share;
+        agents.forEach((meshes, agent) => {
+          const [r, g, b] = ramp(shares ? shares[agent] : NaN);
+          for (const mesh2 of meshes) mesh2.material.color.setRGB(r, g, b);
+        });
+      }
+    }
+    /** Found once: robots of a lane may float around z = 0. */
+    findFloor() {
+      if (this.floorKnown || !this.complete || this.objects.length === 0) return;
+      this.viewer.scene.updateMatrixWorld(true);
+      const box = new THREE.Box3();
+      for (const system of this.fleets)
+        for (const anchor of system.anchors) box.expandByObject(this.objects[anchor]);
+      if (Number.isFinite(box.min.y)) this.layout.floor = Math.min(0, box.min.y);
+      this.floorKnown = true;
+    }
+    /**
+     * Bars stand behind the fleets.
+     * @param {Instant} instant
+     * @param {Store} store
+     */
+    placeBars(instant, store) {
+      const { box, floor: floor2 } = this.layout;
+      let behind = box ? box.high[1] + 2.4 : 0;
+      for (const bars2 of this.bars) {
+        const span = box ? box.high[0] - box.low[0] : 0;
+        const scale = box ? Math.min(Math.max(0.6 * span / bars2.width, 0.8), 6) : 1;
+        const x = box ? (box.low[0] + box.high[0]) / 2 : 0;
+        bars2.update(instant, store, [x, behind, floor2], scale);
+        behind += scale * (bars2.depth + 1);
+      }
+    }
     // ---- pictures
+    /**
+     * Fewer pixels while a slow machine plays (without a graphics card); all of them at rest.
+     * @param {number} quality
+     */
+    setQuality(quality) {
+      if (quality === this.quality) return;
+      this.quality = quality;
+      this.viewer.renderer.setPixelRatio(quality * Math.min(devicePixelRatio, 2));
+      this.viewer.set_3d_pane_size();
+    }
+    render() {
+      const { camera, layout } = this;
+      const { x, y, z } = camera.controls.target;
+      this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
+      camera.render();
+    }
+    get needsRender() {
+      return this.viewer.needs_render;
+    }
+  };
 
+  // src/toolbar.js
+  var nameOf = (system, agent) => `${system.agent_name} ${agent + 1}`;
+  var optionsOf2 = (system) => [...Array(system.agents).keys()].map(
+    (agent) => element("option", {
+      value: JSON.stringify({ system: system.name, agent }),
+      text: nameOf(system, agent)
+    })
+  );
+  var Toolbar = class {
+    /**
+     * @param {Drawn} scene
+     * @param {Overlay} overlay
+     */
+    constructor(scene, overlay) {
+      this.scene = scene;
+      this.overlay = overlay;
+      this.systems = [];
+      byId("ghost-agent").onchange = () => this.setGhosts(true);
+      byId("follow").onchange = () => this.setFollow(byId("follow").value);
+      byId("ramp").style.background = rampGradient();
+    }
+    /** @param {Scene} meta */
+    setMeta({ systems }) {
+      this.systems = systems;
+      this.fillFollow();
+      this.fillGhosts();
+      this.describeLinks();
+    }
+    // ---- labels and links
+    toggleLabels() {
+      this.overlay.labelled = !this.overlay.labelled;
+      press(byId("labels"), this.overlay.labelled);
+      this.scene.dirty();
+    }
+    toggleLinks() {
+      const { links } = this.overlay;
+      links.shown = !links.shown;
+      press(byId("links"), links.shown);
+      this.scene.dirty();
+    }
+    describeLinks() {
+      const linked = this.systems.filter((system) => system.edges.length > 0);
+      byId("links").hidden = linked.length === 0;
+      const words = new Set(linked.map((system) => system.edges_are));
+      const parts = [];
+      if (words.has("messages")) parts.push("lines: messages pass");
+      if (words.has("measurements")) parts.push("dashed lines: measured directly");
+      if (linked.some((system) => system.links.length && system.message_period !== null))
+        parts.push("✕ lost");
+      const note = byId("link-note");
+      note.textContent = parts.join(" · ");
+      note.hidden = parts.length === 0;
+    }
+    // ---- what the camera follows
+    fillFollow() {
+      const fleets = this.systems.filter((system) => system.drawn_as === "fleet");
+      byId("follow-label").hidden = fleets.length === 0;
+      byId("follow").replaceChildren(
+        element("option", { value: "fleet", text: "all" }),
+        ...fleets.flatMap(optionsOf2),
+        element("option", { value: "none", text: "nothing" })
+      );
+    }
+    /** @param {string} value of an option */
+    setFollow(value) {
+      const { camera } = this.scene;
+      if (value === "fleet" || value === "none") camera.setFollow({ kind: value });
+      else camera.setFollow({ kind: "agent", ...JSON.parse(value) });
+    }
+    /**
+     * Follows an agent, if that can be.
+     * @param {Agent | null} which
+     */
+    followAgent(which) {
+      const select = byId("follow");
+      const value = JSON.stringify(which);
+      if (![...select.options].some((option) => option.value === value)) return;
+      select.value = value;
+      this.setFollow(value);
+    }
+    // ---- estimates
+    fillGhosts() {
+      const systems = this.systems.filter((system) => system.estimates);
+      byId("ghost-tools").hidden = systems.length === 0;
+      byId("ghost-agent").replaceChildren(
+        ...systems.map(
+          (system) => element("optgroup", { label: system.name }, ...optionsOf2(system))
+        )
+      );
+      this.setGhosts(false);
+    }
+    toggleGhosts() {
+      this.setGhosts(this.scene.ghosts.shown === null);
+    }
+    /** @param {boolean} on */
+    setGhosts(on2) {
+      const { value } = byId("ghost-agent");
+      const shown = on2 && value ? JSON.parse(value) : null;
+      press(byId("ghosts"), shown !== null);
+      byId("ghost-label").hidden = shown === null;
+      byId("ghost-note").hidden = shown === null;
+      if (shown) byId("ghost-note").textContent = this.ghostNote(shown);
+      this.scene.ghosts.show(shown);
+    }
+    /** @param {Agent} agent */
+    ghostNote({ system: name, agent }) {
+      const system = (
+        /** @type {System} */
+        this.systems.find((each) => each.name === name)
+      );
+      const who = nameOf(system, agent);
+      if (system.drawn_as === "bars")
+        return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
+      const wrong = `(estimate − actual ${system.action.name})`;
+      return `Pale copies: the others as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
+    }
+    // ---- legend
+    /**
+     * Explains the colour of shares that are not known, where there are some.
+     * @param {Instant | null} instant
+     */
+    showLegend(instant) {
+      const shares = Object.values(instant?.systems ?? {}).map((own) => own.share ?? [NaN]);
+      byId("unknown").hidden = !shares.some((share) => share.some((each) => Number.isNaN(each)));
+    }
+  };
+
+  // src/transport.js
+  var SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
+  var speedName = (speed) => speed === null ? "max" : `×${speed}`;
+  var Transport = class {
+    speedKey = "";
+    // of what the menu of speeds has
+    /** @param {Page} page which is driven */
+    constructor(page) {
+      this.play = byId("play");
+      this.speed = byId("speed");
+      this.slider = byId("time-slider");
+      this.play.onclick = () => page.playPause();
+      byId("step").onclick = (event) => page.step(1, event.shiftKey);
+      byId("back").onclick = (event) => page.step(-1, event.shiftKey);
+      byId("restart").onclick = () => page.restart();
+      this.speed.onchange = () => page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
+      this.slider.oninput = () => page.seek(Number(this.slider.value));
+    }
+    /**
+     * @param {Source} source what is shown
+     * @param {{connected: boolean} | null} live the simulation, if there is one
+     */
+    show(source, live) {
+      const { playing, seekable } = source;
+      this.play.dataset.playing = String(playing);
+      this.play.setAttribute("aria-label", playing ? "pause" : "play");
+      this.play.title = playing ? "Pause (space)" : "Play (space)";
+      const lost = live !== null && !live.connected;
+      for (const button of [this.play, byId("step"), this.speed]) button.disabled = !seekable && lost;
+      byId("back").disabled = !seekable;
+      const restart = byId("restart");
+      restart.disabled = lost;
+      restart.title = live ? "Restart the simulation (R)" : "To the start (R)";
+      restart.setAttribute("aria-label", live ? "restart the simulation" : "to the start");
+      this.showSpeeds(source);
+      this.showTime(source);
+    }
+    /** @param {Source} source */
+    showSpeeds({ seekable, speed }) {
+      const all = seekable ? [...SPEEDS] : [...SPEEDS, null];
+      if (!all.includes(speed)) all.unshift(speed);
+      const key = JSON.stringify([all, speed]);
+      if (key === this.speedKey) return;
+      this.speedKey = key;
+      this.speed.replaceChildren(
+        ...all.map(
+          (each) => element("option", {
+            value: each ?? "max",
+            text: speedName(each),
+            selected: each === speed
+          })
+        )
+      );
+    }
+    /** @param {Source} source */
+    showTime({ time, end, seekable }) {
+      this.slider.disabled = !seekable;
+      byId("time-track").title = seekable ? "" : "Time cannot be turned back while the simulation runs; it can when the run has ended.";
+      if (Number(this.slider.max) !== end) this.slider.max = String(end);
+      this.slider.value = String(time);
+      this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds of ${end}`);
+      this.slider.style.setProperty("--done", `${end ? 100 * time / end : 0}%`);
+    }
+    /**
+     * Marks along the slider.
+     * @param {(Intervention & {bad?: boolean})[]} marks
+     * @param {number} end
+     */
+    mark(marks, end) {
+      byId("time-marks").replaceChildren(
+        ...marks.map(
+          ({ time, what, bad }) => element("span", {
+            class: bad ? "mark bad" : "mark",
+            title: `${time.toFixed(2)} s: ${what}`,
+            style: `left: ${100 * time / (end || 1)}%`
+          })
+        )
+      );
+    }
+  };
+
+  // src/slider.js
+  var PER_SECOND = 12;
+  var ECHO = 400;
+  var atMost = (perSecond, call) => {
+    let waiting = null;
+    let latest = NaN;
+    return (value) => {
+      latest = value;
+      waiting ??= setTimeout(() => {
+        waiting = null;
+        call(latest);
+      }, 1e3 / perSecond);
+    };
+  };
+  var Slider = class {
+    /**
+     * @param {Control} control
+     * @param {(value: number) => void} changed
+     */
+    constructor(control, changed) {
+      this.control = control;
+      this.changed = atMost(PER_SECOND, changed);
+      this.value = control.value;
+      this.touched = -Infinity;
+      this.typing = false;
+      this.range = this.makeRange();
+      this.number = this.makeNumber();
+      this.root = element(
+        "div",
+        { class: "control" },
+        element("span", { class: "control-label", text: control.label }),
+        this.range,
+        this.number,
+        element("span", { class: "unit", text: control.unit })
+      );
+      this.show();
+    }
+    makeRange() {
+      const { key, label } = this.control;
+      const attributes = { type: "range", min: 0, max: 1, step: 2e-3, title: key };
+      const range = element("input", { ...attributes, "aria-label": label });
+      range.oninput = () => {
+        this.touched = performance.now();
+        this.value = Number(this.valueAt(Number(range.value)).toPrecision(3));
+        this.show();
+        this.changed(this.value);
+      };
+      return range;
+    }
+    makeNumber() {
+      const { label, min: min2, max: max2 } = this.control;
+      const attributes = { type: "number", min: min2, max: max2, step: "any" };
+      const number2 = element("input", { ...attributes, "aria-label": `${label}, as a number` });
+      number2.oninput = () => this.typing = true;
+      number2.onblur = () => {
+        this.typing = false;
+        this.show();
+      };
+      number2.onchange = () => {
+        this.typing = false;
+        const value = Number(number2.value);
+        if (number2.value !== "" && Number.isFinite(value)) this.changed(this.value = value);
+      };
+      return number2;
+    }
+    get logarithmic() {
+      return this.control.scale === "log" && this.control.min > 0;
+    }
+    /**
+     * Where a value is along the slider, from 0 to 1.
+     * @param {number} value
+     */
+    placeOf(value) {
+      const { min: min2, max: max2 } = this.control;
+      if (this.logarithmic) return Math.log(value / min2) / Math.log(max2 / min2);
+      return (value - min2) / (max2 - min2);
+    }
+    /** @param {number} place */
+    valueAt(place) {
+      const { min: min2, max: max2 } = this.control;
+      return this.logarithmic ? min2 * (max2 / min2) ** place : min2 + (max2 - min2) * place;
+    }
+    show() {
+      const place = this.placeOf(this.value);
+      this.range.value = String(place);
+      this.range.setAttribute("aria-valuetext", withUnit(this.value, this.control.unit));
+      this.range.style.setProperty("--done", `${100 * place}%`);
+      if (!this.typing) this.number.value = String(Number(this.value.toPrecision(3)));
+    }
+    /**
+     * The simulation's value, shown when no hand is on the slider.
+     * @param {number} value
+     */
+    follow(value) {
+      this.value = value;
+      clearTimeout(this.told);
+      const wait = this.touched + ECHO - performance.now();
+      if (wait > 0) this.told = setTimeout(() => this.follow(value), wait);
+      else this.show();
+    }
+  };
+
+  // src/tuning.js
+  var MOST_PUSHED = 8;
+  var Tuning = class {
+    /** @param {(message: object) => void} send to the simulation */
+    constructor(send) {
+      this.send = send;
+      this.sliders = /* @__PURE__ */ new Map();
+    }
+    /** @param {Scene} meta */
+    build({ systems, controls = [], pushes = [] }) {
+      const [panel, body] = [byId("tuning"), byId("tuning-body")];
+      this.sliders.clear();
+      panel.hidden = controls.length + pushes.length === 0;
+      panel.open = innerWidth > 1e3 && innerHeight > 600;
+      const rows = systems.map((system) => {
+        const own = (each) => each.system === system.name;
+        return this.row(system, controls.filter(own), pushes.filter(own));
+      });
+      body.replaceChildren(...rows.filter((row) => row !== null));
+    }
+    /**
+     * @param {System} system
+     * @param {Control[]} controls
+     * @param {Push[]} pushes
+     */
+    row(system, controls, pushes) {
+      if (!controls.length && !pushes.length) return null;
+      return element(
+        "div",
+        { class: "tuning-row", role: "group", "aria-label": system.name },
+        element("h3", { text: system.name }),
+        ...controls.map((control) => this.slider(control)),
+        ...pushes.map((push) => this.pushes(push, system))
+      );
+    }
+    /** @param {Control} control */
+    slider(control) {
+      const { key } = control;
+      const slider = new Slider(control, (value) => this.send({ do: "set", key, value }));
+      this.sliders.set(key, slider);
+      return slider.root;
+    }
+    /**
+     * @param {Push} push
+     * @param {System} system
+     */
+    pushes(push, system) {
+      const force = withUnit(push.force, push.unit);
+      const title = `Push with ${force} for ${number(push.duration)} s`;
+      return element(
+        "div",
+        { class: "pushes", role: "group", "aria-label": title },
+        element("p", { class: "small", text: title }),
+        system.agents <= MOST_PUSHED ? this.pushList(push, system) : this.pushChoice(push, system)
+      );
+    }
+    /**
+     * Buttons for each agent.
+     * @param {Push} push
+     * @param {System} system
+     */
+    pushList(push, { agents, agent_name: noun }) {
+      const list = element("div", { class: "push-list" });
+      for (let agent = 1; agent <= agents; agent++) {
+        const buttons = this.arrows(push, () => agent, `${noun} ${agent}`);
+        const name = element("b", { text: agent });
+        list.append(element("span", { class: "push-one" }, name, ...buttons));
+      }
+      return list;
+    }
+    /**
+     * Buttons for the agent that is chosen, when agents are many.
+     * @param {Push} push
+     * @param {System} system
+     */
+    pushChoice(push, { agents, agent_name: noun }) {
+      const select = element("select", { "aria-label": `${noun} to push` });
+      for (let agent = 1; agent <= agents; agent++)
+        select.append(element("option", { value: agent, text: `${noun} ${agent}` }));
+      const buttons = this.arrows(push, () => Number(select.value), `the chosen ${noun}`);
+      return element("span", { class: "push-one" }, select, ...buttons);
+    }
+    /**
+     * @param {Push} push
+     * @param {() => number} agentOf from 1
+     * @param {string} whom in words
+     */
+    arrows({ system, axes, force }, agentOf, whom) {
+      const arrow = (axis, k, sign2 = 1) => {
+        const what = `push ${whom} ${sign2 < 0 ? "against" : "along"} ${axis || "its axis"}`;
+        return element("button", {
+          type: "button",
+          class: "push",
+          text: (axis === "y" ? "↓↑" : "←→")[sign2 < 0 ? 0 : 1],
+          title: what,
+          "aria-label": what,
+          onclick: () => this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign2 * force })
+        });
+      };
+      return axes.flatMap((axis, k) => [-1, 1].map((sign2) => arrow(axis, k, sign2)));
+    }
+    /**
+     * The simulation's values.
+     * @param {Record<string, number>} values
+     */
+    follow(values) {
+      for (const [key, value] of Object.entries(values)) this.sliders.get(key)?.follow(value);
+    }
+  };
+
+  // src/keys.js
+  var onKeys = (actions) => addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (hasMeaning(
+      event.key,
+      /** @type {HTMLElement} */
+      event.target
+    )) return;
+    if (document.querySelector("dialog[open]")) return;
+    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action) return;
+    event.preventDefault();
+    action(event);
+  });
+  var hasMeaning = (key, target) => {
+    const type = target instanceof HTMLInputElement ? target.type : target.tagName;
+    if (["number", "text", "SELECT", "TEXTAREA"].includes(type)) return true;
+    if (key === " ") return ["BUTTON", "SUMMARY", "checkbox"].includes(type);
+    if (!key.startsWith("Arrow")) return false;
+    const slides = type === "range" && target.id !== "time-slider";
+    return slides || target.getAttribute("role") === "separator";
+  };
+
+  // src/wiring.js
+  var NARROWEST = 280;
+  var VIEW = 380;
+  var wire = (page) => {
+    const { scene, toolbar } = page;
+    const actions = {
+      " ": () => page.playPause(),
+      ArrowRight: ({ shiftKey }) => page.step(1, shiftKey),
+      ArrowLeft: ({ shiftKey }) => page.step(-1, shiftKey),
+      r: () => page.restart(),
+      f: () => scene.camera.fit(),
+      l: () => toolbar.toggleLabels(),
+      c: () => toolbar.toggleLinks(),
+      g: () => toolbar.toggleGhosts(),
+      p: fold,
+      d: () => page.switchTheme(),
+      "?": () => byId("help").showModal(),
+      "[": () => scene.camera.nudge(-6, 1),
+      "]": () => scene.camera.nudge(6, 1),
+      "+": () => scene.camera.nudge(0, 0.88),
+      "=": () => scene.camera.nudge(0, 0.88),
+      "-": () => scene.camera.nudge(0, 1.14)
+    };
+    onKeys(actions);
+    byId("fit").onclick = actions.f;
+    byId("labels").onclick = actions.l;
+    byId("links").onclick = actions.c;
+    byId("ghosts").onclick = actions.g;
+    byId("fold").onclick = actions.p;
+    byId("theme").onclick = actions.d;
+    byId("help-open").onclick = actions["?"];
+    byId("banner-close").onclick = () => byId("banner").hidden = true;
+    byId("banner-show").onclick = () => page.seekExit();
+    wirePane(page);
+    wireDivider();
+    leaveKeys();
+  };
+  var fold = () => press(byId("fold"), !document.body.classList.toggle("folded"));
+  var leaveKeys = () => {
+    const pressedBy = ({ target }) => target instanceof Element ? (
+      /** @type {HTMLElement | null} */
+      target.closest("button, summary, select")
+    ) : null;
+    const release = (pressed) => {
+      if (pressed && !pressed.matches(":focus-visible")) pressed.blur();
+    };
+    document.addEventListener("change", (event) => release(pressedBy(event)));
+    document.addEventListener("click", (event) => {
+      const pressed = pressedBy(event);
+      if (pressed?.tagName !== "SELECT") release(pressed);
+    });
+  };
+  var wirePane = (page) => {
+    const pane = byId("pane");
+    const near = (event) => {
+      const box = pane.getBoundingClientRect();
+      return page.overlay.agentNear(event.clientX - box.left, event.clientY - box.top);
+    };
+    pane.addEventListener("mousemove", (event) => {
+      if (event.buttons) return;
+      const which = near(event);
+      if (JSON.stringify(which) !== JSON.stringify(page.overlay.highlighted)) page.highlight(which);
+    });
+    pane.addEventListener("mouseleave", () => page.highlight(null));
+    pane.addEventListener("dblclick", (event) => page.toolbar.followAgent(near(event)));
+  };
+  var wireDivider = () => {
+    const divider = byId("divider");
+    const set = (width) => {
+      const fitting = Math.round(Math.min(Math.max(width, NARROWEST), innerWidth - VIEW));
+      document.documentElement.style.setProperty("--plots", `${fitting}px`);
+      divider.setAttribute("aria-valuenow", String(fitting));
+    };
+    divider.addEventListener("pointerdown", (event) => divider.setPointerCapture(event.pointerId));
+    divider.addEventListener("pointermove", (event) => {
+      if (divider.hasPointerCapture(event.pointerId)) set(innerWidth - event.clientX);
+    });
+    divider.addEventListener("dblclick", fold);
+    divider.addEventListener("keydown", ({ key }) => {
+      const now = byId("plots").clientWidth;
+      if (key === "ArrowLeft") set(now + 24);
+      if (key === "ArrowRight") set(now - 24);
+    });
+  };
+
+  // src/page.js
+  var SLOW = 100;
+  var PICTURE = 0.016;
+  var Page = class {
+    /** @param {"live" | "served" | "file"} mode where the page and its numbers come from */
+    constructor(mode2) {
+      this.mode = mode2;
+      this.scene = new Scene(byId("pane"));
+      this.overlay = new Overlay(byId("overlay"), this.scene);
+      this.plots = new Plots(byId("plots"), {
+        seek: (time) => this.seek(time),
+        highlight: (which, plot) => this.highlight(which, plot)
+      });
+      this.header = new Header();
+      this.toolbar = new Toolbar(this.scene, this.overlay);
+      this.transport = new Transport(this);
+      this.live = null;
+      this.playback = null;
+      this.meta = null;
+      this.instant = null;
+      this.drawn = false;
+      this.wasMoving = false;
+      this.before = NaN;
+      this.usual = PICTURE;
+      this.slowDue = 0;
+      wire(this);
+      if (mode2 === "live") this.startLive();
+      else this.startReplay();
+      requestAnimationFrame((now) => this.loop(now));
+    }
+    /**
+     * What is shown.
+     * @returns {Source | null}
+     */
+    get source() {
+      return this.playback ?? this.live;
+    }
+    // ---- where the data come from
+    async startReplay() {
+      try {
+        const pack = this.mode === "file" ? await unpack(fromBase64(byId("replay").textContent)) : await fetchReplay();
+        this.showReplay(pack);
+      } catch (error) {
+        warn(`The replay cannot be read: ${error.message}`);
+      }
+    }
+    /** @param {Pack} pack */
+    showReplay(pack) {
+      const { command_lengths: lengths = [] } = (
+        /** @type {Meta} */
+        pack.meta
+      );
+      const commands = (
+        /** @type {Uint8Array} */
+        pack.arrays.commands?.data
+      );
+      let at = 0;
+      for (const length of lengths) {
+        this.scene.command(commands.slice(at, at + length));
+        at += length;
+      }
+      const playback = new Playback(pack, { messages: this.messages });
+      this.playback = playback;
+      this.setScene(playback.meta, playback);
+      this.markOutcome(playback);
+      playback.restart();
+    }
+    startLive() {
+      const tuning = new Tuning((message) => live.send(message));
+      const live = new Live({
+        opened: () => this.opened(),
+        lost: (why) => this.lost(why),
+        command: (bytes) => this.scene.command(bytes),
+        scene: (meta) => {
+          this.setScene(meta, live);
+          tuning.build(meta);
+        },
+        messages: this.messages,
+        controls: (values) => tuning.follow(values),
+        ended: (pack) => this.replayRun(pack, live.speed),
+        resumed: () => this.leaveReplay(live)
+      });
+      this.live = live;
+      this.tuning = tuning;
+    }
+    opened() {
+      if (this.meta) this.scene.clear();
+      this.meta = this.instant = null;
+      byId("lost").hidden = true;
+    }
+    /** @param {string} why */
+    lost(why) {
+      byId("lost").hidden = false;
+      byId("lost-text").textContent = why;
+      this.slowDue = 0;
+    }
+    /**
+     * A run has ended: it can be replayed now.
+     * @param {Pack} pack
+     * @param {number | null} speed
+     */
+    replayRun(pack, speed) {
+      const options = { messages: this.messages, pace: "ended; replay", speed: speed ?? 1 };
+      const playback = new Playback(pack, options);
+      this.playback = playback;
+      this.plots.setSource(playback);
+      this.markOutcome(playback);
+      playback.seek(playback.end);
+    }
+    /** @param {Live} live */
+    leaveReplay(live) {
+      this.playback = null;
+      this.plots.setSource(live);
+      this.transport.mark([], 1);
+    }
+    /**
+     * Messages pass along a system's links now.
+     * @param {System} system
+     * @param {Numbers | undefined} counts
+     */
+    messages = (system, counts) => this.overlay.links.messages(system, counts, performance.now());
+    /**
+     * @param {Meta} meta
+     * @param {Source} source
+     */
+    setScene(meta, source) {
+      this.meta = meta;
+      this.instant = null;
+      document.title = `${meta.title} · gne_mj`;
+      byId("title").textContent = meta.title;
+      byId("waiting").hidden = true;
+      this.scene.setMeta(meta);
+      this.overlay.setMeta(meta);
+      this.plots.setScene(meta, source);
+      this.toolbar.setMeta(meta);
+    }
+    /**
+     * Exits and interventions of a replay, marked along the slider.
+     * @param {Playback} playback
+     */
+    markOutcome({ exits, interventions, end }) {
+      const marks = Object.entries(exits).map(([name, time]) => ({
+        time,
+        what: `${name} left the set`,
+        bad: true
+      }));
+      this.transport.mark([...interventions, ...marks], end);
+    }
+    // ---- what users ask for
+    playPause() {
+      this.source?.playPause();
+      this.slowDue = 0;
+    }
+    /**
+     * @param {number} direction
+     * @param {boolean} second
+     */
+    step(direction, second) {
+      this.source?.step(direction, second);
+    }
+    /** Of the simulation, also where the replay of a run that has ended is shown. */
+    restart() {
+      (this.live ?? this.playback)?.restart();
+    }
+    /** @param {number | null} speed */
+    setSpeed(speed) {
+      this.source?.setSpeed(speed);
+      this.slowDue = 0;
+    }
+    /** @param {number} time */
+    seek(time) {
+      this.source?.seek(time);
+    }
+    /** To where the first system left the set. */
+    seekExit() {
+      if (this.source) this.seek(Math.min(...Object.values(this.source.exits)));
+    }
+    /**
+     * @param {Agent | null} which
+     * @param {Plot} [plot] that was pointed at
+     */
+    highlight(which, plot) {
+      this.overlay.highlighted = which;
+      this.plots.highlight(which, plot);
+      this.scene.dirty();
+    }
+    switchTheme() {
+      setTheme(theme() === "dark" ? "light" : "dark");
+      this.scene.restyle();
+      this.plots.restyle();
+    }
+    // ---- pictures
+    /** @param {number} now ms */
     loop(now) {
       requestAnimationFrame((next) => this.loop(next));
-      const passed = Math.min(now - (this.before ?? now), 250) / 1000;
+      const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1e3;
       this.before = now;
-      this.watchPace(passed);
-      if (this.replaying && this.playing) this.playOn(passed);
-      if (!this.meta) return;
-      this.flow(now);
-      this.draw(now);
-      if (now >= (this.slowDue ?? 0)) this.slow(now);
+      const { source } = this;
+      this.watchPace(passed, source?.playing ?? false);
+      source?.advance(passed);
+      if (!this.meta || !source) return;
+      if (source.playing) this.overlay.links.flow(this.meta.systems, now);
+      this.draw(source, now);
+      if (now >= this.slowDue) this.slow(this.meta, source, now);
     }
-
-    watchPace(passed) {
-      if (!this.playing) {
-        this.usual = 0.016;
+    /**
+     * @param {number} passed s
+     * @param {boolean} playing
+     */
+    watchPace(passed, playing) {
+      if (!playing) {
+        this.usual = PICTURE;
         return this.scene.setQuality(1);
       }
       this.usual += 0.1 * (passed - this.usual);
       if (this.usual > 0.05) this.scene.setQuality(0.6);
     }
-
-    playOn(passed) {
-      this.seek(this.time + passed * this.speed, true);
-      if (this.time >= this.replay.end) this.playing = false;
-    }
-
-    flow(now) {
-      if (!this.playing) return;
-      for (const system of this.meta.systems)
-        if (system.links.length && system.message_period === null) this.overlay.flow(system, now);
-    }
-
-    draw(now) {
-      if (this.pending) {
-        this.instant = this.pending;
-        this.pending = null;
-        this.scene.apply(this.instant, this.store);
-        this.plots.setTime(this.instant.time);
-      } else if (this.instant && this.scene.stale) this.scene.apply(this.instant, this.store);
+    /**
+     * @param {Source} source
+     * @param {number} now ms
+     */
+    draw(source, now) {
+      const instant = source.take();
+      if (instant) {
+        this.instant = instant;
+        this.scene.apply(instant, source.store);
+        this.plots.setTime(instant.time);
+      } else if (this.instant && this.scene.stale) this.scene.apply(this.instant, source.store);
       if (!this.instant) return;
       const render = this.scene.needsRender;
       if (render) this.scene.render();
-      if (render || this.overlay.moving || this.wasMoving) this.overlay.draw(this.instant, now);
+      const { moving } = this.overlay;
+      if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
       this.wasMoving = this.overlay.moving;
-      window.gne.ready = true;
+      this.drawn = true;
     }
-
-    /** What need not be fresh at every picture. */
-    slow(now) {
+    /**
+     * What need not be fresh at every picture.
+     * @param {Meta} meta
+     * @param {Source} source
+     * @param {number} now ms
+     */
+    slow(meta, source, now) {
       const began = performance.now();
-      if (this.plotsDue) {
-        this.plotsDue = false;
+      if (source.grown) {
+        source.grown = false;
         this.plots.refresh();
       } else this.plots.writeValues();
-      this.showHeader();
-      this.showBanner();
-      this.showLegend();
-      this.showTransport();
-      // slow plots must not take more than a sixth of the time
+      this.header.show(meta, source);
+      this.toolbar.showLegend(this.instant);
+      this.transport.show(source, this.live);
       this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
     }
+  };
 
-    showLegend() {
-      const shares = Object.values(this.instant?.systems || {}).map((own) => own.share || [NaN]);
-      GNE.byId("unknown").hidden = !shares.some((share) => share.some(Number.isNaN));
-    }
-
-    showTransport() {
-      const { replaying } = this;
-      this.transport.show({
-        playing: this.playing,
-        seekable: replaying,
-        live: this.live,
-        connected: Boolean(this.connected),
-        time: this.time,
-        end: replaying ? this.replay.end : this.meta.duration,
-        speed: this.speed,
-      });
-    }
-
-    // ---- header
-
-    showHeader() {
-      GNE.byId("time").textContent = this.time.toFixed(2);
-      GNE.byId("duration").textContent = GNE.number(this.meta.duration, 6);
-      GNE.byId("pace").textContent = this.pace();
-      const key = JSON.stringify(this.meta.systems.map((system) => this.stateOf(system)));
-      if (key === this.chipKey) return;
-      this.chipKey = key;
-      GNE.byId("chips").replaceChildren(...this.meta.systems.map((system) => this.chip(system)));
-      this.announce();
-    }
-
-    /** Tells a screen reader of changes of status; margins change too often for that. */
-    announce() {
-      const words = this.meta.systems.map(
-        (system) => `${system.name}: ${GNE.status(this.stateOf(system).status).words}`,
-      );
-      const text = words.join(", ");
-      const place = GNE.byId("announcement");
-      if (place.textContent !== text) place.textContent = text;
-    }
-
-    pace() {
-      if (!this.live || this.replaying || !this.frame)
-        return this.live && this.replaying ? "ended; replay" : "";
-      if (!this.connected) return "not connected";
-      if (!this.playing) return "paused";
-      const { speed, pace } = this.frame;
-      const wished = speed === null ? "as fast as possible" : `×${GNE.number(speed)}`;
-      return Number.isFinite(pace) ? `${wished}, ${GNE.number(pace)} reached` : wished;
-    }
-
-    /** {status, message, margin, margin_name, margin_time} of a system, as of now. */
-    stateOf({ name }) {
-      if (!this.replaying) return this.frame?.state[name] || { status: "waiting" };
-      // of the whole run, also while an earlier time is shown
-      return this.replay.meta.outcome?.[name] || { status: "" };
-    }
-
-    chip(system) {
-      const state = this.stateOf(system);
-      const { kind, symbol, words } = GNE.status(state.status);
-      const about = [
-        system.game,
-        `${system.agents} ${system.agent_name}s`,
-        `information: ${system.information}`,
-        `mode: ${system.mode}`,
-        `engine: ${system.engine}`,
-      ];
-      return GNE.element(
-        "div",
-        {
-          class: `chip ${kind}`,
-          title: [state.message, about.join(" · ")].filter(Boolean).join("\n"),
-        },
-        GNE.element("span", { class: "sign", "aria-hidden": true, text: symbol }),
-        GNE.element("span", {}, GNE.element("b", { text: system.name }), `: ${words}`),
-        GNE.element("span", { class: "margin", text: this.marginText(state) }),
-      );
-    }
-
-    marginText({ margin, margin_name: name, margin_time: time }) {
-      if (!Number.isFinite(margin)) return "no margin known";
-      const when = Number.isFinite(time) ? ` at ${GNE.fixed(time, time < 10 ? 2 : 1)} s` : "";
-      const of = this.replaying ? "the run's least margin" : "least margin so far";
-      return `${of} ${GNE.number(margin)}${name ? ` · ${name}` : ""}${when}`;
-    }
-
-    showBanner() {
-      const out = this.meta.systems.filter((system) => GNE.outside(this.stateOf(system).status));
-      const banner = GNE.byId("banner");
-      const text = out.map((system) => this.exitText(system)).join("   ");
-      GNE.byId("banner-show").hidden =
-        !this.replaying || !Number.isFinite(this.exits[out[0]?.name]);
-      if (text === this.bannerText) return; // closed, perhaps
-      this.bannerText = text;
-      banner.hidden = !text;
-      GNE.byId("banner-text").textContent = text;
-    }
-
-    exitText(system) {
-      const { status, message } = this.stateOf(system);
-      const at = this.exits[system.name];
-      const when = Number.isFinite(at) ? ` at ${GNE.number(at, 4)} s` : "";
-      return `${system.name}: ${GNE.status(status).words}${when}${message ? `: ${message}` : ""}`;
-    }
-
-    // ---- wiring
-
-    wire() {
-      const press = (id, action) => GNE.byId(id).addEventListener("click", action);
-      const toggle = (id, what) => {
-        this.overlay.show[what] = !this.overlay.show[what];
-        GNE.byId(id).setAttribute("aria-pressed", this.overlay.show[what]);
-        this.scene.dirty();
-      };
-      const ghostsOn = () => GNE.byId("ghosts").getAttribute("aria-pressed") === "true";
-      const actions = {
-        " ": () => this.playPause(),
-        ArrowRight: ({ shiftKey }) => this.step(1, shiftKey),
-        ArrowLeft: ({ shiftKey }) => this.step(-1, shiftKey),
-        r: () => this.restart(),
-        f: () => this.scene.fit(),
-        l: () => toggle("labels", "labels"),
-        c: () => toggle("links", "links"),
-        g: () => this.scene.ghosts && this.setGhosts(!ghostsOn()),
-        p: () => this.fold(),
-        d: () => this.switchTheme(),
-        "?": () => GNE.byId("help").showModal(),
-        "[": () => this.scene.nudge(-6, 1),
-        "]": () => this.scene.nudge(6, 1),
-        "+": () => this.scene.nudge(0, 0.88),
-        "=": () => this.scene.nudge(0, 0.88),
-        "-": () => this.scene.nudge(0, 1.14),
-      };
-      GNE.keys(actions);
-      press("fit", actions.f);
-      press("labels", actions.l);
-      press("links", actions.c);
-      press("ghosts", actions.g);
-      press("fold", actions.p);
-      press("theme", actions.d);
-      press("help-open", actions["?"]);
-      press("banner-close", () => (GNE.byId("banner").hidden = true));
-      press("banner-show", () => this.seek(Math.min(...Object.values(this.exits))));
-      GNE.byId("ghost-agent").onchange = () => this.setGhosts(true);
-      GNE.byId("follow").onchange = (event) => this.setFollow(event.target.value);
-      GNE.byId("ramp").style.background = GNE.rampGradient();
-      this.wirePane();
-      this.wireDivider();
-      // what was pressed by mouse does not keep the keys: space is to play and pause
-      const release = ({ target }) => {
-        const pressed = target.closest?.("button, summary, select");
-        if (pressed && !pressed.matches(":focus-visible")) pressed.blur();
-      };
-      document.addEventListener("change", release);
-      document.addEventListener("click", (event) => {
-        if (!event.target.closest("select")) release(event);
-      });
-    }
-
-    setFollow(value) {
-      if (value === "fleet" || value === "none") this.scene.setFollow({ kind: value });
-      else this.scene.setFollow({ kind: "agent", ...JSON.parse(value) });
-    }
-
-    wirePane() {
-      const pane = GNE.byId("pane");
-      const near = (event) => {
-        const box = pane.getBoundingClientRect();
-        return this.overlay.agentNear(event.clientX - box.left, event.clientY - box.top);
-      };
-      pane.addEventListener("mousemove", (event) => {
-        if (event.buttons) return;
-        const which = near(event);
-        if (JSON.stringify(which) !== JSON.stringify(this.overlay.highlighted))
-          this.highlight(which);
-      });
-      pane.addEventListener("mouseleave", () => this.highlight(null));
-      pane.addEventListener("dblclick", (event) => {
-        const which = near(event);
-        const value = which && JSON.stringify(which);
-        const select = GNE.byId("follow");
-        if (![...select.options].some((option) => option.value === value)) return;
-        select.value = value;
-        this.setFollow(value);
-      });
-    }
-
-    wireDivider() {
-      const divider = GNE.byId("divider");
-      const set = (width) => {
-        const fitting = Math.round(Math.min(Math.max(width, 280), innerWidth - 380));
-        document.documentElement.style.setProperty("--plots", `${fitting}px`);
-        divider.setAttribute("aria-valuenow", fitting);
-      };
-      divider.addEventListener("pointerdown", (event) =>
-        divider.setPointerCapture(event.pointerId),
-      );
-      divider.addEventListener("pointermove", (event) => {
-        if (divider.hasPointerCapture(event.pointerId)) set(innerWidth - event.clientX);
-      });
-      divider.addEventListener("dblclick", () => this.fold());
-      divider.addEventListener("keydown", ({ key }) => {
-        const now = GNE.byId("plots").clientWidth;
-        if (key === "ArrowLeft") set(now + 24);
-        if (key === "ArrowRight") set(now - 24);
-      });
-    }
-
-    fold() {
-      const folded = document.body.classList.toggle("folded");
-      GNE.byId("fold").setAttribute("aria-pressed", !folded);
-    }
-
-    switchTheme() {
-      GNE.setTheme(GNE.theme() === "dark" ? "light" : "dark");
-      this.scene.restyle();
-      this.plots.restyle();
-    }
-
-    // ---- for tests
-
-    expose() {
-      const page = this;
-      window.gne = {
-        ready: false,
-        mode: this.mode,
-        time: () => page.time,
-        seek: (t) => {
-          page.seek(t);
-          page.draw(performance.now());
-        },
-        play: () => page.playing || page.playPause(),
-        pause: () => page.playing && page.playPause(),
-        position: (item) => page.scene.position(item),
-        tint: (agentIndex, systemName) => page.tint(agentIndex, systemName),
-        get plots() {
-          return page.plots.describe();
-        },
-        get framesReceived() {
-          return page.framesReceived;
-        },
-        state: () => page.describe(),
-      };
-    }
-
-    /** CSS colour of an agent (from 0) as it is drawn. */
-    tint(agent, name) {
-      const bars = this.scene.bars.find(({ system }) => system.name === name);
-      const drawn = bars
-        ? bars.bars[bars.system.action.owner.indexOf(agent + 1)]
-        : this.scene.tinted?.get(name)?.[agent]?.[0];
-      return drawn ? GNE.css(drawn.material.color.toArray()) : null;
-    }
-
-    describe() {
-      const systems = this.meta?.systems || [];
-      return {
-        mode: this.mode,
-        time: this.time,
-        playing: this.playing,
-        speed: this.speed,
-        replaying: this.replaying,
-        connected: Boolean(this.connected),
-        theme: GNE.theme(),
-        exits: { ...this.exits },
-        systems: Object.fromEntries(systems.map((s) => [s.name, this.stateOf(s)])),
-        controls: [...(this.tuning?.sliders.keys() || [])],
-        interventions: this.plots.interventions,
-        pulses: this.overlay.pulses.length,
-        following: this.scene.following,
-        follow: this.scene.follow,
-        ghosts: this.scene.ghosts?.shown ?? null,
-      };
-    }
-  }
-
-  GNE.page = new Page();
+  // src/main.js
+  var { mode = "served" } = JSON.parse(byId("settings").textContent || "{}");
+  window.gne = handleOf(new Page(mode));
 })();

@@ -1,0 +1,174 @@
+// uPlot's options for a plot, and the bounds and interventions that are drawn into it.
+import uPlot from "uplot";
+import { colour } from "./theme.js";
+import { number, withUnit } from "./words.js";
+/** @import { Plot } from "./plot.js" */
+/** @import { Bound, Spec } from "./specs.js" */
+/** @import { Intervention } from "./types.d.ts" */
+
+export const MOST_CHIPS = 14; // lines, up to which each has a chip with its value
+const FONT = "12px system-ui, sans-serif";
+const LABEL = 13; // px of a bound's label
+
+/**
+ * @param {Plot} plot
+ * @param {number} width
+ * @param {number} height
+ * @returns {uPlot.Options}
+ */
+export const optionsOf = (plot, width, height) => ({
+  width,
+  height,
+  legend: { show: false },
+  padding: [6, 16, 0, 0],
+  scales: {
+    x: { time: false, range: () => [0, plot.plots.span()] },
+    y: { range: (u, low, high) => rangeY(plot.spec.bounds, u.height, low, high) },
+  },
+  axes: axesOf(plot.spec.unit),
+  series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
+  focus: { alpha: 0.22 },
+  cursor: {
+    drag: { x: false, y: false },
+    points: { show: plot.spec.total <= MOST_CHIPS, size: 6 },
+    focus: { prox: 14 },
+    sync: { key: "gne", setSeries: false, scales: ["x", null] },
+  },
+  hooks: {
+    drawAxes: [(u) => drawMarks(u, plot)],
+    draw: [() => plot.setTime(plot.plots.now)], // the axis is another one only by now
+    setCursor: [(u) => plot.hover(u)],
+    // uPlot's types do not know what it tells here
+    setSeries: [(_, k, how) => plot.focusedByMouse(k, /** @type {any} */ (how))],
+  },
+});
+
+/**
+ * @returns {uPlot.Axis[]}
+ * @param {string} unit
+ */
+const axesOf = (unit) => {
+  const axis = {
+    stroke: colour("muted"),
+    font: FONT,
+    grid: { stroke: colour("plot-grid"), width: 1 },
+    ticks: { stroke: colour("plot-grid"), width: 1, size: 4 },
+  };
+  return [
+    {
+      ...axis,
+      size: 24,
+      gap: 2,
+      space: 60,
+      values: (_, ticks) => ticks.map((v) => `${number(v, 6)} s`),
+    },
+    {
+      ...axis,
+      size: 50,
+      gap: 3,
+      space: 24,
+      label: unit || undefined,
+      labelSize: 18,
+      labelGap: 0,
+      labelFont: FONT,
+      values: (_, ticks) => ticks.map((v) => number(v, 6)),
+    },
+  ];
+};
+
+/**
+ * @returns {uPlot.Series}
+ * @param {Plot} plot
+ * @param {string} label
+ * @param {number} k
+ */
+const seriesOf = (plot, label, k) => {
+  const look = plot.lineOf(k);
+  return {
+    label,
+    stroke: look.colour,
+    dash: look.dash.length ? look.dash : undefined,
+    width: plot.spec.columns.length > MOST_CHIPS ? 1 : 1.75,
+    points: { show: false },
+    spanGaps: false,
+  };
+};
+
+/**
+ * @returns {[number, number]}
+ * @param {Bound[]} bounds
+ * @param {number} height of the plot, px
+ * @param {number | null} low
+ * @param {number | null} high
+ */
+const rangeY = (bounds, height, low, high) => {
+  for (const { value } of bounds) {
+    low = low === null ? value : Math.min(low, value);
+    high = high === null ? value : Math.max(high, value);
+  }
+  if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
+  const size = high - low || Math.abs(high) || 1;
+  // room for a bound's label above its line
+  const room = bounds.length ? 18 / Math.max(height - 36, 40) : 0.08;
+  return [low - 0.07 * size, high + room * size * 1.2];
+};
+
+/**
+ * @param {uPlot} u
+ * @param {Plot} plot
+ */
+const drawMarks = (u, plot) => {
+  const { ctx: context, bbox } = u;
+  context.save();
+  context.beginPath();
+  context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  context.clip();
+  drawInterventions(u, plot.plots.source.interventions);
+  drawBounds(u, plot.spec);
+  context.restore();
+};
+
+/**
+ * @param {uPlot} u
+ * @param {Intervention[]} interventions
+ */
+const drawInterventions = (u, interventions) => {
+  const { ctx: context, bbox } = u;
+  context.strokeStyle = colour("muted");
+  context.lineWidth = 1;
+  context.setLineDash([2, 4]);
+  for (const { time } of interventions) {
+    const x = u.valToPos(time, "x", true);
+    context.beginPath();
+    context.moveTo(x, bbox.top);
+    context.lineTo(x, bbox.top + bbox.height);
+    context.stroke();
+  }
+};
+
+/**
+ * @param {uPlot} u
+ * @param {Spec} spec
+ */
+const drawBounds = (u, { bounds, unit }) => {
+  const { ctx: context, bbox } = u;
+  const ratio = uPlot.pxRatio;
+  context.strokeStyle = context.fillStyle = colour("limit");
+  context.lineWidth = 1.5 * ratio;
+  context.font = `${12 * ratio}px system-ui, sans-serif`;
+  context.textBaseline = "bottom";
+  context.textAlign = "right";
+  context.setLineDash([6 * ratio, 4 * ratio]);
+  let last = Infinity;
+  for (const { value, note } of bounds) {
+    const y = u.valToPos(value, "y", true);
+    context.beginPath();
+    context.moveTo(bbox.left, y);
+    context.lineTo(bbox.left + bbox.width, y);
+    context.stroke();
+    if (last - y < LABEL * ratio) continue; // no room for another label
+    last = y;
+    const text = `bound ${withUnit(value, unit)}${note}`;
+    context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+  }
+};

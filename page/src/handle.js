@@ -1,0 +1,73 @@
+// What a developer, or a test, may ask of a page: window.gne, the only name that the page defines.
+import { css } from "./colours.js";
+import { theme } from "./theme.js";
+/** @import { Page } from "./page.js" */
+/** @import { Scene, Source } from "./types.d.ts" */
+
+/** @param {Page} page */
+export const handleOf = (page) => ({
+  /** Whether something has been drawn. */
+  get ready() {
+    return page.drawn;
+  },
+  /** Simulated time that is shown, s. */
+  time: () => page.source?.time ?? 0,
+  /** Shows a time of a replay, at once. */
+  seek(/** @type {number} */ time) {
+    page.seek(time);
+    if (page.source) page.draw(page.source, performance.now());
+  },
+  /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
+  position: (/** @type {string} */ path) => page.scene.position(path),
+  /** CSS colour of an agent (from 0) as it is drawn. */
+  tint: (/** @type {number} */ agent, /** @type {string} */ system) => tintOf(page, agent, system),
+  /** What is plotted. */
+  get plots() {
+    return page.plots.describe();
+  },
+  get framesReceived() {
+    return page.live?.framesReceived ?? 0;
+  },
+  /** What the page is doing. */
+  state: () => stateOf(page),
+});
+
+/**
+ * @param {Page} page
+ * @param {number} agent
+ * @param {string} name of the system
+ */
+const tintOf = ({ scene }, agent, name) => {
+  const bars = scene.bars.find(({ system }) => system.name === name);
+  const drawn = bars
+    ? bars.bars[bars.system.action.owner.indexOf(agent + 1)]
+    : scene.tinted.get(name)?.[agent]?.[0];
+  return drawn ? css(drawn.material.color.toArray()) : null;
+};
+
+/** @param {Page} page */
+const stateOf = ({ meta, mode, live, overlay, playback, scene, source, tuning }) => ({
+  mode,
+  replaying: playback !== null,
+  connected: live?.connected ?? false,
+  theme: theme(),
+  controls: [...(tuning?.sliders.keys() ?? [])],
+  pulses: overlay.links.pulses.length,
+  following: scene.camera.following,
+  follow: scene.camera.follow,
+  ghosts: scene.ghosts.shown,
+  ...(meta && source && shownOf(meta, source)),
+});
+
+/**
+ * @param {Scene} meta
+ * @param {Source} source
+ */
+const shownOf = (meta, source) => ({
+  time: source.time,
+  playing: source.playing,
+  speed: source.speed,
+  exits: source.exits,
+  interventions: source.interventions,
+  systems: Object.fromEntries(meta.systems.map((each) => [each.name, source.stateOf(each)])),
+});

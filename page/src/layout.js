@@ -1,0 +1,146 @@
+// Where agents stand at an instant, in MuJoCo's coordinates, and how much room all of it takes.
+import { THREE } from "./meshcat.js";
+import { toView } from "./viewer.js";
+/** @import { Bars } from "./bars.js" */
+/** @import { Instant, Numbers, Point, System } from "./types.d.ts" */
+
+export class Layout {
+  constructor() {
+    /** @type {System[]} */
+    this.fleets = [];
+    /** @type {Bars[]} */
+    this.bars = [];
+    this.floor = 0; // the lowest point of what is drawn
+    this.known = false; // whether there was an instant of the scene
+    this.spill = 0; // how far bodies have swung out of the box, m
+    this.spillTime = 0;
+    /** @type {{low: number[], high: number[]} | null} */
+    this.box = null; // on the ground, around the agents of fleets
+    /** @type {Numbers} */
+    this.poses = new Float64Array(0);
+  }
+
+  /**
+   * Another scene.
+   * @param {System[]} fleets
+   * @param {Bars[]} bars
+   */
+  begin(fleets, bars) {
+    this.fleets = fleets;
+    this.bars = bars;
+    this.known = false;
+    this.spill = 0;
+    this.box = null;
+  }
+
+  /** @param {Instant} instant */
+  update(instant) {
+    this.poses = instant.poses ?? new Float64Array(0);
+    this.known = true;
+    this.box = this.boxOf();
+    if (this.box) this.noteSpill(this.box, instant.time);
+  }
+
+  /**
+   * Where an agent of a fleet is.
+   * @param {System} system
+   * @param {number} agent
+   */
+  agentAt(system, agent) {
+    const p = 8 * system.anchors[agent];
+    return this.poses.slice(p, p + 3);
+  }
+
+  /**
+   * Where links of an agent begin: above a robot, on top of a bar.
+   * @param {System} system
+   * @param {number} agent
+   * @returns {Point}
+   */
+  headOf(system, agent) {
+    if (system.drawn_as === "bars") return this.barsOf(system).topOfAgent(agent);
+    const [x, y, z] = this.agentAt(system, agent);
+    return [x, y, z + 0.8 * system.height];
+  }
+
+  /**
+   * The bars of a system that is drawn as such.
+   * @param {System} system
+   */
+  barsOf(system) {
+    return /** @type {Bars} */ (this.bars.find((bars) => bars.system === system));
+  }
+
+  boxOf() {
+    const low = [Infinity, Infinity];
+    const high = [-Infinity, -Infinity];
+    for (const system of this.fleets)
+      for (const anchor of system.anchors)
+        for (const axis of [0, 1]) {
+          const v = this.poses[8 * anchor + axis];
+          low[axis] = Math.min(low[axis], v);
+          high[axis] = Math.max(high[axis], v);
+        }
+    return Number.isFinite(low[0]) ? { low, high } : null;
+  }
+
+  /**
+   * What has swung out is forgotten slowly: the view must not breathe.
+   * @param {{low: number[], high: number[]}} box
+   * @param {number} time s
+   */
+  noteSpill({ low, high }, time) {
+    if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
+    this.spillTime = time;
+    const { poses } = this;
+    for (let p = 0; p < poses.length; p += 8)
+      for (const axis of [0, 1]) {
+        const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]);
+        if (poses[p + 7] !== 0 && out > this.spill) this.spill = out;
+      }
+  }
+
+  /** The y of robots in a row, or null. */
+  get lane() {
+    if (!this.box) return null;
+    const { low, high } = this.box;
+    return high[1] - low[1] < 0.3 ? (low[1] + high[1]) / 2 : null;
+  }
+
+  get planar() {
+    return this.lane === null ? 1 : 0;
+  }
+
+  /** The points that should be in view, as three.js sees them. */
+  points() {
+    /** @type {Point[]} */
+    const points = [];
+    for (const system of this.fleets)
+      for (let agent = 0; agent < system.agents; agent++) {
+        const [x, y, z] = this.agentAt(system, agent);
+        points.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
+      }
+    if (this.box) {
+      const { low, high } = this.box;
+      for (const x of [low[0] - this.spill, high[0] + this.spill])
+        for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
+          points.push([x, y, this.floor]);
+    }
+    for (const bars of this.bars) points.push(...bars.corners());
+    return points.length ? points.map(toView) : [new THREE.Vector3()];
+  }
+
+  /** The middle of the agents, without what swings about them, as three.js sees it. */
+  middle() {
+    const box = new THREE.Box3();
+    for (const system of this.fleets)
+      for (let agent = 0; agent < system.agents; agent++) {
+        const [x, y, z] = this.agentAt(system, agent);
+        box.expandByPoint(toView([x, y, this.floor]));
+        box.expandByPoint(toView([x, y, z + system.height]));
+      }
+    for (const bars of this.bars)
+      for (const corner of bars.corners()) box.expandByPoint(toView(corner));
+    return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
+  }
+}

@@ -1,0 +1,300 @@
+// The page: puts a source of instants, the scene, plots and controls together.
+import { byId } from "./dom.js";
+import { Header, warn } from "./header.js";
+import { Live } from "./live.js";
+import { Overlay } from "./overlay.js";
+import { fetchReplay, fromBase64, unpack } from "./pack.js";
+import { Playback } from "./playback.js";
+import { Plots } from "./plots.js";
+import { Scene } from "./scene.js";
+import { setTheme, theme } from "./theme.js";
+import { Toolbar } from "./toolbar.js";
+import { Transport } from "./transport.js";
+import { Tuning } from "./tuning.js";
+import { wire } from "./wiring.js";
+/** @import { Agent, Instant, Numbers, Pack, Scene as Meta, Source, System } from "./types.d.ts" */
+/** @import { Plot } from "./plot.js" */
+
+const SLOW = 100; // ms between refreshes of texts and, live, of plots
+const PICTURE = 0.016; // s between pictures, where nothing is slow
+
+export class Page {
+  /** @param {"live" | "served" | "file"} mode where the page and its numbers come from */
+  constructor(mode) {
+    this.mode = mode;
+    this.scene = new Scene(byId("pane"));
+    this.overlay = new Overlay(byId("overlay"), this.scene);
+    this.plots = new Plots(byId("plots"), {
+      seek: (time) => this.seek(time),
+      highlight: (which, plot) => this.highlight(which, plot),
+    });
+    this.header = new Header();
+    this.toolbar = new Toolbar(this.scene, this.overlay);
+    this.transport = new Transport(this);
+    /** @type {Live | null} */
+    this.live = null; // the simulation, in mode "live"
+    /** @type {Playback | null} */
+    this.playback = null; // the replay, if that is shown
+    /** @type {Meta | null} */
+    this.meta = null;
+    /** @type {Instant | null} */
+    this.instant = null; // what is drawn
+    this.drawn = false; // whether anything was
+    this.wasMoving = false;
+    this.before = NaN; // ms, of the picture before
+    this.usual = PICTURE; // s between pictures
+    this.slowDue = 0; // ms, when texts are refreshed
+    wire(this);
+    if (mode === "live") this.startLive();
+    else this.startReplay();
+    requestAnimationFrame((now) => this.loop(now));
+  }
+
+  /**
+   * What is shown.
+   * @returns {Source | null}
+   */
+  get source() {
+    return this.playback ?? this.live;
+  }
+
+  // ---- where the data come from
+
+  async startReplay() {
+    try {
+      const pack =
+        this.mode === "file"
+          ? await unpack(fromBase64(byId("replay").textContent))
+          : await fetchReplay();
+      this.showReplay(pack);
+    } catch (error) {
+      warn(`The replay cannot be read: ${error.message}`);
+    }
+  }
+
+  /** @param {Pack} pack */
+  showReplay(pack) {
+    const { command_lengths: lengths = [] } = /** @type {Meta} */ (pack.meta);
+    const commands = /** @type {Uint8Array} */ (pack.arrays.commands?.data);
+    let at = 0;
+    for (const length of lengths) {
+      this.scene.command(commands.slice(at, at + length));
+      at += length;
+    }
+    const playback = new Playback(pack, { messages: this.messages });
+    this.playback = playback;
+    this.setScene(playback.meta, playback);
+    this.markOutcome(playback);
+    playback.restart();
+  }
+
+  startLive() {
+    const tuning = new Tuning((message) => live.send(message));
+    const live = new Live({
+      opened: () => this.opened(),
+      lost: (why) => this.lost(why),
+      command: (bytes) => this.scene.command(bytes),
+      scene: (meta) => {
+        this.setScene(meta, live);
+        tuning.build(meta);
+      },
+      messages: this.messages,
+      controls: (values) => tuning.follow(values),
+      ended: (pack) => this.replayRun(pack, live.speed),
+      resumed: () => this.leaveReplay(live),
+    });
+    this.live = live;
+    this.tuning = tuning;
+  }
+
+  opened() {
+    // another server may stand behind the address now
+    if (this.meta) this.scene.clear();
+    this.meta = this.instant = null;
+    byId("lost").hidden = true;
+  }
+
+  /** @param {string} why */
+  lost(why) {
+    byId("lost").hidden = false;
+    byId("lost-text").textContent = why;
+    this.slowDue = 0;
+  }
+
+  /**
+   * A run has ended: it can be replayed now.
+   * @param {Pack} pack
+   * @param {number | null} speed
+   */
+  replayRun(pack, speed) {
+    const options = { messages: this.messages, pace: "ended; replay", speed: speed ?? 1 };
+    const playback = new Playback(pack, options);
+    this.playback = playback;
+    this.plots.setSource(playback);
+    this.markOutcome(playback);
+    playback.seek(playback.end);
+  }
+
+  /** @param {Live} live */
+  leaveReplay(live) {
+    this.playback = null;
+    this.plots.setSource(live);
+    this.transport.mark([], 1);
+  }
+
+  /**
+   * Messages pass along a system's links now.
+   * @param {System} system
+   * @param {Numbers | undefined} counts
+   */
+  messages = (system, counts) => this.overlay.links.messages(system, counts, performance.now());
+
+  /**
+   * @param {Meta} meta
+   * @param {Source} source
+   */
+  setScene(meta, source) {
+    this.meta = meta;
+    this.instant = null;
+    document.title = `${meta.title} · gne_mj`;
+    byId("title").textContent = meta.title;
+    byId("waiting").hidden = true;
+    this.scene.setMeta(meta);
+    this.overlay.setMeta(meta);
+    this.plots.setScene(meta, source);
+    this.toolbar.setMeta(meta);
+  }
+
+  /**
+   * Exits and interventions of a replay, marked along the slider.
+   * @param {Playback} playback
+   */
+  markOutcome({ exits, interventions, end }) {
+    const marks = Object.entries(exits).map(([name, time]) => ({
+      time,
+      what: `${name} left the set`,
+      bad: true,
+    }));
+    this.transport.mark([...interventions, ...marks], end);
+  }
+
+  // ---- what users ask for
+
+  playPause() {
+    this.source?.playPause();
+    this.slowDue = 0;
+  }
+
+  /**
+   * @param {number} direction
+   * @param {boolean} second
+   */
+  step(direction, second) {
+    this.source?.step(direction, second);
+  }
+
+  /** Of the simulation, also where the replay of a run that has ended is shown. */
+  restart() {
+    (this.live ?? this.playback)?.restart();
+  }
+
+  /** @param {number | null} speed */
+  setSpeed(speed) {
+    this.source?.setSpeed(speed);
+    this.slowDue = 0;
+  }
+
+  /** @param {number} time */
+  seek(time) {
+    this.source?.seek(time);
+  }
+
+  /** To where the first system left the set. */
+  seekExit() {
+    if (this.source) this.seek(Math.min(...Object.values(this.source.exits)));
+  }
+
+  /**
+   * @param {Agent | null} which
+   * @param {Plot} [plot] that was pointed at
+   */
+  highlight(which, plot) {
+    this.overlay.highlighted = which;
+    this.plots.highlight(which, plot);
+    this.scene.dirty();
+  }
+
+  switchTheme() {
+    setTheme(theme() === "dark" ? "light" : "dark");
+    this.scene.restyle();
+    this.plots.restyle();
+  }
+
+  // ---- pictures
+
+  /** @param {number} now ms */
+  loop(now) {
+    requestAnimationFrame((next) => this.loop(next));
+    const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1000;
+    this.before = now;
+    const { source } = this;
+    this.watchPace(passed, source?.playing ?? false);
+    source?.advance(passed);
+    if (!this.meta || !source) return;
+    if (source.playing) this.overlay.links.flow(this.meta.systems, now);
+    this.draw(source, now);
+    if (now >= this.slowDue) this.slow(this.meta, source, now);
+  }
+
+  /**
+   * @param {number} passed s
+   * @param {boolean} playing
+   */
+  watchPace(passed, playing) {
+    if (!playing) {
+      this.usual = PICTURE;
+      return this.scene.setQuality(1);
+    }
+    this.usual += 0.1 * (passed - this.usual);
+    if (this.usual > 0.05) this.scene.setQuality(0.6);
+  }
+
+  /**
+   * @param {Source} source
+   * @param {number} now ms
+   */
+  draw(source, now) {
+    const instant = source.take();
+    if (instant) {
+      this.instant = instant;
+      this.scene.apply(instant, source.store);
+      this.plots.setTime(instant.time);
+    } else if (this.instant && this.scene.stale) this.scene.apply(this.instant, source.store);
+    if (!this.instant) return;
+    const render = this.scene.needsRender;
+    if (render) this.scene.render();
+    const { moving } = this.overlay;
+    if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
+    this.wasMoving = this.overlay.moving;
+    this.drawn = true;
+  }
+
+  /**
+   * What need not be fresh at every picture.
+   * @param {Meta} meta
+   * @param {Source} source
+   * @param {number} now ms
+   */
+  slow(meta, source, now) {
+    const began = performance.now();
+    if (source.grown) {
+      source.grown = false;
+      this.plots.refresh();
+    } else this.plots.writeValues();
+    this.header.show(meta, source);
+    this.toolbar.showLegend(this.instant);
+    this.transport.show(source, this.live);
+    // slow plots must not take more than a sixth of the time
+    this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
+  }
+}

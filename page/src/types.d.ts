@@ -1,0 +1,222 @@
+// What Python sends (gne_mj/view: scene.py, stage.py, replay.py, session.py, controls.py), and what
+// modules of the page expect of each other.
+
+/** An object of three.js, which comes inside meshcat's bundle and has no types. */
+export type Three = any;
+
+export type Numbers = Float64Array | Float32Array | Int32Array | Uint8Array;
+
+export interface Pack {
+  meta: any; // by its kind: Scene, Frame, ...
+  arrays: Record<string, { data: Numbers; shape: number[] }>;
+}
+
+export interface Quantity {
+  name: string;
+  long_name: string;
+  symbol: string; // TeX
+  unit: string;
+  labels: string[];
+  bound: (number | null)[] | null;
+  lower_bound: (number | null)[] | null;
+}
+
+export interface System {
+  name: string;
+  game: string;
+  agent_name: string;
+  agents: number;
+  information: string;
+  mode: string;
+  engine: string;
+  drawn_as: "bars" | "fleet";
+  action: { name: string; unit: string; owner: number[]; axis: string[] }; // owners from 1
+  quantities: Quantity[];
+  edges: [number, number][]; // agents from 1
+  edges_are: "measurements" | "messages";
+  links: [number, number][]; // [hearer, sender], from 1
+  message_period: number | null; // s; null if messages flow all the time
+  estimates: boolean;
+  anchors: number[]; // the item at which each robot is
+  height: number; // m
+  tints: string[][]; // paths of what has each agent's colour
+}
+
+export interface Control {
+  key: string;
+  label: string;
+  system: string;
+  unit: string;
+  value: number;
+  min: number;
+  max: number;
+  scale: "linear" | "log";
+}
+
+export interface Push {
+  system: string;
+  axes: string[];
+  unit: string;
+  force: number;
+  duration: number; // s
+}
+
+/** How a system's run stands, or how it ended. */
+export interface State {
+  status: string;
+  message?: string;
+  margin?: number | null;
+  margin_name?: string | null;
+  margin_time?: number | null; // s
+  exit_time?: number | null; // s
+}
+
+export interface Intervention {
+  time: number; // s
+  what: string;
+}
+
+export interface Scene {
+  title: string;
+  duration: number; // s
+  items: string[]; // paths of what has a pose, in the order of poses
+  systems: System[];
+  controls?: Control[]; // of a live page
+  pushes?: Push[];
+  outcome?: Record<string, State>; // of a replay
+  interventions?: Intervention[];
+  command_lengths?: number[];
+}
+
+export interface Frame {
+  time: number; // s
+  playing: boolean;
+  speed: number | null; // null: as fast as possible
+  pace: number | null;
+  ended: boolean;
+  state: Record<string, State>;
+}
+
+/** Everything at one time: of each system its arrays by their short names. */
+export interface Instant {
+  time: number; // s
+  poses: Numbers | undefined; // of 8 numbers an item: position, quaternion, length (0: hidden)
+  systems: Record<string, Record<string, Numbers | undefined>>;
+}
+
+/** What was simulated, for plots. */
+export interface Store {
+  time: number[];
+  column(array: string, k: number): (number | null)[];
+  greatest(array: string): number;
+}
+
+/** Where instants come from: a simulation that runs, or a replay, whose time is the page's own. */
+export interface Source {
+  store: Store;
+  seekable: boolean;
+  time: number; // s
+  end: number; // s, where the slider ends
+  playing: boolean;
+  speed: number | null;
+  pace: string; // in words
+  grown: boolean; // more samples are in the store than plots know of
+  exits: Record<string, number>; // when each system left the set, of those that did, s
+  interventions: Intervention[];
+  /** The instant to be drawn, if it is a new one. */
+  take(): Instant | null;
+  playPause(): void;
+  step(direction: number, second: boolean): void;
+  restart(): void;
+  setSpeed(speed: number | null): void;
+  seek(time: number): void;
+  advance(seconds: number): void;
+  stateOf(system: System): State;
+}
+
+/** An agent, from 0. */
+export interface Agent {
+  system: string;
+  agent: number;
+}
+
+export interface Follow {
+  kind: "fleet" | "agent" | "none";
+  system?: string;
+  agent?: number;
+}
+
+export type Point = number[]; // [x, y, z] in MuJoCo's coordinates, m
+
+/** A text beside what is drawn as bars. */
+export interface Text {
+  point: Point;
+  text: string;
+  shift?: number; // px down
+  align?: "center" | "left";
+  bold?: boolean;
+  bad?: boolean;
+  limit?: boolean;
+  title?: boolean;
+  chosen?: boolean;
+}
+
+/** The elements of index.html that scripts look for. */
+export interface Elements {
+  settings: HTMLScriptElement;
+  replay: HTMLScriptElement; // in a file from disk
+  title: HTMLElement;
+  chips: HTMLElement;
+  announcement: HTMLElement;
+  time: HTMLElement;
+  duration: HTMLElement;
+  pace: HTMLElement;
+  theme: HTMLButtonElement;
+  "help-open": HTMLButtonElement;
+  banner: HTMLElement;
+  "banner-text": HTMLElement;
+  "banner-show": HTMLButtonElement;
+  "banner-close": HTMLButtonElement;
+  lost: HTMLElement;
+  "lost-text": HTMLElement;
+  follow: HTMLSelectElement;
+  "follow-label": HTMLElement;
+  fit: HTMLButtonElement;
+  labels: HTMLButtonElement;
+  links: HTMLButtonElement;
+  ghosts: HTMLButtonElement;
+  "ghost-tools": HTMLElement;
+  "ghost-label": HTMLElement;
+  "ghost-agent": HTMLSelectElement;
+  tuning: HTMLDetailsElement;
+  "tuning-body": HTMLElement;
+  pane: HTMLElement;
+  overlay: HTMLCanvasElement;
+  waiting: HTMLElement;
+  ramp: HTMLElement;
+  unknown: HTMLElement;
+  "link-note": HTMLElement;
+  "ghost-note": HTMLElement;
+  divider: HTMLElement;
+  plots: HTMLElement;
+  restart: HTMLButtonElement;
+  back: HTMLButtonElement;
+  play: HTMLButtonElement;
+  step: HTMLButtonElement;
+  speed: HTMLSelectElement;
+  "time-track": HTMLElement;
+  "time-slider": HTMLInputElement;
+  "time-marks": HTMLElement;
+  fold: HTMLButtonElement;
+  notices: HTMLElement;
+  alerts: HTMLElement;
+  help: HTMLDialogElement;
+}
+
+declare global {
+  /** meshcat's bundle, a script of its own. */
+  const MeshCat: any;
+  interface Window {
+    gne: unknown;
+  }
+}
