@@ -18,7 +18,7 @@ from gne_mj.batches.summary import (
     refused_columns,
     span_of,
 )
-from gne_mj.errors import InfeasibleStart
+from gne_mj.errors import InfeasibleStart, part_of
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.batch import Case
 from gne_mj.loops.faults import SEED
@@ -113,7 +113,8 @@ class Runner:
             prepared = _Prepared(combination)
             system = combination.system
             if system is not None:
-                setup = system.setup(combination.clock)
+                with combination.scenario.naming(system.name), part_of("system", "clock"):
+                    setup = system.setup(combination.clock)
                 prepared = _Prepared(combination, key_of(system, combination.clock, setup), setup)
             self._prepared[number] = prepared
             while len(self._prepared) > _COMBINATIONS:
@@ -199,6 +200,6 @@ def _start(
     memory = system.law.initial_memory(
         y,
         initial.estimate,
-        None if filtered is None else per_action("initial.filtered", filtered, sizes),
+        None if filtered is None else per_action("filtered", filtered, sizes),
     )
     return state, memory

@@ -55,14 +55,10 @@ class Store:
             StorageError: it cannot be written, as on a full disk.
         """
         if os.path.lexists(folder):
-            raise InvalidInput(
-                "--out",
-                str(folder),
-                "it exists already; name a folder that does not, or add --resume to go on with it",
-            )
-        with storing("--out", folder):
+            raise InvalidInput("folder", str(folder), "it exists already; name one that does not")
+        with storing("folder", folder):
             folder.parent.mkdir(parents=True, exist_ok=True)
-        with written("--out", folder, replace=False) as new:
+        with written("folder", folder, replace=False) as new:
             new.mkdir()
             text = json.dumps(plan.manifest(), indent=2)
             (new / MANIFEST).write_text(text + "\n", encoding="utf-8")
@@ -119,7 +115,7 @@ class Store:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InvalidInput(
-                    "--out", str(self.folder), "another process is running this batch right now"
+                    "folder", str(self.folder), "another process is running this batch right now"
                 ) from None
             self._tidy()
             try:
@@ -217,10 +213,10 @@ def _manifest(folder: Path) -> dict[str, Any]:
         form = found["format"]
     except (OSError, ValueError, KeyError, TypeError):
         raise InvalidInput(
-            "DIR", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
+            "folder", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
         ) from None
     if form != FORMAT:
-        raise InvalidInput("DIR", str(folder), f"its format is {form}, not {FORMAT} as here")
+        raise InvalidInput("folder", str(folder), f"its format is {form}, not {FORMAT} as here")
     return found
 
 
@@ -329,15 +325,13 @@ def _schema(plan: Plan) -> tuple[Combination, Variables]:
         if kind not in known:
             known[kind] = _one_run(combination, plan.record)
     if first is None:
-        raise InvalidInput(
-            "initial.action", "given", "it is strictly inside in no combination of the sweep"
-        )
+        raise plan.nowhere_inside()
     shapes: dict[str, Any] = {}
     for variables in known.values():
         for name, (dimensions, like, _) in variables.items():
             if shapes.setdefault(name, (dimensions, like.shape)) != (dimensions, like.shape):
                 raise InvalidInput(
-                    "--sweep",
+                    "plan.sweeps",
                     ", ".join(sweep.key for sweep in plan.sweeps),
                     f"'{name}' must have the same shape in all combinations",
                 )
@@ -357,7 +351,9 @@ def _check_layout(first: Combination, other: Combination) -> None:
     ):
         if here != there:
             raise InvalidInput(
-                "--sweep", ", ".join(other.changes), f"all combinations must have the same {what}"
+                "plan.sweeps",
+                ", ".join(other.changes),
+                f"all combinations must have the same {what}",
             )
 
 
