@@ -45,9 +45,8 @@ def _name_flags(error: Any, parameters: list[Any]) -> None:
     What is expected may name some too, in backquotes.
     """
     flags = {
-        each.name: each.opts[0]
-        if each.opts[0].startswith("-")
-        else each.human_readable_name.strip("[]")
+        each.name: next((opt for opt in each.opts if opt.startswith("-")), None)
+        or (each.metavar or each.name).strip("[]").upper()
         for each in parameters
     }
 
