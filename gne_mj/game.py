@@ -360,7 +360,7 @@ class Game:
             if not self.tested:
                 raise
             words = f"its numbers leave those that can be computed with: {error}"
-            raise InvalidInput("parameters", self.name, words) from error
+            raise InvalidInput("game", self.name, words) from error
 
     def tightest(self, y: ArrayLike) -> tuple[int, float]:
         """The constraint with the greatest g_l(y) and that value (negative inside)."""

@@ -197,7 +197,7 @@ class Simulation:
         touched = {done["system"] for done in self.interventions}
         parts = {}
         for name, run in self._runs.items():
-            with part_of(f"systems.{name}.game"):
+            with part_of(f"systems.{name}"):
                 parts[name] = run.part(self.tolerance, interrupted, name in touched)
         return Trajectory.from_parts(
             parts,

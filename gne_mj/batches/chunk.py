@@ -94,7 +94,9 @@ class Runner:
                 runs = slice(done, done + int(np.sum(inside)))
                 done = runs.stop
                 part = outcome.part(runs)
-                columns.insert(0, columns_of(prepared.combination, span, part, self.plan.record))
+                combination = prepared.combination
+                with combination.scenario.naming(self.plan.name), part_of("system"):
+                    columns.insert(0, columns_of(combination, span, part, self.plan.record))
             order = np.argsort(np.argsort(~inside, kind="stable"), kind="stable")
             parts[prepared.combination.number] = rearranged(join(columns), order)
         return parts
