@@ -196,6 +196,25 @@ def test_of_a_batch(options, key, tmp_path):
     assert key in parameters(gne_mj.run_batch)
 
 
+def test_of_a_file_that_is_gone(tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    tables = {"systems": {"s": {
+        "game": {"type": "custom", "file": str(tmp_path / "own.py")},
+        "agents": {"type": "integrator", "count": 3},
+        "initial": {"action": 2.9},
+    }}}  # fmt: skip
+    plan = make_plan(tables)
+    (tmp_path / "own.py").unlink()
+    assert refused(plan.manifest).key == "scenario.systems.s.game.file"
+
+
+OWN = """
+from gne_mj.games import velocity_game
+def game(count):
+    return velocity_game(count, 3.0, 1.0)
+"""
+
+
 def test_of_a_batchs_folder(tmp_path):
     plan = make_plan("velocity-sync", {"plant.engine": "ode"})
     assert refused(Store.create, tmp_path, plan).key == "folder"
@@ -259,6 +278,30 @@ def test_the_key_of_a_file_is_named(name, changes, key):
     system = next(iter(load_scenario(name).systems))
     shared = key.split(".")[0] in ("simulation", "recording")
     assert error.key == (key if shared else f"systems.{system}.{key}")
+
+
+def test_of_a_game_of_ones_own_too(tmp_path):
+    (tmp_path / "own.py").write_text(OWN.replace("count, 3.0", "count + 1, 3.0"))
+    own = {"type": "custom", "file": str(tmp_path / "own.py")}
+    error = refused(lambda: load_scenario("velocity-sync", {"game": own}).simulation_object())
+    assert (error.key, error.value) == ("systems.robots.agents.count", 5)
+    (tmp_path / "own.py").write_text(OWN.replace("count, 3.0, 1.0", "count, 3.0, -1.0"))
+    error = refused(lambda: load_scenario("velocity-sync", {"game": own}).simulation_object())
+    assert error.key == "systems.robots.game.gap_bound"
+
+
+def test_what_is_called_with_a_scenarios_system_is_told_of_its_keys():
+    scenario = load_scenario("osnr", {"controller.mode": "continuous"})
+    (system,) = scenario.system_objects()
+    for search, key in (
+        (theory.search_period, "systems.channels.controller.mode"),
+        (lambda system, clock: system.closed_loop(Clock(1.0, 0.05, 0.05, 0.05)),
+         "simulation.timestep"),
+    ):  # fmt: skip
+        tried = replace(system, integrator="rk4")
+        with pytest.raises(Refusal) as caught, scenario.naming("channels"):
+            search(tried, scenario.clock())
+        assert caught.value.key == key
 
 
 def test_the_key_is_found_by_what_the_tables_declare():

@@ -345,14 +345,14 @@ def _whole(key: str, given: Any) -> int:
 def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:
     """Of the user's own files that a scenario names."""
     found = {}
-    for system in scenario["systems"].values():
-        for table in system.values():
+    for system, tables in scenario["systems"].items():
+        for key, table in tables.items():
             given = table.get("file", []) if isinstance(table, dict) else []
             for name in [given] if isinstance(given, str) else given:
                 try:
                     found[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
                 except OSError as error:
-                    raise InvalidInput(
-                        "file", name, f"it cannot be read: {error.strerror}"
-                    ) from None
+                    where = f"scenario.systems.{system}.{key}.file"
+                    why = f"it cannot be read: {error.strerror}"
+                    raise InvalidInput(where, name, why) from None
     return found
