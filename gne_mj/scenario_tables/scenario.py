@@ -133,7 +133,7 @@ class SystemTable(Table):
         | MixedAgents
         | MjcfAgents,
         Field(discriminator="type"),
-        Fills(""),
+        Fills(""),  # N is the game's too
     ]
     barrier: Annotated[BarrierTable, Fills("")] = BarrierTable()
     controller: Annotated[
