@@ -46,7 +46,7 @@ def _name_flags(error: Any, parameters: list[Any]) -> None:
     """
     flags = {
         each.name: next((opt for opt in each.opts if opt.startswith("-")), None)
-        or (each.metavar or each.name).strip("[]").upper()
+        or (each.metavar or each.name).upper()
         for each in parameters
     }
 

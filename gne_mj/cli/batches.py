@@ -33,7 +33,7 @@ def batch(
     source: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="A shipped scenario or a .toml file; with --resume it may be left out.",
         ),
     ] = None,

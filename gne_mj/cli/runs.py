@@ -20,7 +20,7 @@ def run(
     source: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="Name of a shipped scenario (see `scenarios`), or a .toml file.",
         ),
     ] = None,
