@@ -91,7 +91,7 @@ class FullyDistributed(Law):
         z = np.asarray(y if filtered is None else filtered, dtype=np.float64)
         if z.shape not in ((), y.shape):
             raise InvalidInput(
-                "initial.filtered",
+                "filtered",
                 f"shape {z.shape}",
                 f"it must be one number or a list of {len(y)}",
             )

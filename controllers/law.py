@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.controllers import settings
 from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
 from gne_mj.controllers.theorem import LawTheorem
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named
 from gne_mj.graph import Graph, GraphData
 
 _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
@@ -150,11 +150,9 @@ class Law(ABC):
             filtered: z(0), one number or (m,); y if left out.
         """
         if estimate is not None:
-            raise InvalidInput(
-                "initial.estimate", "given", f"the {self.information} law has no estimates"
-            )
+            raise InvalidInput("estimate", "given", f"the {self.information} law has no estimates")
         if filtered is not None:
-            raise InvalidInput("initial.filtered", "given", f"the {self.information} law has no z")
+            raise InvalidInput("filtered", "given", f"the {self.information} law has no z")
         return np.zeros(0)
 
     def barrier_profiles(
@@ -172,7 +170,8 @@ class Law(ABC):
         """What ``propagate`` needs for a control period in s."""
         if self.graph is None:
             return no_propagator()
-        return propagator(self.graph, self.estimate_rate * period)
+        with named(duration="period"):
+            return propagator(self.graph, self.estimate_rate * period)
 
 
 def check_positive(law: Law, *keys: str) -> None:
@@ -184,7 +183,7 @@ def check_positive(law: Law, *keys: str) -> None:
     for key in keys:
         value = getattr(law, key)
         if not (np.isfinite(value) and value > 0):
-            raise InvalidInput(f"controller.{key}", value, "it must be positive and finite")
+            raise InvalidInput(key, value, "it must be positive and finite")
 
 
 def initial_estimates(
@@ -196,7 +195,7 @@ def initial_estimates(
     try:
         given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
     except ValueError:
-        raise InvalidInput("initial.estimate", "lists of different lengths", expected) from None
+        raise InvalidInput("estimate", "lists of different lengths", expected) from None
     if given.shape not in ((), (m,), (agents, m)):
-        raise InvalidInput("initial.estimate", f"shape {given.shape}", expected)
+        raise InvalidInput("estimate", f"shape {given.shape}", expected)
     return np.broadcast_to(given, (agents, m)).astype(np.float64).ravel()

@@ -44,9 +44,10 @@ class PlainLaw(Law):
     ) -> None:
         if (rate is None) != (memory is None):
             raise InvalidInput(
-                "controller.file",
-                "rate and initial_memory",
-                "a law with a memory has both of these functions, a static law none",
+                "rate",
+                "no rate" if rate is None else "a rate",
+                "a law with a memory has both of these functions, rate and initial_memory, a static"
+                " law none",
             )
         self._game, self._action, self._rate, self._memory = game, action, rate, memory
         self.propagates = memory is None

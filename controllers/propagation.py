@@ -59,7 +59,7 @@ def propagator(graph: Graph, duration: float) -> Propagator:
         return Propagator(_dense(graph, duration), np.zeros(0), numbers)
     if half > _LONGEST:
         raise InvalidInput(
-            "simulation.control_period",
+            "duration",
             f"{duration:.3g} time constants of the estimates",
             f"{agents} agents on this graph allow at most {2.0 * _LONGEST / bound:.3g}",
         )

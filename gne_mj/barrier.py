@@ -41,15 +41,13 @@ class Schedule:
 
     def __post_init__(self) -> None:
         if self.kind not in SCHEDULES:
-            raise InvalidInput("barrier.schedule", self.kind, f"choose from {list(SCHEDULES)}")
+            raise InvalidInput("kind", self.kind, f"choose from {list(SCHEDULES)}")
         for key in ("floor", "time_constant"):
             value = getattr(self, key)
             if not (np.isfinite(value) and value > 0):
-                raise InvalidInput(f"barrier.{key}", value, "it must be positive and finite")
+                raise InvalidInput(key, value, "it must be positive and finite")
         if self.floor > self.start:
-            raise InvalidInput(
-                "barrier.floor", self.floor, f"it must not exceed rho(0), {self.start:g}"
-            )
+            raise InvalidInput("floor", self.floor, f"it must not exceed rho(0), {self.start:g}")
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -82,7 +80,7 @@ class LogBarrier:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rho) and self.rho > 0):
-            raise InvalidInput("barrier.rho", self.rho, "it must be positive and finite")
+            raise InvalidInput("rho", self.rho, "it must be positive and finite")
 
     def margin(self, y: ArrayLike) -> float:
         """min_l -g_l(y): positive strictly inside, in the constraints' own units."""

@@ -44,10 +44,10 @@ def check_room(key: str, value: object, numbers: float, what: str, most: int = M
         )
 
 
-def check_count(option: str, value: int, most: int) -> None:
-    """Refuse a count beyond ``most``."""
+def check_count(key: str, value: int, most: int, what: str = "it") -> None:
+    """Refuse a count beyond ``most``, of what the value makes so many."""
     if value > most:
-        raise InvalidInput(option, value, f"it must be at most {most}")
+        raise InvalidInput(key, value, f"{what} must be at most {most}")
 
 
 # More parts of one dotted TOML key than DEEPEST: reading them takes time by their number's square

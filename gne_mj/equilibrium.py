@@ -79,7 +79,7 @@ def penalised_equilibrium(
     """
     rho = float(rho)
     if not 0.0 < rho < np.inf:
-        raise InvalidInput("barrier.rho", rho, "it must be positive and finite")
+        raise InvalidInput("rho", rho, "it must be positive and finite")
     first = max(start.rho, rho) if isinstance(start, Equilibrium) else 0.0
     return _solver(game).follow(start, Path(first, rho, tolerance, tolerance, False))
 
@@ -167,7 +167,7 @@ class Solver:
         position, self._half_band = order(game)
         if not m * float(self._half_band) ** 2 <= MOST_WORK:
             raise InvalidInput(
-                "agents.count",
+                "game.agents",
                 game.agents,
                 f"the {game.name} game couples up to {self._half_band} actions with each other,"
                 " which is too much work for its equilibria",

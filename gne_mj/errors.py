@@ -2,7 +2,8 @@
 
 import difflib
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import CodeType
@@ -30,22 +31,41 @@ class GneError(Exception):
         return error
 
 
-class InvalidInput(GneError, ValueError):
-    """A value that cannot be used: names the key, the value and what would be right.
+class Refusal(GneError, ValueError):
+    """What was given cannot be used.
 
     Attributes:
-        key: dotted name of the offending entry.
+        key: which parameter of the function or class that was called; what is within it behind
+            dots, as in "faults.0.agents". Errors of a scenario's file have its dotted key, and
+            those of the command line the flag, since these layers name anew (:func:`renaming`).
+        about: the rest of the sentence.
+    """
+
+    def __init__(self, key: str, about: str) -> None:
+        super().__init__(f"{one_line(key, LONGEST_VALUE)}: {about}")
+        self.key, self.about = key, about
+
+    def rename(self, key: str, about: str | None = None) -> None:
+        """Name by another key what was refused, and say other words about it if there are any."""
+        self.__dict__ |= {"key": key, "about": about or self.about}
+        self.args = (one_line(f"{one_line(key, LONGEST_VALUE)}: {self.about}"),)
+
+
+class InvalidInput(Refusal):
+    """A value that cannot be used: names the parameter, the value and what would be right.
+
+    Attributes:
         value: what was given.
         expected: what would be right.
     """
 
     def __init__(self, key: str, value: object, expected: str) -> None:
-        self.key, self.value, self.expected = key, value, expected
+        self.value, self.expected = value, expected
         given = "nothing is given" if value is None else f"got {shown(value)}"
-        super().__init__(f"{one_line(key, LONGEST_VALUE)}: {given}, but {expected}")
+        super().__init__(key, f"{given}, but {expected}")
 
 
-class InfeasibleStart(GneError, ValueError):
+class InfeasibleStart(Refusal):
     """An initial action (or estimate) on or outside the boundary of the shared constraint set.
 
     Attributes:
@@ -55,13 +75,51 @@ class InfeasibleStart(GneError, ValueError):
 
     status = "infeasible_start"
 
-    def __init__(self, system: str, what: str, constraint: str, value: float) -> None:
-        self.system, self.constraint, self.value = system, constraint, value
+    def __init__(self, key: str, what: str, constraint: str, value: float) -> None:
+        self.constraint, self.value = constraint, value
         super().__init__(
-            f"{system}: the {what} must lie strictly inside the constraint set, but constraint"
+            key,
+            f"the {what} must lie strictly inside the constraint set, but constraint"
             f" '{constraint}' has g = {value + 0.0:.6g} (margin {0.0 - value:.6g}); it must be"
-            " negative"
+            " negative",
         )
+
+
+@contextmanager
+def renaming(name: Callable[[str], str]) -> Iterator[None]:
+    """Let what is refused within be named as whoever called knows it: ``name(key)``."""
+    try:
+        yield
+    except Refusal as error:
+        error.rename(name(error.key))
+        raise
+
+
+@contextmanager
+def part_of(owner: str, *others: str) -> Iterator[None]:
+    """Name what is refused within as a part of ``owner``, but for ``others`` that stand beside it.
+
+    >>> with part_of("system", "clock"):
+    ...     raise InvalidInput("mode", "continuous", "it must be 'sampled'")  # system.mode
+    """
+    beside = (owner, *others)
+    with renaming(lambda key: key if key.split(".")[0] in beside else f"{owner}.{key}"):
+        yield
+
+
+@contextmanager
+def named(**parameters: str) -> Iterator[None]:
+    """Name by other parameters what is refused within, by what they are called there.
+
+    One whose name is empty is left out before what is a part of it.
+    """
+
+    def name(key: str) -> str:
+        head, dot, rest = key.partition(".")
+        return f"{parameters.get(head, head)}{dot}{rest}".removeprefix(".")
+
+    with renaming(name):
+        yield
 
 
 class UserCodeError(GneError, RuntimeError):

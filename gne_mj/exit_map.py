@@ -53,15 +53,15 @@ class Grid:
             values = np.asarray(getattr(self, key), dtype=np.float64)
             lowest = 0.0 if key == "pushes" else np.nextafter(0.0, 1.0)
             if not len(values) or not np.all(np.isfinite(values)) or np.any(values < lowest):
-                raise InvalidInput(f"--{key}", list(values), "every entry must be positive")
+                raise InvalidInput(key, list(values), "every entry must be positive")
         if np.any(np.asarray(self.margins) >= 1.0):
-            raise InvalidInput("--margins", self.margins, "they are shares, below 1")
+            raise InvalidInput("margins", self.margins, "they are shares, below 1")
         for key in ("runs", "duration"):
             if not 0 < getattr(self, key) < np.inf:
-                raise InvalidInput(f"--{key}", getattr(self, key), "it must be positive")
+                raise InvalidInput(key, getattr(self, key), "it must be positive")
         if self.seed < 0:
-            raise InvalidInput("--seed", self.seed, "it must not be negative")
-        check_count("--runs: all together", self.total, MOST_RUNS)
+            raise InvalidInput("seed", self.seed, "it must not be negative")
+        check_count("runs", self.total, MOST_RUNS, "all together")
 
     @property
     def cells(self) -> int:

@@ -40,6 +40,7 @@ class Fault(ABC):
     kind: ClassVar[int]
     # The field that says how much, and between which values it may be; None if there is none
     measure: ClassVar[tuple[str, float, float] | None] = None
+    needs_graph: ClassVar[str] = ""  # why it strikes only laws with a graph; empty if it does not
     agents: tuple[int, ...] | None = None
     start: float = 0.0
     end: float = np.inf
@@ -47,14 +48,12 @@ class Fault(ABC):
     def __post_init__(self) -> None:
         if not 0.0 <= self.start < self.end:
             raise InvalidInput(
-                "faults.end", self.end, f"it must be later than the start, {self.start:g} s"
+                "end", self.end, f"it must be later than the start, {self.start:g} s"
             )
         if self.measure is not None:
             key, low, high = self.measure
             if not low <= self.size <= high:
-                raise InvalidInput(
-                    f"faults.{key}", self.size, f"it must be between {low:g} and {high:g}"
-                )
+                raise InvalidInput(key, self.size, f"it must be between {low:g} and {high:g}")
 
     @property
     def size(self) -> float:
@@ -71,9 +70,7 @@ class Fault(ABC):
         agents = range(game.agents) if self.agents is None else self.agents
         for agent in agents:
             if not 0 <= agent < game.agents:
-                raise InvalidInput(
-                    "faults.agents", agent + 1, f"agents are numbered 1 to {game.agents}"
-                )
+                raise InvalidInput("agents", agent + 1, f"agents are numbered 1 to {game.agents}")
         at = game.data.offsets
         return [r for i in agents for r in range(at[i], at[i + 1])]
 
@@ -100,9 +97,9 @@ class Push(Fault):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.profile not in SHAPES:
-            raise InvalidInput("faults.profile", self.profile, f"choose from {', '.join(SHAPES)}")
+            raise InvalidInput("profile", self.profile, f"choose from {', '.join(SHAPES)}")
         if not 0.0 < self.period < np.inf:
-            raise InvalidInput("faults.period", self.period, "it must be positive and finite")
+            raise InvalidInput("period", self.period, "it must be positive and finite")
 
     def targets(self, game: Game, graph: Graph | None) -> list[int]:
         """Those entries of the agents' actions."""
@@ -110,9 +107,7 @@ class Push(Fault):
         if self.axis is None:
             return entries
         if not 0 <= self.axis < min(game.sizes):
-            raise InvalidInput(
-                "faults.axis", self.axis + 1, f"actions have {min(game.sizes)} entries"
-            )
+            raise InvalidInput("axis", self.axis + 1, f"actions have {min(game.sizes)} entries")
         at, owner = game.data.offsets, game.agent_of_action
         return [r for r in entries if r - at[owner[r]] == self.axis]
 
@@ -175,10 +170,10 @@ class SensorDelay(Fault):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.agents is not None or self.start > 0.0 or np.isfinite(self.end):
-            raise InvalidInput(
-                "faults.type", "sensor-delay", "it holds for all agents and for the whole run"
-            )
+        for key, whole in (("agents", None), ("start", 0.0), ("end", np.inf)):
+            given = getattr(self, key)
+            if given != whole:
+                raise InvalidInput(key, given, "sensors are late for all agents and a whole run")
 
 
 @dataclass(frozen=True)
@@ -189,19 +184,18 @@ class _OnLinks(Fault):
         edges: pairs of agents, numbered from 0, both directions.
     """
 
+    needs_graph = "the full-information law sends no messages"
     edges: tuple[tuple[int, int], ...] | None = None
 
     def targets(self, game: Game, graph: Graph | None) -> list[int]:
         """The links it strikes: entries of the graph's neighbour lists."""
         if graph is None:
-            raise InvalidInput(
-                "faults.type", type(self).__name__, "the full-information law sends no messages"
-            )
+            raise InvalidInput("graph", None, self.needs_graph)
         super().targets(game, graph)
         known = set(graph.edges)
         for i, j in self.edges or ():
             if (min(i, j), max(i, j)) not in known:
-                raise InvalidInput("faults.edges", [i + 1, j + 1], "the graph has no such edge")
+                raise InvalidInput("edges", [i + 1, j + 1], "the graph has no such edge")
         everyone = self.agents is None and self.edges is None
         struck = {frozenset(edge) for edge in self.edges or ()}
         whom = set(self.agents or ())
@@ -258,14 +252,13 @@ class Corruption(Fault):
 
     kind: ClassVar[int] = native.CORRUPTION
     measure = ("amplitude", 0.0, LARGEST)
+    needs_graph = "the full-information law has no estimates"
     amplitude: float = 0.0
 
     def targets(self, game: Game, graph: Graph | None) -> list[int]:
         """The agents themselves."""
         if graph is None:
-            raise InvalidInput(
-                "faults.type", "estimate-corruption", "the full-information law has no estimates"
-            )
+            raise InvalidInput("graph", None, self.needs_graph)
         super().targets(game, graph)
         return list(range(game.agents) if self.agents is None else self.agents)
 

@@ -66,7 +66,7 @@ def refuse_existing(key: str, paths: Iterable[Path]) -> None:
     for path in paths:
         if os.path.lexists(path):
             raise InvalidInput(
-                key, str(path), "it exists already; name another one, or ask for --replace"
+                key, str(path), "it exists already; name another one, or give `replace`"
             )
 
 

@@ -162,38 +162,38 @@ class Game:
     def _check(self) -> None:
         count = len(self.sizes)
         if not count or any(size < 1 for size in self.sizes):
-            raise InvalidInput("game.sizes", self.sizes, "it must list a positive size an agent")
+            raise InvalidInput("sizes", self.sizes, "it must list a positive size an agent")
         if len(self.in_cost) != count:
             raise InvalidInput(
-                "game.in_cost", f"{len(self.in_cost)} lists", f"there must be {count}, one an agent"
+                "in_cost", f"{len(self.in_cost)} lists", f"there must be {count}, one an agent"
             )
         constraints = len(self.in_constraint)
         if not constraints or len(self.constraint_names) != constraints:
             raise InvalidInput(
-                "game.in_constraint",
+                "in_constraint",
                 f"{constraints} lists and {len(self.constraint_names)} constraint_names",
                 "there must be as many of both, and at least one",
             )
-        check_count("agents.count: the actions of all", sum(self.sizes), MOST_ACTIONS)
-        check_count("game.in_constraint: the constraints", constraints, MOST_ACTIONS)
+        check_count("sizes", sum(self.sizes), MOST_ACTIONS, "the actions of all")
+        check_count("in_constraint", constraints, MOST_ACTIONS, "the constraints")
         for key in ("in_cost", "in_constraint"):
-            check_count(f"game.{key}: the agents", sum(map(len, getattr(self, key))), MOST_MEMBERS)
+            check_count(key, sum(map(len, getattr(self, key))), MOST_MEMBERS, "all agents in it")
             for members in getattr(self, key):
                 inside = min(members, default=0) >= 0 and max(members, default=0) < count
                 if not inside or len(set(members)) != len(members):
                     raise InvalidInput(
-                        f"game.{key}",
+                        key,
                         list(members),
                         f"agents are numbered from 0 to {count - 1}, each at most once in a list",
                     )
         if not all(len(members) for members in self.in_constraint):
-            raise InvalidInput("game.in_constraint", [], "every constraint contains an agent")
+            raise InvalidInput("in_constraint", [], "every constraint contains an agent")
 
     def _check_declarations(self) -> None:
         m, p = sum(self.sizes), len(self.in_constraint)
         if self.constraint_class not in (None, *CLASSES):
             raise InvalidInput(
-                "game.constraint_class",
+                "constraint_class",
                 self.constraint_class,
                 f"it must be one of {', '.join(CLASSES)}, or None",
             )
@@ -201,20 +201,20 @@ class Game:
             shapes = [np.shape(bound) for bound in self.box]
             if shapes != [(m,), (m,)] or not np.all(np.less(*self.box)):
                 raise InvalidInput(
-                    "game.box",
+                    "box",
                     self.box,
                     f"it must be (lower, upper), each of {m} numbers, lower below upper",
                 )
         bounds = self.gap_bounds
         if bounds is not None and (np.shape(bounds) != (p,) or not np.all(np.asarray(bounds) > 0)):
             raise InvalidInput(
-                "game.gap_bounds", bounds, f"it must list {p} positive numbers, one a constraint"
+                "gap_bounds", bounds, f"it must list {p} positive numbers, one a constraint"
             )
         if self.affine_constraints is not None and (
             bounds is None or self.affine_constraints != 2 * p
         ):
             raise InvalidInput(
-                "game.affine_constraints",
+                "affine_constraints",
                 self.affine_constraints,
                 f"it goes with gap_bounds, where {p} bounds on gaps of one entry are {2 * p} affine"
                 " constraints",
@@ -373,7 +373,7 @@ class Game:
 
     def _matrix(self, rows: int) -> NDArray[np.float64]:
         size = rows * self.actions
-        check_room("agents.count", self.agents, size, f"a matrix of the {self.name} game")
+        check_room("agents", self.agents, size, f"a matrix of the {self.name} game")
         return np.zeros((rows, self.actions))
 
     def _profile(self, y: ArrayLike) -> NDArray[np.float64]:

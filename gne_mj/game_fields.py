@@ -83,7 +83,7 @@ def real(value: Any) -> NDArray[np.float64] | None:
 
 def _need(game: Any, key: str, holds: bool, expected: str) -> None:
     if not holds:
-        raise InvalidInput(f"game.{key}", f"{getattr(game, key)!r:.60}", expected)
+        raise InvalidInput(key, f"{getattr(game, key)!r:.60}", expected)
 
 
 def _need_pair(game: Any, key: str, shape: tuple[int, ...]) -> None:

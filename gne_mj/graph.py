@@ -45,10 +45,10 @@ class Graph:
         for i, j in self.edges:
             if not (0 <= i < self.agents and 0 <= j < self.agents):
                 raise InvalidInput(
-                    "controller.graph", [i + 1, j + 1], f"agents are numbered 1 to {self.agents}"
+                    "edges", [i + 1, j + 1], f"agents are numbered 1 to {self.agents}"
                 )
             if i == j:
-                raise InvalidInput("controller.graph", [i + 1, j + 1], "an edge joins two agents")
+                raise InvalidInput("edges", [i + 1, j + 1], "an edge joins two agents")
             unique.add((min(i, j), max(i, j)))
         object.__setattr__(self, "edges", tuple(sorted(unique)))
         parts, label = connected_components(self.adjacency, directed=False)
@@ -56,7 +56,7 @@ class Graph:
             apart = [int(i) + 1 for i in np.flatnonzero(label != label[0])]
             shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
             raise InvalidInput(
-                "controller.graph",
+                "edges",
                 f"{len(self.edges)} edges in {parts} parts",
                 f"the graph must be connected; agent 1 cannot reach"
                 f" agent{'s' if len(apart) > 1 else ''} {shown}",
@@ -131,7 +131,7 @@ def ring(agents: int) -> Graph:
 
 def complete(agents: int) -> Graph:
     """Everyone hears everyone: up to 1,000 agents."""
-    check_count("controller.graph: the edges", agents * (agents - 1) // 2, MOST_EDGES)
+    check_count("agents", agents * (agents - 1) // 2, MOST_EDGES, "the edges of a complete graph")
     return Graph(agents, tuple((i, j) for i in range(agents) for j in range(i + 1, agents)))
 
 
@@ -158,7 +158,7 @@ def caption(agents: int = 10) -> Graph:
 
 def _ten_channels(name: str, edges: Sequence[tuple[int, int]], agents: int) -> Graph:
     if agents != 10:
-        raise InvalidInput("controller.graph", name, f"this graph has 10 agents, not {agents}")
+        raise InvalidInput("agents", agents, f"the graph '{name}' has 10 agents")
     return Graph(10, tuple((i - 1, j - 1) for i, j in edges))
 
 

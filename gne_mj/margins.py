@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_HELD, check_count
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named
 from gne_mj.game import Game
 from gne_mj.plants import mixed
 from gne_mj.plants.agents import Agents, input_columns
@@ -42,9 +42,9 @@ class Disturbance:
         for key in ("push", "noise"):
             value = np.asarray(getattr(self, key), dtype=np.float64)
             if np.any(value < 0) or not np.all(np.isfinite(value)):
-                raise InvalidInput(f"margin.{key}", value, "it must be finite and not negative")
+                raise InvalidInput(key, value, "it must be finite and not negative")
         if self.delay < 0:
-            raise InvalidInput("margin.delay", self.delay, "it must not be negative")
+            raise InvalidInput("delay", self.delay, "it must not be negative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +86,11 @@ def influence(
     """
     if not hasattr(agents.kind, "rate"):
         raise InvalidInput(
-            "margin",
+            "agents",
             agents.kind.NAME,
             "margins follow from the agents' ODE, and of these robots none is known",
         )
-    check_count("simulation.control_period: its timesteps", period * (delay + 1), MOST_HELD)
+    check_count("period", period * (delay + 1), MOST_HELD, "the timesteps looked ahead over")
     gains = np.zeros((3, agents.channels))
     known: dict[bytes, tuple[float, float, float]] = {}
     exact = True
@@ -125,7 +125,7 @@ def tightening(game: Game, error: Array) -> Array:
             change = float(np.sqrt(error @ form @ error))
             if change >= bound:
                 raise InvalidInput(
-                    "margin",
+                    "error",
                     f"{change:.4g} of '{game.constraint_names[k]}'",
                     f"disturbances could use up all of the bound, {bound:g}; a shorter control"
                     " period or smaller disturbances leave room",
@@ -134,7 +134,7 @@ def tightening(game: Game, error: Array) -> Array:
         return t
     if not is_affine(game, y):
         raise InvalidInput(
-            "margin", game.name, "margins are computed for affine constraints and bounds on gaps"
+            "game", game.name, "margins are computed for affine constraints and bounds on gaps"
         )
     return np.abs(game.constraint_jacobian(y)) @ error
 
@@ -155,7 +155,7 @@ def is_affine(game: Game, y: Array) -> bool:
 def with_margin(
     game: Game,
     agents: Agents,
-    bound: Disturbance,
+    disturbance: Disturbance,
     timestep: float,
     integrator: str,
     period: int,
@@ -165,8 +165,9 @@ def with_margin(
     Raises:
         InvalidInput: as :func:`influence` and :func:`tightening`.
     """
-    effect = influence(agents, timestep, integrator, period, bound.delay)
-    return game.tightened(tightening(game, effect.of(bound)))
+    with named(error="disturbance"):
+        effect = influence(agents, timestep, integrator, period, disturbance.delay)
+        return game.tightened(tightening(game, effect.of(disturbance)))
 
 
 def of_the_set(game: Game) -> Game:

@@ -222,15 +222,15 @@ def is_plain(module: ModuleType) -> bool:
         if name not in found:
             if not natives and name in _OPTIONAL:
                 continue
-            raise InvalidInput("game.kernels", file, f"it must define {_call(name, arguments)}")
+            raise InvalidInput("kernels", file, f"it must define {_call(name, arguments)}")
         if natives and name not in natives:
             raise InvalidInput(
-                "game.kernels",
+                "kernels",
                 file,
                 f"its '{natives[0]}' is a kernel and its '{name}' is not; mark all six functions"
                 " with @kernel, or none",
             )
-        check_arguments("game.kernels", file, found[name], name, arguments)
+        check_arguments("kernels", file, found[name], name, arguments)
     return not natives
 
 

@@ -37,9 +37,7 @@ class Quantity:
 
     def __post_init__(self) -> None:
         if self.each not in ("", "agent", "constraint"):
-            raise InvalidInput(
-                f"game.quantities.{self.name}", self.each, "it must be 'agent', 'constraint' or ''"
-            )
+            raise InvalidInput("each", self.each, "it must be 'agent', 'constraint' or ''")
 
     def at(self, profiles: NDArray[np.float64], entries: tuple[int, ...]) -> NDArray[np.float64]:
         """The values at profiles (samples, m), of shape (samples, *entries).
@@ -50,7 +48,7 @@ class Quantity:
         values = np.asarray(self.values(profiles), dtype=np.float64)
         if values.shape != (len(profiles), *entries):
             raise InvalidInput(
-                f"game.quantities.{self.name}",
+                "values",
                 values.shape,
                 f"its values at {len(profiles)} profiles must be {(len(profiles), *entries)}",
             )
@@ -62,15 +60,12 @@ class Quantity:
         Raises:
             InvalidInput: a bound that is neither one number nor of that shape.
         """
-        given = {f"{self.name}_bound": self.bound, f"{self.name}_lower_bound": self.lower_bound}
         bounds = {}
-        for name, value in given.items():
+        for key, value in (("bound", self.bound), ("lower_bound", self.lower_bound)):
             if value is None:
                 continue
             array = np.asarray(value, dtype=np.float64)
             if array.shape not in ((), entries):
-                raise InvalidInput(
-                    f"game.quantities.{name}", array.shape, f"it must be one number or {entries}"
-                )
-            bounds[name] = np.broadcast_to(array, entries).copy()
+                raise InvalidInput(key, array.shape, f"it must be one number or {entries}")
+            bounds[f"{self.name}_{key}"] = np.broadcast_to(array, entries).copy()
         return bounds

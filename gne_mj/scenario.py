@@ -42,7 +42,7 @@ def load_scenario(
         InvalidInput: names the key, the value and what would be right.
     """
     if isinstance(source, Mapping):
-        check_nesting("scenario", source)
+        check_nesting("source", source)
         tables = json.loads(json.dumps(source))
     else:
         tables = _read(source)
@@ -52,8 +52,8 @@ def load_scenario(
         _change(tables, key, value)
     systems = tables.get("systems")
     if isinstance(systems, Mapping):
-        check_count("systems: their number", len(systems), MOST_SYSTEMS)
-    _check_text("scenario", tables)
+        check_count("systems", len(systems), MOST_SYSTEMS, "their number")
+    _check_text("source", tables)
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:
@@ -84,22 +84,22 @@ def _read(source: str | Path) -> dict[str, Any]:
     path = Path(source)
     if path.suffix != ".toml":
         raise InvalidInput(
-            "scenario",
+            "source",
             str(source),
             f"it must name a file ending in .toml; {nearest(str(source), names)}",
         )
     try:
         contents = read_file(path)
-        check_text("scenario", contents)
+        check_text("source", contents)
         tables = tomllib.loads(contents.decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise InvalidInput("scenario", str(source), f"it cannot be read: {reason}") from None
+        raise InvalidInput("source", str(source), f"it cannot be read: {reason}") from None
     except RecursionError:
-        raise InvalidInput("scenario", str(source), "it is nested too deeply") from None
+        raise InvalidInput("source", str(source), "it is nested too deeply") from None
     except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
-        raise InvalidInput("scenario", str(source), f"it is not valid TOML: {error}") from None
-    check_nesting("scenario", tables)
+        raise InvalidInput("source", str(source), f"it is not valid TOML: {error}") from None
+    check_nesting("source", tables)
     return _resolve(tables, path.parent)
 
 
@@ -120,7 +120,7 @@ def _check_text(key: str, value: Any) -> None:
     """Refuse what is not UTF-8, as a file's name can be: results keep the scenario as text."""
     if isinstance(value, Mapping):
         for name, entry in value.items():
-            _check_text(str(name) if key == "scenario" else f"{key}.{name}", entry)
+            _check_text(str(name) if key == "source" else f"{key}.{name}", entry)
     elif isinstance(value, list):
         for entry in value:
             _check_text(key, entry)
@@ -183,7 +183,7 @@ def _first(error: ValidationError) -> InvalidInput:
     details = error.errors()
     detail = details[0]
     if not detail["loc"]:
-        return InvalidInput("scenario", list(detail["input"]), detail["msg"])
+        return InvalidInput("source", list(detail["input"]), detail["msg"])
     if detail["loc"][-1] in ("float", "str") and isinstance(detail["input"], list):
         # of "one number, a list of them or a list of lists" the user meant what goes deepest
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]

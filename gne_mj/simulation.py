@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_RECORDED, check_room
 from gne_mj.certificate import Certificate, certify_run
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
@@ -80,11 +80,15 @@ class Simulation:
             raise InvalidInput("systems", names, "there must be systems, with different names")
         check_recording(systems, clock)
         for system in systems:
-            check_names(system, declared(system))
+            with named(system=f"systems.{system.name}"):
+                check_names(system, declared(system))
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
         self.interventions: list[dict[str, Any]] = []
-        self._runs = {system.name: SystemRun(system, clock) for system in systems}
+        self._runs: dict[str, SystemRun] = {}
+        for system in systems:
+            with part_of(f"systems.{system.name}", "clock"):
+                self._runs[system.name] = SystemRun(system, clock)
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -132,7 +136,8 @@ class Simulation:
         Raises:
             InvalidInput: a step that the new numbers do not allow; nothing has changed then.
         """
-        self._runs[system.name].change(system)
+        with part_of("system", "clock"):
+            self._runs[system.name].change(system)
         self._note(system.name, what, about)
 
     def push(self, system: str, channel: int, force: float, duration: float) -> None:
@@ -149,7 +154,7 @@ class Simulation:
         """
         run = self._runs[system]
         if not run.inside:
-            raise InvalidInput("push", system, "it must not have left its set")
+            raise InvalidInput("system", system, "it must not have left its set")
         run.push(channel, force, max(1, self.clock.steps(duration)))
         game = run.system.game
         agent, axis = int(game.agent_of_action[channel]) + 1, game.axis_of_action[channel]
@@ -194,11 +199,12 @@ class Simulation:
             interrupted: the user stopped the run.
         """
         touched = {done["system"] for done in self.interventions}
+        parts = {}
+        for name, run in self._runs.items():
+            with part_of(f"systems.{name}"):
+                parts[name] = run.part(self.tolerance, interrupted, name in touched)
         return Trajectory.from_parts(
-            {
-                name: run.part(self.tolerance, interrupted, name in touched)
-                for name, run in self._runs.items()
-            },
+            parts,
             seed=self.seed,
             source=self.source,
             wall_time=sum(run.wall_time for run in self._runs.values()),
@@ -211,7 +217,7 @@ def check_recording(systems: Sequence[System], clock: Clock) -> None:
     rows = clock.steps(clock.duration) // clock.steps(clock.sample_period) + 2
     numbers = sum(system.recorded for system in systems)
     what = f"{rows} samples of {numbers} numbers"
-    check_room("recording.period", clock.sample_period, rows * numbers, what, MOST_RECORDED)
+    check_room("clock.sample_period", clock.sample_period, rows * numbers, what, MOST_RECORDED)
 
 
 class SystemRun:

@@ -18,7 +18,7 @@ from gne_mj.equilibrium import (
     penalised_equilibrium,
     variational_equilibrium,
 )
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, part_of
 from gne_mj.game import Game
 from gne_mj.margins import of_the_set
 from gne_mj.optimality import FLAT, Optimality, examine
@@ -109,6 +109,7 @@ class Solution:
         }
 
 
+@part_of("system", "rhos", "path_rhos")
 @np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def solve_system(
     system: System, rhos: Sequence[float] = (), path_rhos: Sequence[float] = ()
@@ -124,6 +125,10 @@ def solve_system(
         InvalidInput: a rho that is not positive and finite.
         SolverError: an equilibrium was not found.
     """
+    for key, given in (("rhos", rhos), ("path_rhos", path_rhos)):
+        for rho in given:
+            if not 0.0 < rho < np.inf:
+                raise InvalidInput(key, rho, "it must be positive and finite")
     game, start = system.game, system.start
     penalised = [penalised_equilibrium(game, rho, start) for rho in rhos or (system.rho,)]
     variational = variational_equilibrium(of_the_set(game), penalised[0])
@@ -140,7 +145,7 @@ def solve_system(
     )
 
 
-def parse_path(text: str, option: str = "--path") -> list[float]:
+def parse_path(text: str) -> list[float]:
     """FROM:TO:COUNT as that many positive numbers at equal ratios.
 
     Raises:
@@ -155,7 +160,7 @@ def parse_path(text: str, option: str = "--path") -> list[float]:
         right = False
     if not right:
         raise InvalidInput(
-            option, text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive numbers and"
+            "text", text, "it must read FROM:TO:COUNT, e.g. 1:1e-6:13 (two positive numbers and"
             f" how many, from 2 to {MOST_POINTS})",
         )  # fmt: skip
     return np.geomspace(first, last, count).tolist()

@@ -21,7 +21,7 @@ from typing import Any
 
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
-from gne_mj.errors import USER_MODULES, GneError, InvalidInput, raised
+from gne_mj.errors import USER_MODULES, GneError, InvalidInput, named, raised
 from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.native import is_kernel
@@ -48,17 +48,15 @@ def load_game(path: str | Path, count: int, parameters: Mapping[str, Any]) -> Ga
     Raises:
         InvalidInput: the file cannot be read or run, or makes no game for these parameters.
     """
-    module = _load(path, "game.file")
+    module = _load(path)
     if not callable(getattr(module, "game", None)):
-        raise InvalidInput("game.file", str(path), "it must define a function game(count, ...)")
-    game = _make("game.parameters", parameters, partial(module.game, count, **parameters))
+        raise InvalidInput("path", str(path), "it must define a function game(count, ...)")
+    game = _make(parameters, partial(module.game, count, **parameters))
     if not isinstance(game, Game):
-        raise InvalidInput("game.file", str(path), "its function game must return a gne_mj Game")
+        raise InvalidInput("path", str(path), "its function game must return a gne_mj Game")
     if game.agents != count:
         raise InvalidInput(
-            "game.file",
-            str(path),
-            f"its game has {game.agents} agents, but agents.count is {count}",
+            "count", count, f"the game of {Path(path).name} has {game.agents} agents"
         )
     return game
 
@@ -71,28 +69,23 @@ def load_law(
     Raises:
         InvalidInput: the file cannot be read or run, or makes no law for these parameters.
     """
-    module = _load(path, "controller.file")
+    module = _load(path)
     if callable(getattr(module, "law", None)):
-        law = _make(
-            "controller.parameters", parameters, partial(module.law, game, graph, **parameters)
-        )
+        law = _make(parameters, partial(module.law, game, graph, **parameters))
         if not isinstance(law, Law):
-            raise InvalidInput("controller.file", str(path), "its function law must return a Law")
+            raise InvalidInput("path", str(path), "its function law must return a Law")
         _check_law(law, Path(path).name)
         return law
     if not callable(getattr(module, "action", None)):
-        raise InvalidInput(
-            "controller.file", str(path), "it must define law(game, graph, ...) or action(...)"
-        )
+        raise InvalidInput("path", str(path), "it must define law(game, graph, ...) or action(...)")
     functions = {}
     for name, arguments in _LAW_FUNCTIONS.items():
         if hasattr(module, name):
             function = getattr(module, name)
-            check_arguments(
-                "controller.file", Path(path).name, function, name, arguments, parameters
-            )
+            check_arguments("path", Path(path).name, function, name, arguments, parameters)
             functions[name] = partial(function, **parameters)
-    return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
+    with named(rate="path"):
+        return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
 
 
 def _check_law(law: Law, file: str) -> None:
@@ -100,7 +93,7 @@ def _check_law(law: Law, file: str) -> None:
         return
     if law.information != "custom":
         raise InvalidInput(
-            "controller.file",
+            "path",
             file,
             f"its law has information = {law.information!r}, for which the theory makes claims; a"
             " law of one's own has 'custom'",
@@ -108,8 +101,8 @@ def _check_law(law: Law, file: str) -> None:
     for name, arguments in _LAW_KERNELS.items():
         function = getattr(law.kernels, name, None)
         if not is_kernel(function):
-            raise InvalidInput("controller.file", file, f"its law needs a kernel named {name}")
-        check_arguments("controller.file", file, function, name, arguments)
+            raise InvalidInput("path", file, f"its law needs a kernel named {name}")
+        check_arguments("path", file, function, name, arguments)
 
 
 def compiler_complaint(error: BaseException) -> str | None:
@@ -135,24 +128,24 @@ def compiler_complaint(error: BaseException) -> str | None:
     return f"{found[0][0]}, line {found[0][1]}: a kernel cannot be compiled: {reason}"
 
 
-def _make(key: str, parameters: Mapping[str, Any], function: Any) -> Any:
+def _make(parameters: Mapping[str, Any], function: Any) -> Any:
     try:
         return function()
     except (KeyboardInterrupt, GneError):
         raise
     except BaseException as error:
         raise InvalidInput(
-            key, dict(parameters), f"the file must accept them: {raised(error)}"
+            "parameters", dict(parameters), f"the file must accept them: {raised(error)}"
         ) from error
 
 
-def _load(path: str | Path, key: str) -> ModuleType:
+def _load(path: str | Path) -> ModuleType:
     try:
         path = Path(path).resolve()
         text = read_file(path)
     except (OSError, ValueError) as error:  # or a name that no file can have
         why = getattr(error, "strerror", error)
-        raise InvalidInput(key, str(path), f"it cannot be read: {why}") from None
+        raise InvalidInput("path", str(path), f"it cannot be read: {why}") from None
     # One module for one text: loops are compiled for modules, and a changed file is another one.
     digest = hashlib.sha256(str(path).encode() + text).hexdigest()[:16]
     name = f"{USER_MODULES}{path.stem}_{digest}"
@@ -160,7 +153,7 @@ def _load(path: str | Path, key: str) -> ModuleType:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise InvalidInput(key, str(path), "it must be a Python file ending in .py")
+        raise InvalidInput("path", str(path), "it must be a Python file ending in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     # Where it matters that a value is not a number, an error says so, with its place.
@@ -171,5 +164,5 @@ def _load(path: str | Path, key: str) -> ModuleType:
         del sys.modules[name]
         if isinstance(error, KeyboardInterrupt):
             raise
-        raise InvalidInput(key, str(path), f"Python must run it: {raised(error)}") from error
+        raise InvalidInput("path", str(path), f"Python must run it: {raised(error)}") from error
     return module

@@ -181,7 +181,7 @@ def check_names(system: System, variables: Iterable[Variable], others: Iterable[
         for name in (variable.name, *variable.bounds(system)):
             if name in taken:
                 raise InvalidInput(
-                    f"systems.{system.name}", name, "results have something else of that name;"
+                    "system", name, "results have something else of that name;"
                     " give the game's quantity, or the agents' state, another one",
                 )  # fmt: skip
             taken.add(name)

@@ -137,14 +137,14 @@ def test_values_that_no_scenario_can_hold_are_refused(values, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"runs": "3"}, "--runs: got '3'"),
-        ({"runs": 2.5}, "--runs: got 2.5"),
+        ({"runs": "3"}, "^runs: got '3'"),
+        ({"runs": 2.5}, "^runs: got 2.5"),
         ({"runs": 10**12}, "10000000 runs at most"),
-        ({"seed": -1}, "--seed: got -1"),
-        ({"record": "some"}, "--record: got 'some'"),
-        ({"record": 1.5}, "--record: got 1.5"),
-        ({"spread": "0.5"}, "--spread"),
-        ({"threads": -1}, "--threads: got -1"),
+        ({"seed": -1}, "^seed: got -1"),
+        ({"record": "some"}, "^record: got 'some'"),
+        ({"record": 1.5}, "^record: got 1.5"),
+        ({"spread": "0.5"}, "^spread"),
+        ({"threads": -1}, "^threads: got -1"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(options, words, tmp_path):

@@ -292,7 +292,7 @@ def test_a_step_outside_is_refused_and_the_named_one_is_accepted(count, kind, en
     with pytest.raises(InvalidInput, match="mode 'sampled'") as caught:
         system.closed_loop(clock_of(1.01 * largest_step(system)))
     message = str(caught.value)
-    assert message.startswith("simulation.timestep")
+    assert message.startswith("clock.timestep")
     assert ("rosenbrock" in message) == (kind == "distributed" and engine == "ode")
     named = float(message.split("steps of at most ")[1].split(" s;")[0])
     system.closed_loop(clock_of(named))
@@ -315,5 +315,5 @@ def test_light_agents_limit_the_step_as_light_estimates_do():
 
 def test_refused_when_the_loop_is_made():
     system = line_of_integrators(FullyDistributed(graphs.ring(5), 1e-3), 5)
-    with pytest.raises(InvalidInput, match=r"simulation\.timestep"):
+    with pytest.raises(InvalidInput, match=r"^clock\.timestep"):
         system.closed_loop(clock(0.01))

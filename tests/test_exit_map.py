@@ -86,10 +86,10 @@ def test_several_systems_need_a_name(monkeypatch, capsys):
 
 
 def test_negative_periods_are_refused():
-    with pytest.raises(InvalidInput, match="--periods"):
+    with pytest.raises(InvalidInput, match="periods: got"):
         Grid(periods=(-1.0,), margins=(0.1,))
 
 
 def test_a_negative_seed_is_refused():
-    with pytest.raises(InvalidInput, match="--seed: got -1"):
+    with pytest.raises(InvalidInput, match="seed: got -1"):
         Grid(periods=(0.1,), margins=(0.1,), seed=-1)

@@ -75,7 +75,7 @@ def test_a_process_that_answers(fuzz):
     with worker.Worker([]) as process:
         refused = process.run(["run", "PATH"], b"nothing", limit=60.0)
         assert refused["code"] == 2
-        assert refused["err"].startswith("gne-mj: scenario: got 'input.toml'")
+        assert refused["err"].startswith("gne-mj: SCENARIO: got 'input.toml'")
         assert 0 < refused["memory"] < worker.MOST_MEMORY
         listed = process.run(["scenarios"], limit=60.0)
         assert listed["code"] == 0

@@ -42,7 +42,7 @@ def test_refusals():
         graphs.Graph(2, ((0, 0), (0, 1)))
     with pytest.raises(InvalidInput, match="numbered 1 to 2"):
         graphs.Graph(2, ((0, 2),))
-    with pytest.raises(InvalidInput, match="10 agents, not 5"):
+    with pytest.raises(InvalidInput, match="agents: got 5, but the graph 'printed' has 10 agents"):
         graphs.printed(5)
 
 

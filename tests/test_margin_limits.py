@@ -172,7 +172,7 @@ def listed(pointer=None, neighbour=None, **options):
     ],
 )
 def test_lists_that_native_code_would_read_beyond_are_refused(lists):
-    with pytest.raises(InvalidInput, match=r"systems.robots.controller.graph: got .*must"):
+    with pytest.raises(InvalidInput, match=r"^law.graph: got .*must"):
         listed(**lists).setup(clock(0.01))
 
 

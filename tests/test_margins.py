@@ -151,7 +151,7 @@ def test_inside_the_tightened_set_no_such_error_leads_out(name):
 
 
 def test_an_error_beyond_a_bound_is_refused():
-    with pytest.raises(InvalidInput, match=r"margin: got .?2.*gap of agent 2.*shorter control"):
+    with pytest.raises(InvalidInput, match=r"error: got .?2.*gap of agent 2.*shorter control"):
         tightening(velocity_game(2, V0, [9.0, 1.5]), np.array([1.0, 1.0]))
 
 

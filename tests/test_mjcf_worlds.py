@@ -162,7 +162,7 @@ def test_files_that_no_fleet_can_have_are_refused_in_one_sentence(tmp_path, more
     with pytest.raises(InvalidInput) as caught:
         plant_of(good, bad)
     said = str(caught.value)
-    assert caught.value.key == "agents.file"
+    assert caught.value.key == "agents.path"
     assert "bad.xml" in said
     assert words in said
     assert "\n" not in said

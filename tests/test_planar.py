@@ -365,7 +365,7 @@ def test_defaults_of_a_game_of_ones_own():
         ({"game.reference_velocity": [1.0]}, ["agents.type", "2 axes", "have 1"]),
         ({"game.edges": [[1, 2], [2, 7]]}, ["game.edges", "[2, 7]", "numbered 1 to 6"]),
         ({"game.edges": "rinq"}, ["game.edges", "rinq"]),
-        ({"game.edges": "printed"}, ["game.edges", "10 agents, not 6"]),
+        ({"game.edges": "printed"}, ["agents.count: got 6", "'printed' has 10 agents"]),
         ({"game.leader_weight": 0.0}, ["game.leader_weight", "needs a leader"]),
         ({"game.leader_weight": [1.0, 2.0]}, ["game.leader_weight", "6, one for each agent"]),
         ({"game.gap_bound": [1.0]}, ["game.gap_bound", "8, one for each edge"]),

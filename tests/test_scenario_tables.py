@@ -154,5 +154,5 @@ def test_the_barriers_defaults():
     assert (given.floor, given.time_constant) == (1e-4, 3.0)
     assert BarrierTable(schedule="halving", rho=1e-5).build(1e-3).floor == 1e-5
     for key in ("floor", "time_constant"):
-        with pytest.raises(InvalidInput, match=f"barrier.{key}"):
+        with pytest.raises(InvalidInput, match=f"^{key}: got 1.0"):
             BarrierTable(**{key: 1.0}).build(1e-3)

@@ -116,7 +116,7 @@ def test_json_and_files(tmp_path):
     [
         (("--system", "robot"), ("--system", "'robots'")),
         (("--path", "1:2"), ("--path", "FROM:TO:COUNT")),
-        (("--rho", "0"), ("barrier.rho", "positive")),
+        (("--rho", "0"), ("--rho: got 0.0", "positive")),
         (("--rho", "1e-30"), ("residual",)),
         (("--set", "initial.action=[9, 9, 9, 9]"), ("initial.action", "5")),
     ],

@@ -220,7 +220,7 @@ def test_publishing_never_waits(live):
 
 
 def test_a_port_can_be_chosen_unless_it_is_taken(static):
-    with pytest.raises(InvalidInput, match=f"--port: got {static.port}, but it cannot be listened"):
+    with pytest.raises(InvalidInput, match=f"^port: got {static.port}, but it cannot be listened"):
         Server("another", replay=b"", port=static.port)
     port = static.port
     static.close()

@@ -10,6 +10,7 @@ from gne_mj.batches.plan import Plan, make_plan, parse_record
 from gne_mj.batches.progress import Progress
 from gne_mj.batches.store import Store
 from gne_mj.batches.sweep import Sweep, parse_sweep
+from gne_mj.errors import named
 
 if TYPE_CHECKING:
     import xarray
@@ -72,23 +73,29 @@ def run_batch(
         StorageError: results could not be written; what was stored before is readable.
         ClusterError: the cluster's scheduler no longer answers; likewise.
     """
-    plan = make_plan(
-        source,
-        changes,
-        system=system,
-        sweeps=[Sweep(key, values) for key, values in (sweep or {}).items()],  # type: ignore[arg-type]
-        starts=runs,
-        seed=seed,
-        spread=spread,
-        record=parse_record(record),
-        chunk=chunk,
-    )
-    folder = Path(out)
-    with connected(cluster) as client:
-        goes_on = resume and folder.exists()
-        store = Store.resume(folder, plan) if goes_on else Store.create(folder, plan)
-        execute(store, threads=threads, cluster=client, progress=progress)
-    return store.dataset()
+    sweeps = []
+    for key, values in (sweep or {}).items():
+        with named(values=f"sweep.{key}"):
+            sweeps.append(Sweep(key, values))  # type: ignore[arg-type]
+    own = named(starts="runs", sweeps="sweep", given="record", folder="out", address="cluster")
+    with own, named(plan=""):
+        plan = make_plan(
+            source,
+            changes,
+            system=system,
+            sweeps=sweeps,
+            starts=runs,
+            seed=seed,
+            spread=spread,
+            record=parse_record(record),
+            chunk=chunk,
+        )
+        folder = Path(out)
+        with connected(cluster) as client:
+            goes_on = resume and folder.exists()
+            store = Store.resume(folder, plan) if goes_on else Store.create(folder, plan)
+            execute(store, threads=threads, cluster=client, progress=progress)
+        return store.dataset()
 
 
 def open_batch(folder: str | Path) -> "xarray.Dataset":

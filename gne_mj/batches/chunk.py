@@ -17,7 +17,7 @@ from gne_mj.batches.summary import (
     refused_columns,
     span_of,
 )
-from gne_mj.errors import InfeasibleStart
+from gne_mj.errors import InfeasibleStart, part_of
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.batch import Case
 from gne_mj.loops.faults import SEED
@@ -94,7 +94,9 @@ class Runner:
                 runs = slice(done, done + int(np.sum(inside)))
                 done = runs.stop
                 part = outcome.part(runs)
-                columns.insert(0, columns_of(prepared.combination, span, part, self.plan.record))
+                combination = prepared.combination
+                with combination.scenario.naming(self.plan.name), part_of("system"):
+                    columns.insert(0, columns_of(combination, span, part, self.plan.record))
             order = np.argsort(np.argsort(~inside, kind="stable"), kind="stable")
             parts[prepared.combination.number] = rearranged(join(columns), order)
         return parts
@@ -113,7 +115,8 @@ class Runner:
             prepared = _Prepared(combination)
             system = combination.system
             if system is not None:
-                setup = system.setup(combination.clock)
+                with combination.scenario.naming(system.name), part_of("system", "clock"):
+                    setup = system.setup(combination.clock)
                 prepared = _Prepared(combination, key_of(system, combination.clock, setup), setup)
             self._prepared[number] = prepared
             while len(self._prepared) > _COMBINATIONS:
@@ -199,6 +202,6 @@ def _start(
     memory = system.law.initial_memory(
         y,
         initial.estimate,
-        None if filtered is None else per_action("initial.filtered", filtered, sizes),
+        None if filtered is None else per_action("filtered", filtered, sizes),
     )
     return state, memory

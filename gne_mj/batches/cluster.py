@@ -53,19 +53,19 @@ def connected(address: str | None) -> Iterator["Client | None"]:
         from distributed.comm import get_address_host_port
     except ImportError:
         raise InvalidInput(
-            "--cluster", address, "it needs Dask: pip install 'gne-mj[cluster]'"
+            "address", address, "it needs Dask: pip install 'gne-mj[cluster]'"
         ) from None
     try:
         get_address_host_port(address)
     except (ValueError, TypeError):
-        raise InvalidInput("--cluster", address, "it must read tcp://HOST:PORT") from None
+        raise InvalidInput("address", address, "it must read tcp://HOST:PORT") from None
     with _silent():
         try:
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             reason = " ".join(str(error).split())
             raise InvalidInput(
-                "--cluster", address, f"no scheduler answers there: {reason}"
+                "address", address, f"no scheduler answers there: {reason}"
             ) from None
         with client:
             yield client
@@ -136,9 +136,7 @@ def run_chunk(folder: str, manifest: str, chunk: int) -> tuple[int, int]:
     """
     store = Store.open(Path(folder))
     if json.dumps(store.plan.manifest()) != manifest:
-        raise InvalidInput(
-            "--cluster", folder, "a worker's versions or files differ from those here"
-        )
+        raise InvalidInput("folder", folder, "a worker's versions or files differ from those here")
     variables = _runner(manifest).run(chunk)
     assert variables is not None
     store.write(chunk, variables)

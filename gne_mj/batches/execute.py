@@ -47,8 +47,8 @@ def execute(
         ClusterError: the scheduler no longer answers, or its workers end.
     """
     if threads < 0:
-        raise InvalidInput("--threads", threads, "it must not be negative")
-    check_count("--threads", threads, MOST_THREADS)
+        raise InvalidInput("threads", threads, "it must not be negative")
+    check_count("threads", threads, MOST_THREADS)
     now = Progress.of(store)
 
     def tell(done: int, early: int, workers: int | None = None) -> Progress:

@@ -16,7 +16,7 @@ AGAIN = "`gne-mj batch --resume --out {}` runs again what it was of"
 
 def broken(folder: Path, what: str) -> InvalidInput:
     """The error that tells of a batch that is not whole."""
-    return InvalidInput("DIR", str(folder), f"it must be whole: {what}")
+    return InvalidInput("folder", str(folder), f"it must be whole: {what}")
 
 
 def read_statuses(folder: Path, store: Path) -> NDArray[np.str_]:

@@ -33,7 +33,6 @@ _NOT_SWEPT = {
     "recording.period": "all runs of a batch share their sample times",
     "description": "it changes nothing",
 }
-_OPTIONS = {"starts": "--runs", "seed": "--seed", "record": "--record", "chunk": "--chunk"}
 _CHUNK_RUNS = 256
 _CHUNK_BYTES = 2**27  # of rows in memory
 _LEAST_CHUNKS = 16  # of a small batch, so that its progress is seen and little is lost
@@ -83,14 +82,14 @@ class Plan:
 
     def __post_init__(self) -> None:
         for key in ("starts", "seed", "record", "chunk"):
-            object.__setattr__(self, key, _whole(_OPTIONS[key], getattr(self, key)))
+            object.__setattr__(self, key, _whole(key, getattr(self, key)))
         if self.seed > 2**53:
-            raise InvalidInput("--seed", self.seed, "it must not exceed 2^53")
+            raise InvalidInput("seed", self.seed, "it must not exceed 2^53")
         if not isinstance(self.spread, int | float) or not 0.0 < self.spread < 1.0:
-            raise InvalidInput("--spread", self.spread, "it must lie between 0 and 1, without them")
+            raise InvalidInput("spread", self.spread, "it must lie between 0 and 1, without them")
         self._check_sweeps()
         if self.runs > MOST_RUNS:
-            raise InvalidInput("--runs", self.runs, f"a batch has {MOST_RUNS} runs at most")
+            raise InvalidInput("starts", self.runs, f"a batch has {MOST_RUNS} runs at most")
         if not self.chunk:
             object.__setattr__(self, "chunk", self._fitting_chunk())
 
@@ -100,12 +99,12 @@ class Plan:
             parts = full_key(self.scenario, sweep.key, sweep.values[0])
             reason = _NOT_SWEPT.get(".".join(parts))
             if reason is not None:
-                raise InvalidInput("--sweep", sweep.key, f"it cannot be swept: {reason}")
+                raise InvalidInput("sweeps", sweep.key, f"it cannot be swept: {reason}")
             for other in known:
                 shorter = min(len(parts), len(other))
                 if parts[:shorter] == other[:shorter]:
                     raise InvalidInput(
-                        "--sweep", sweep.key, f"it is swept already, by {'.'.join(other)}"
+                        "sweeps", sweep.key, f"it is swept already, by {'.'.join(other)}"
                     )
             known.append(parts)
 
@@ -127,12 +126,17 @@ class Plan:
     def check_room(self) -> None:
         """Refuse a chunk whose runs fill the memory."""
         each = self._numbers_of_run
-        check_room("recording.period", self._clock.sample_period, each, "a run", MOST_RECORDED)
-        check_room("--chunk", self.chunk, self.chunk * each, "its runs", MOST_RECORDED)
+        key = self._loaded.key_of("clock.sample_period")
+        check_room(key, self._clock.sample_period, each, "a run", MOST_RECORDED)
+        check_room("chunk", self.chunk, self.chunk * each, "its runs", MOST_RECORDED)
+
+    @cached_property
+    def _loaded(self) -> Scenario:
+        return load_scenario(self.scenario)
 
     @cached_property
     def _clock(self) -> Clock:
-        return load_scenario(self.scenario).clock()
+        return self._loaded.clock()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -222,9 +226,12 @@ class Plan:
             system = self.combination(number).system
             if system is not None:
                 return system
-        raise InvalidInput(
-            "initial.action", "given", "in no combination of the sweep is it strictly inside"
-        )
+        raise self.nowhere_inside()
+
+    def nowhere_inside(self) -> InvalidInput:
+        """What to raise where no combination has a start that can be run."""
+        key = self._loaded.key_of(f"systems.{self.name}.state")
+        return InvalidInput(key, "given", "in no combination of the sweep is it strictly inside")
 
     def profiles(self, combination: Combination, starts: Sequence[int]) -> NDArray[np.float64]:
         """y(0) of these starts, (starts, m)."""
@@ -242,7 +249,7 @@ class Plan:
             InvalidInput: there is no such run.
         """
         if not 0 <= run < self.runs:
-            raise InvalidInput("--index", run, f"runs are numbered from 0 to {self.runs - 1}")
+            raise InvalidInput("run", run, f"runs are numbered from 0 to {self.runs - 1}")
         number, start = self.of_run(run)
         combination = self.combination(number)
         scenario = combination.scenario
@@ -322,30 +329,30 @@ def parse_record(given: str | int) -> int:
         given = int(given)
     if isinstance(given, int) and not isinstance(given, bool) and given > 0:
         return given
-    raise InvalidInput("--record", given, "it must be 'summaries', 'all' or a whole number from 1")
+    raise InvalidInput("given", given, "it must be 'summaries', 'all' or a whole number from 1")
 
 
-def _whole(option: str, given: Any) -> int:
+def _whole(key: str, given: Any) -> int:
     try:
         number = operator.index(given)
     except TypeError:
         number = -1
     if number < 0 or isinstance(given, bool):
-        raise InvalidInput(option, given, "it must be a whole number, and not negative")
+        raise InvalidInput(key, given, "it must be a whole number, and not negative")
     return number
 
 
 def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:
     """Of the user's own files that a scenario names."""
     found = {}
-    for system in scenario["systems"].values():
-        for table in system.values():
+    for system, tables in scenario["systems"].items():
+        for key, table in tables.items():
             given = table.get("file", []) if isinstance(table, dict) else []
             for name in [given] if isinstance(given, str) else given:
                 try:
                     found[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
                 except OSError as error:
-                    raise InvalidInput(
-                        "file", name, f"it cannot be read: {error.strerror}"
-                    ) from None
+                    where = f"scenario.systems.{system}.{key}.file"
+                    why = f"it cannot be read: {error.strerror}"
+                    raise InvalidInput(where, name, why) from None
     return found

@@ -53,17 +53,17 @@ def write_report(
     """
     names = ["combinations.csv", "runs.csv", *(f"summary.{kind}" for kind in formats)]
     if not replace:
-        refuse_existing("--out", [target / name for name in names])
+        refuse_existing("target", [target / name for name in names])
     runs = figures_of(store)
     if runs.sizes["run"] == 0:
-        raise InvalidInput("DIR", str(store.folder), "it must hold at least one run")
+        raise InvalidInput("store", str(store.folder), "it must hold at least one run")
     table, paths = combinations(runs), []
     for name, rows in (("combinations.csv", table), ("runs.csv", runs.to_dataframe())):
-        with written("--out", target / name, replace=True) as path:
+        with written("target", target / name, replace=True) as path:
             rows.to_csv(path, index=name == "runs.csv")
         paths.append(target / name)
     for kind in formats:
-        with written("--out", target / f"summary.{kind}", replace=True) as path:
+        with written("target", target / f"summary.{kind}", replace=True) as path:
             plots.save_batch(runs, path, kind)
         paths.append(target / f"summary.{kind}")
     return Report(runs, table, tuple(paths))

@@ -23,7 +23,7 @@ from gne_mj.batch_variables import declared_figures
 from gne_mj.batches.integrity import AGAIN, broken, kept_of_runs, lost_chunks, read_statuses
 from gne_mj.batches.plan import FORMAT, Combination, Plan
 from gne_mj.batches.summary import columns_of, join, kept, span_of, times
-from gne_mj.errors import InvalidInput, StorageError
+from gne_mj.errors import InvalidInput, StorageError, named
 from gne_mj.files import storing, written
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import Outcome
@@ -56,14 +56,10 @@ class Store:
             StorageError: it cannot be written, as on a full disk.
         """
         if os.path.lexists(folder):
-            raise InvalidInput(
-                "--out",
-                str(folder),
-                "it exists already; name a folder that does not, or add --resume to go on with it",
-            )
-        with storing("--out", folder):
+            raise InvalidInput("folder", str(folder), "it exists already; name one that does not")
+        with storing("folder", folder):
             folder.parent.mkdir(parents=True, exist_ok=True)
-        with written("--out", folder, replace=False) as new:
+        with written("folder", folder, replace=False) as new:
             new.mkdir()
             text = json.dumps(plan.manifest(), indent=2)
             (new / MANIFEST).write_text(text + "\n", encoding="utf-8")
@@ -120,7 +116,7 @@ class Store:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InvalidInput(
-                    "--out", str(self.folder), "another process is running this batch right now"
+                    "folder", str(self.folder), "another process is running this batch right now"
                 ) from None
             self._tidy()
             try:
@@ -218,10 +214,10 @@ def _manifest(folder: Path) -> dict[str, Any]:
         form = found["format"]
     except (OSError, ValueError, KeyError, TypeError):
         raise InvalidInput(
-            "DIR", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
+            "folder", str(folder), f"it must be a folder that `batch` wrote, with a {MANIFEST}"
         ) from None
     if form != FORMAT:
-        raise InvalidInput("DIR", str(folder), f"its format is {form}, not {FORMAT} as here")
+        raise InvalidInput("folder", str(folder), f"its format is {form}, not {FORMAT} as here")
     return found
 
 
@@ -324,20 +320,19 @@ def _schema(plan: Plan) -> tuple[Combination, Labelled]:
         _check_layout(first, combination)
         rows = [each for each in declared(system) if each.batch] if plan.record else []
         shown = [*declared_figures(system), *rows]
-        check_names(system, shown, ("run", "start", "seed", *plan.labels()))
+        with named(system=f"systems.{system.name}"):
+            check_names(system, shown, ("run", "start", "seed", *plan.labels()))
         kind = (len(system.loop_memory), *((each.name, each.dims(system)) for each in shown))
         if kind not in known:
             known[kind] = _one_run(combination, plan.record)
     if first is None:
-        raise InvalidInput(
-            "initial.action", "given", "it is strictly inside in no combination of the sweep"
-        )
+        raise plan.nowhere_inside()
     shapes: dict[str, Any] = {}
     for variables in known.values():
         for name, (dimensions, like, _) in variables.items():
             if shapes.setdefault(name, (dimensions, like.shape)) != (dimensions, like.shape):
                 raise InvalidInput(
-                    "--sweep",
+                    "plan.sweeps",
                     ", ".join(sweep.key for sweep in plan.sweeps),
                     f"'{name}' must have the same shape in all combinations",
                 )
@@ -357,7 +352,9 @@ def _check_layout(first: Combination, other: Combination) -> None:
     ):
         if here != there:
             raise InvalidInput(
-                "--sweep", ", ".join(other.changes), f"all combinations must have the same {what}"
+                "plan.sweeps",
+                ", ".join(other.changes),
+                f"all combinations must have the same {what}",
             )
 
 

@@ -36,20 +36,19 @@ class Sweep:
     values: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        option = f"--sweep {self.key}"
         given: Any = self.values
         if isinstance(given, str | bytes) or not isinstance(given, Iterable):
-            raise InvalidInput(option, given, "its values must be a list")
-        values = tuple(_plain(option, value) for value in given)
+            raise InvalidInput("values", given, "its values must be a list")
+        values = tuple(_plain(value) for value in given)
         if not values:
-            raise InvalidInput(option, "nothing", "it needs at least one value")
+            raise InvalidInput("values", "nothing", "it needs at least one value")
         if len(values) > MOST:
-            raise InvalidInput(option, f"{len(values)} values", f"it may have {MOST} at most")
+            raise InvalidInput("values", f"{len(values)} values", f"it may have {MOST} at most")
         seen = set()
         for value in values:
             text = json.dumps(value, sort_keys=True)
             if text in seen:
-                raise InvalidInput(option, value, "every value may occur once only")
+                raise InvalidInput("values", value, "every value may occur once only")
             seen.add(text)
         object.__setattr__(self, "values", values)
 
@@ -69,46 +68,44 @@ def parse_sweep(text: str) -> Sweep:
     """
     key, equals, given = text.partition("=")
     if not (key and equals and given):
-        raise InvalidInput("--sweep", text, "it must read KEY=FROM:TO:COUNT[log] or KEY=A,B,...")
+        raise InvalidInput("text", text, "it must read KEY=FROM:TO:COUNT[log] or KEY=A,B,...")
     found = _RANGE.fullmatch(given)
     if found:
-        return Sweep(key, _range(key, given, *found.groups()))
+        return Sweep(key, _range(given, *found.groups()))
     try:
         return Sweep(key, tuple(tomllib.loads(f"values = [{given}]")["values"]))
     except tomllib.TOMLDecodeError:
         return Sweep(key, tuple(parse_value(part.strip()) for part in given.split(",")))
 
 
-def _plain(option: str, value: Any) -> Any:
+def _plain(value: Any) -> Any:
     """A value as JSON has it."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [_plain(option, each) for each in value]
+        return [_plain(each) for each in value]
     if isinstance(value, Mapping):
-        return {str(key): _plain(option, each) for key, each in value.items()}
+        return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, float) and not np.isfinite(value):
-        raise InvalidInput(option, value, "it must be finite")
+        raise InvalidInput("values", value, "it must be finite")
     if not isinstance(value, bool | int | float | str):
-        raise InvalidInput(option, str(value), "it must be a number, a word, a list or a table")
+        raise InvalidInput("values", str(value), "it must be a number, a word, a list or a table")
     return value
 
 
-def _range(
-    key: str, given: str, start: str, end: str, count: str, log: str | None
-) -> tuple[Any, ...]:
+def _range(given: str, start: str, end: str, count: str, log: str | None) -> tuple[Any, ...]:
     try:
         ends = float(start), float(end)
     except ValueError:
-        raise InvalidInput(f"--sweep {key}", given, "FROM and TO must be numbers") from None
+        raise InvalidInput("text", given, "FROM and TO must be numbers") from None
     if log and not min(ends) > 0:
-        raise InvalidInput(f"--sweep {key}", given, "a logarithmic range must be positive")
+        raise InvalidInput("text", given, "a logarithmic range must be positive")
     if not all(np.isfinite(ends)):
-        raise InvalidInput(f"--sweep {key}", given, "FROM and TO must be finite")
+        raise InvalidInput("text", given, "FROM and TO must be finite")
     if int(count) > MOST:
-        raise InvalidInput(f"--sweep {key}", given, f"it may have {MOST} values at most")
+        raise InvalidInput("text", given, f"it may have {MOST} values at most")
     if int(count) < 2 and ends[0] != ends[1]:
-        raise InvalidInput(f"--sweep {key}", given, "a range has at least two values")
+        raise InvalidInput("text", given, "a range has at least two values")
     spaced = np.geomspace(*ends, int(count)) if log else np.linspace(*ends, int(count))
     # twelve digits: 0.1 rather than 0.10000000000000002
     return tuple(float(f"{value:.12g}") for value in spaced)

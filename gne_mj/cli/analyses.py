@@ -6,19 +6,19 @@ from typing import Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, settings
+from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, meaning, settings
 from gne_mj.cli.output import PREPARING, Results, emit, progress, say, working
 from gne_mj.cli.signals import stopping
 
 
 @app.command()
 def solve(
-    scenario: SCENARIO,
+    source: SCENARIO,
     set_: SET = None,
     system: Annotated[
         str | None, typer.Option("--system", metavar="NAME", help="Solve this system only.")
     ] = None,
-    rho: Annotated[
+    rhos: Annotated[
         list[float] | None,
         typer.Option("--rho", help="In place of the scenario's penalty; may be repeated."),
     ] = None,
@@ -36,18 +36,19 @@ def solve(
     --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
     """
     from gne_mj import solve as solving
-    from gne_mj.errors import InvalidInput, nearest
     from gne_mj.scenario import load_scenario
 
-    rhos = [] if path is None else solving.parse_path(path)
+    path_rhos = [] if path is None else meaning("path", solving.parse_path, path)
     results = Results(out)
     with working(as_json, PREPARING):
-        every, moved = load_scenario(scenario, settings(set_)).inside_systems()
-        systems = [each for each in every if system in (None, each.name)]
-        if not systems:
-            names = [each.name for each in every]
-            raise InvalidInput("--system", system, nearest(str(system), names))
-        solutions = [solving.solve_system(each, rho or (), rhos) for each in systems]
+        loaded = load_scenario(source, settings(set_))
+        wanted = None if system is None else loaded.name_of(system)
+        every, moved = loaded.inside_systems()
+        solutions = []
+        for built in every:
+            if wanted in (None, built.name):
+                with loaded.naming(built.name):
+                    solutions.append(solving.solve_system(built, rhos or (), path_rhos))
     report = json.dumps(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
@@ -82,7 +83,7 @@ def _moved(done: dict[str, Any] | None) -> list[str]:
 
 @app.command()
 def certify(
-    scenario: SCENARIO,
+    source: SCENARIO,
     set_: SET = None,
     as_json: JSON = False,
     search: Annotated[
@@ -115,28 +116,33 @@ def certify(
     from gne_mj.theory import certify as examine
     from gne_mj.theory import search_epsilon, search_period, search_push, words
 
-    loaded = load_scenario(scenario, settings(set_))
+    loaded = load_scenario(source, settings(set_))
     clock = loaded.clock()
     systems, moved = loaded.inside_systems()
-    reports = {system.name: examine(system, clock) for system in systems}
+    reports = {}
+    for system in systems:
+        with loaded.naming(system.name):
+            reports[system.name] = examine(system, clock)
     if search:
         searched = [s for s in systems if reports[s.name].epsilon is not None]
         if not searched:
-            raise InvalidInput("--search-epsilon", scenario, "no system has the distributed law")
+            raise InvalidInput("search", source, "no system has the distributed law")
         for system in searched:
-            with working(as_json, f"searching epsilon of {system.name}") as tell:
+            told = working(as_json, f"searching epsilon of {system.name}")
+            with told as tell, loaded.naming(system.name):
                 found = asdict(search_epsilon(system, clock, tell))
             epsilon = {**(reports[system.name].epsilon or {}), "search": found}
             reports[system.name] = replace(reports[system.name], epsilon=epsilon)
     for option, wanted, key, hunt in (
-        ("--search-period", period, "period_search", search_period),
-        ("--search-push", push, "push_search", search_push),
+        ("period", period, "period_search", search_period),
+        ("push", push, "push_search", search_push),
     ):
         searched = [s for s in systems if wanted and reports[s.name].held is not None]
         if wanted and not searched:
-            raise InvalidInput(option, scenario, "no system is in mode 'implicit'")
+            raise InvalidInput(option, source, "no system is in mode 'implicit'")
         for system in searched:
-            with working(as_json, f"searching for {system.name}") as tell:
+            told = working(as_json, f"searching for {system.name}")
+            with told as tell, loaded.naming(system.name):
                 found = asdict(hunt(system, clock, tell))
             held = {**(reports[system.name].held or {}), key: found}
             reports[system.name] = replace(reports[system.name], held=held)
@@ -157,7 +163,7 @@ def certify(
 
 
 @app.command()
-def check(scenario: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
+def check(source: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
     """Compare what is written twice in a scenario's games: derivatives, lists, declarations.
 
     Derivatives are compared with differences at profiles strictly inside. Exit status 1 if anything
@@ -166,7 +172,7 @@ def check(scenario: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
     from gne_mj.game_check import examine
     from gne_mj.scenario import load_scenario
 
-    loaded = load_scenario(scenario, settings(set_))
+    loaded = load_scenario(source, settings(set_))
     reports = {}
     for name, table in loaded.systems.items():
         with working(as_json, PREPARING):
@@ -181,7 +187,7 @@ def check(scenario: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
 
 @app.command()
 def passivity(
-    scenario: SCENARIO,
+    source: SCENARIO,
     system: Annotated[
         str | None, typer.Option("--system", metavar="NAME", help="This one; all if left out.")
     ] = None,
@@ -196,15 +202,21 @@ def passivity(
     do not matter here. Amplitudes grow, and the report tells how far was tried. That no violation
     is found is no proof.
     """
+    from gne_mj.errors import named
     from gne_mj.passivity import examine, plants_of
     from gne_mj.scenario import load_scenario
 
-    loaded = load_scenario(scenario, settings(set_))
+    loaded = load_scenario(source, settings(set_))
     reports = {}
     for name in loaded.systems if system is None else (loaded.name_of(system),):
         with working(as_json, PREPARING):
             built = loaded.systems[name].build(name, loaded.simulation)
-        with progress(100.0, as_json, "% of all trials") as show:
+        of_clock = {key: f"clock.{key}" for key in ("timestep", "duration")}
+        with (
+            progress(100.0, as_json, "% of all trials") as show,
+            loaded.naming(name),
+            named(build="system.agents.count", **of_clock),
+        ):
             reports[name] = examine(
                 plants_of(built.agents, built.engine, built.integrator),
                 loaded.simulation.timestep,
@@ -224,7 +236,7 @@ def passivity(
 
 @app.command(name="map")
 def map_(
-    scenario: SCENARIO,
+    source: SCENARIO,
     set_: SET = None,
     system: SYSTEM = None,
     periods: Annotated[
@@ -253,24 +265,19 @@ def map_(
     from dataclasses import asdict
 
     from gne_mj import exit_map as mapping
-    from gne_mj.errors import InvalidInput, nearest
+    from gne_mj.errors import InvalidInput
     from gne_mj.scenario import load_scenario
     from gne_mj.solve import parse_path
 
-    loaded = load_scenario(scenario, settings(set_))
-    names = list(loaded.systems)
-    if system is None and len(names) > 1:
-        raise InvalidInput("--system", None, f"name one of {', '.join(names)}")
-    name = system or names[0]
-    if name not in names:
-        raise InvalidInput("--system", system, nearest(str(system), names))
+    loaded = load_scenario(source, settings(set_))
+    name = loaded.name_of(system)
     try:
         forces = tuple(float(force) for force in pushes.split(","))
     except ValueError:
-        raise InvalidInput("--pushes", pushes, "it must be numbers, A,B,...") from None
+        raise InvalidInput("pushes", pushes, "it must be numbers, A,B,...") from None
     grid = mapping.Grid(
-        periods=tuple(parse_path(periods, "--periods")),
-        margins=tuple(parse_path(margins, "--margins")),
+        periods=tuple(meaning("periods", parse_path, periods)),
+        margins=tuple(meaning("margins", parse_path, margins)),
         pushes=forces,
         runs=runs,
         duration=duration,

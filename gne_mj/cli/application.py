@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 import warnings
 from contextlib import nullcontext
@@ -27,10 +28,32 @@ class _Commands(typer.core.TyperGroup):
             raise Interrupted from error
 
     def invoke(self, ctx: Any) -> Any:
+        from gne_mj.errors import Refusal
+
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
             raise Interrupted from error
+        except Refusal as error:
+            _name_flags(error, self.commands[ctx.invoked_subcommand].params)
+            raise
+
+
+def _name_flags(error: Any, parameters: list[Any]) -> None:
+    """Let an error name the option or argument of a command in place of its function's parameter.
+
+    What is expected may name some too, in backquotes.
+    """
+    flags = {
+        each.name: next((opt for opt in each.opts if opt.startswith("-")), None)
+        or (each.metavar or each.name).upper()
+        for each in parameters
+    }
+
+    def flag(found: re.Match[str]) -> str:
+        return flags.get(found[1], found[0])
+
+    error.rename(re.sub(r"^(\w+)", flag, error.key), re.sub(r"`(\w+)`", flag, error.about))
 
 
 app = typer.Typer(

@@ -1,12 +1,20 @@
 """Arguments and options that several commands share."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
+T = TypeVar("T")
+
+# An error that names one of a command's parameters is told with its option, or its argument's name:
+# they are called as in the functions that a command calls.
 SCENARIO = Annotated[
-    str, typer.Argument(help="Name of a shipped scenario (see `scenarios`), or a .toml file.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO", help="Name of a shipped scenario (see `scenarios`), or a .toml file."
+    ),
 ]
 
 
@@ -53,9 +61,17 @@ def settings(changes: list[str] | None) -> dict[str, Any]:
     for change in changes or []:
         key, equals, value = change.partition("=")
         if not (key and equals):
-            raise InvalidInput("--set", change, "it must read KEY=VALUE")
+            raise InvalidInput("set_", change, "it must read KEY=VALUE")
         found[key.strip()] = parse_value(value.strip())
     return found
+
+
+def meaning(option: str, parse: Callable[[str], T], text: str) -> T:
+    """What the text of an option says; what is wrong with it is told of the option."""
+    from gne_mj.errors import renaming
+
+    with renaming(lambda _: option):
+        return parse(text)
 
 
 def formats(given: list[str] | None) -> tuple[str, ...]:
@@ -65,5 +81,5 @@ def formats(given: list[str] | None) -> tuple[str, ...]:
 
     for name in given or []:
         if name not in FORMATS:
-            raise InvalidInput("--format", name, f"choose from {', '.join(FORMATS)}")
+            raise InvalidInput("format_", name, f"choose from {', '.join(FORMATS)}")
     return tuple(given or ("png",))

@@ -9,24 +9,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gne_mj.cli.application import app
-from gne_mj.cli.arguments import FORMAT, JSON, REPLACE, SET, SYSTEM, WHERE, formats, settings
+from gne_mj.cli.arguments import (
+    FORMAT,
+    JSON,
+    REPLACE,
+    SET,
+    SYSTEM,
+    WHERE,
+    formats,
+    meaning,
+    settings,
+)
 from gne_mj.cli.output import by_the_minute, console, emit, folder_for, on_terminal, say
 from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
-    from gne_mj.batches import Progress, Store
+    from gne_mj.batches import Progress, Store, Sweep
     from gne_mj.batches.report import Report
 
 
 @app.command()
 def batch(
-    scenario: Annotated[
+    source: Annotated[
         str | None,
         typer.Argument(
-            help="A shipped scenario or a .toml file; with --resume it may be left out."
+            metavar="SCENARIO",
+            help="A shipped scenario or a .toml file; with --resume it may be left out.",
         ),
     ] = None,
-    sweep: Annotated[
+    sweeps: Annotated[
         list[str] | None,
         typer.Option(
             "--sweep",
@@ -35,13 +46,13 @@ def batch(
             " combinations are run.",
         ),
     ] = None,
-    runs: Annotated[
+    starts: Annotated[
         int,
         typer.Option(
             "--runs", help="Random interior starts of each combination; 0: the scenario's own."
         ),
     ] = 0,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write.")] = Path(
+    folder: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write.")] = Path(
         "results/batch"
     ),
     set_: SET = None,
@@ -83,34 +94,43 @@ def batch(
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
     that was stopped or killed goes on with --resume, and ends as if it had not been.
     """
-    from gne_mj.batches import Store, connected, execute, make_plan, parse_record, parse_sweep
+    from gne_mj.batches import Store, connected, execute, make_plan, parse_record
     from gne_mj.batches.report import write_report
-    from gne_mj.errors import InvalidInput
+    from gne_mj.errors import InvalidInput, named
 
-    changed = bool(sweep or set_ or system or runs or seed or chunk)
-    if scenario is None and (changed or record != "summaries" or spread != 0.9):
+    changed = bool(sweeps or set_ or system or starts or seed or chunk)
+    if source is None and (changed or record != "summaries" or spread != 0.9):
         raise InvalidInput(
-            "SCENARIO", None, "a scenario must be named, unless --resume --out DIR is all there is"
+            "source", None, "a scenario must be named, unless `resume` `folder` DIR is all there is"
         )
-    with connected(cluster) as client, stopping() as stop:
-        if scenario is None:
+    own = named(address="cluster", store="folder", target="folder")
+    with own, connected(cluster) as client, stopping() as stop:
+        if source is None:
             if not resume:
-                raise InvalidInput("SCENARIO", None, "a scenario must be named, or --resume")
-            store = Store.continued(out)
+                raise InvalidInput("source", None, "a scenario must be named, or `resume`")
+            store = Store.continued(folder)
         else:
             plan = make_plan(
-                scenario,
+                source,
                 settings(set_),
                 system=system,
-                sweeps=[parse_sweep(text) for text in sweep or []],
-                starts=runs,
+                sweeps=[_sweep(text) for text in sweeps or []],
+                starts=starts,
                 seed=seed,
                 spread=spread,
-                record=parse_record(record),
+                record=meaning("record", parse_record, record),
                 chunk=chunk,
             )
-            goes_on = resume and out.exists()
-            store = Store.resume(out, plan) if goes_on else Store.create(out, plan)
+            if folder.exists() and not resume:
+                raise InvalidInput(
+                    "folder",
+                    str(folder),
+                    "it exists already; name a folder that does not, or add `resume` to go on with"
+                    " it",
+                )
+            with named(plan=""):
+                begin = Store.resume if folder.exists() else Store.create
+                store = begin(folder, plan)
         with _showing(store.plan.runs, as_json) as show:
             now = execute(
                 store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
@@ -138,14 +158,24 @@ def batch_report(
     """
     from gne_mj.batches import Progress, Store
     from gne_mj.batches.report import write_report
+    from gne_mj.errors import named
 
     kinds = formats(format_)
     store = Store.open(folder)
     now, target = Progress.of(store), folder_for(out, folder)
-    report = write_report(store, target, kinds, replace=replace or target == folder)
+    with named(store="folder", target="out"):
+        report = write_report(store, target, kinds, replace=replace or target == folder)
     _print(store, now, report, as_json)
     if not now.complete and not as_json:
         print(f"\npartial: {_partial(store, now)}")
+
+
+def _sweep(text: str) -> "Sweep":
+    """What --sweep says; errors tell of which key."""
+    from gne_mj.batches import parse_sweep
+
+    key, equals, _ = text.partition("=")
+    return meaning(f"sweeps {key}" if equals else "sweeps", parse_sweep, text)
 
 
 def _counts(now: "Progress") -> dict[str, Any]:

@@ -79,9 +79,9 @@ class Results:
         if replace and _is_of_paper(out):
             self._replaced = _entries(out)
         elif os.path.lexists(out):
-            raise InvalidInput("--out", str(out), "it exists already; name a folder that does not")
+            raise InvalidInput("out", str(out), "it exists already; name a folder that does not")
         there = next(parent for parent in out.parents if parent.exists())
-        with storing("--out", out), hidden_folder(there):
+        with storing("out", out), hidden_folder(there):
             pass  # a place that cannot be written to is refused before anything is computed
 
     @contextmanager
@@ -99,9 +99,9 @@ class Results:
         if self.out is None:
             yield None
             return
-        with storing("--out", self.out):
+        with storing("out", self.out):
             self.out.parent.mkdir(parents=True, exist_ok=True)
-        with storing("--out", self.out), hidden_folder(self.out.parent) as hidden:
+        with storing("out", self.out), hidden_folder(self.out.parent) as hidden:
             folder = hidden / self.out.name
             folder.mkdir()
             yield folder
@@ -171,7 +171,7 @@ def folder_for(out: Path | None, own: Path) -> Path:
 
     if out is None or (out.exists() and out.samefile(own)):
         return own
-    with storing("--out", out):
+    with storing("out", out):
         out.mkdir(parents=True, exist_ok=True)
     return out
 

@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 
 @app.command()
 def run(
-    scenario: Annotated[
+    source: Annotated[
         str | None,
-        typer.Argument(help="Name of a shipped scenario (see `scenarios`), or a .toml file."),
+        typer.Argument(
+            metavar="SCENARIO",
+            help="Name of a shipped scenario (see `scenarios`), or a .toml file.",
+        ),
     ] = None,
     set_: SET = None,
     out: OUT = None,
-    from_: Annotated[
+    folder: Annotated[
         Path | None,
         typer.Option("--from", metavar="DIR", help="Run one of this batch's runs, by --index."),
     ] = None,
@@ -46,16 +49,16 @@ def run(
     """
     from gne_mj.errors import InvalidInput
 
-    source = source_of(scenario, from_, index)
+    chosen = source_of(source, folder, index)
     if view:
-        title = Path(scenario).stem if scenario else f"run {index} of {from_}"
-        trajectory = watch(source, set_, Results(out), as_json, title=title, speed=speed, port=port)
+        title = Path(source).stem if source else f"run {index} of {folder}"
+        trajectory = watch(chosen, set_, Results(out), as_json, title=title, speed=speed, port=port)
     else:
-        for key, value in (("--speed", speed), ("--port", port)):
+        for key, value in (("speed", speed), ("port", port)):
             if value is not None:
-                raise InvalidInput(key, value, "it goes with --view")
+                raise InvalidInput(key, value, "it goes with `view`")
         results = Results(out)
-        trajectory = simulate(source, set_, results, quiet=as_json)
+        trajectory = simulate(chosen, set_, results, quiet=as_json)
         tell(trajectory, as_json, results.out)
     raise typer.Exit(0 if trajectory.holds else 1)
 
@@ -93,7 +96,7 @@ def _illustrate(trajectory: "Trajectory", folder: Path) -> None:
 
 @app.command()
 def plot(
-    run_folder: Annotated[
+    folder: Annotated[
         Path, typer.Argument(metavar="RUN", help="Folder that `run --out` or `paper` wrote.")
     ],
     out: WHERE = None,
@@ -105,11 +108,14 @@ def plot(
     In the run's own folder they take the place of older ones.
     """
     from gne_mj import plots
+    from gne_mj.errors import named
 
     kinds = formats(format_)
-    trajectory = stored(run_folder)
-    target = folder_for(out, run_folder)
-    for path in plots.save(trajectory, target, kinds, replace=replace or target == run_folder):
+    trajectory = stored(folder)
+    target = folder_for(out, folder)
+    with named(folder="out"):
+        paths = plots.save(trajectory, target, kinds, replace=replace or target == folder)
+    for path in paths:
         print(path)
 
 
@@ -133,4 +139,4 @@ def scenarios(
     elif name in files:
         print(files[name], end="")
     else:
-        raise InvalidInput("scenario", name, nearest(name, files))
+        raise InvalidInput("name", name, nearest(name, files))

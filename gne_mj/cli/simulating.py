@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 
 def source_of(
-    scenario: str | None, folder: Path | None, index: int | None
+    source: str | None, folder: Path | None, index: int | None
 ) -> "str | Mapping[str, Any]":
     """What to run: a scenario's name, or the tables of a batch's run."""
-    from gne_mj.errors import InvalidInput
+    from gne_mj.errors import InvalidInput, named
 
-    if (scenario is None) == (folder is None):
-        raise InvalidInput("SCENARIO", scenario, "either a scenario or --from must be given")
+    if (source is None) == (folder is None):
+        raise InvalidInput("source", source, "either a scenario or `folder` must be given")
     if folder is None:
         if index is not None:
-            raise InvalidInput("--index", index, "it goes with --from")
-        assert scenario is not None
-        return scenario
+            raise InvalidInput("index", index, "it goes with `folder`")
+        assert source is not None
+        return source
     if index is None:
-        raise InvalidInput("--index", index, "it must say which run of the batch")
+        raise InvalidInput("index", index, "it must say which run of the batch")
     from gne_mj.batches import Store
 
     store = Store.open(folder)
@@ -37,7 +37,9 @@ def source_of(
             f"gne-mj: warning: {difference} since the batch was run, so that the last bits may"
             " differ"
         )
-    tables: dict[str, Any] = json.loads(store.plan.alone(index).model_dump_json(exclude_none=True))
+    with named(run="index"):
+        alone = store.plan.alone(index)
+    tables: dict[str, Any] = json.loads(alone.model_dump_json(exclude_none=True))
     return tables
 
 
@@ -88,12 +90,11 @@ def stored(folder: Path) -> "Trajectory":
 
     store = folder / "trajectory.zarr"
     if not store.is_dir():
-        batch = "; of a batch say which run, by --index" if is_batch(folder) else ""
-        raise InvalidInput("RUN", str(folder), f"it must be a folder with a trajectory.zarr{batch}")
-    try:
-        return Trajectory.load(store)
-    except InvalidInput as error:
-        raise InvalidInput("RUN", str(store), error.expected) from None
+        batch = "; of a batch say which run, by `index`" if is_batch(folder) else ""
+        raise InvalidInput(
+            "folder", str(folder), f"it must be a folder with a trajectory.zarr{batch}"
+        )
+    return Trajectory.load(store)
 
 
 def load(

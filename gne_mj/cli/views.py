@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def view(
-    run_folder: Annotated[
+    folder: Annotated[
         Path,
         typer.Argument(
             metavar="RUN", help="Folder that `run --out`, `paper` or (with --index) `batch` wrote."
@@ -43,25 +43,25 @@ def view(
     from gne_mj.files import refuse_existing, written
 
     if html is not None and port is not None:
-        raise InvalidInput("--port", port, "it is of no use with --html")
+        raise InvalidInput("port", port, "it is of no use with `html`")
     if html is not None and (html.is_dir() or not html.parent.is_dir()):
-        raise InvalidInput("--html", str(html), "it must be a file, in a folder that exists")
+        raise InvalidInput("html", str(html), "it must be a file, in a folder that exists")
     if html is not None and not replace:
-        refuse_existing("--html", [html])
-    title = _title(run_folder.resolve().name)
+        refuse_existing("html", [html])
+    title = _title(folder.resolve().name)
     if index is None:
-        trajectory = stored(run_folder)
-    elif is_batch(run_folder):
-        source = source_of(None, run_folder, index)
+        trajectory = stored(folder)
+    elif is_batch(folder):
+        source = source_of(None, folder, index)
         trajectory = simulate(source, None, Results(None), quiet=False)
         title = f"{title}, run {index}"
     else:
-        raise InvalidInput("--index", index, "it goes with a folder that `batch` wrote")
+        raise InvalidInput("index", index, "it goes with a folder that `batch` wrote")
     if html is not None:
         from gne_mj.view import html_page
 
         page = html_page(trajectory, title)
-        with written("--html", html, replace=replace) as new:
+        with written("html", html, replace=replace) as new:
             new.write_text(page, encoding="utf-8")
         print(html)
         return
@@ -143,7 +143,7 @@ def _speed(given: str | None) -> float | None:
         speed = 0.0
     if not 0.0 < speed <= FASTEST:
         raise InvalidInput(
-            "--speed", given, f"it must be 'max' or a positive number, at most {FASTEST:g}"
+            "speed", given, f"it must be 'max' or a positive number, at most {FASTEST:g}"
         )
     return speed
 

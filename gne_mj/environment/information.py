@@ -44,7 +44,7 @@ def information_of(game: Game, structure: str, graph: Graph | None) -> Informati
         InvalidInput: another structure, or a graph that is missing or of other agents.
     """
     if structure not in STRUCTURES:
-        raise InvalidInput("information", structure, nearest(str(structure), STRUCTURES))
+        raise InvalidInput("structure", structure, nearest(str(structure), STRUCTURES))
     agents = range(game.agents)
     if structure == "full":
         hears = [[j for j in agents if j != i] for i in agents]

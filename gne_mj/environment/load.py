@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gne_mj.environment.information import STRUCTURES, Information, Structure, information_of
 from gne_mj.environment.physics import FleetPhysics
 from gne_mj.environment.task import FleetEnvironment, FleetTask, Start, finite_costs
-from gne_mj.errors import InvalidInput, nearest
+from gne_mj.errors import InvalidInput, named, nearest, part_of
 from gne_mj.graph import NAMED, Graph
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -41,10 +41,12 @@ def load_environment(
     >>> timestep = environment.reset()
     >>> timestep = environment.step(np.zeros(environment.action_spec().shape))
     """
-    loaded = load_scenario(scenario, changes)
-    name = loaded.name_of(system, "system")
+    with named(source="scenario"):
+        loaded = load_scenario(scenario, changes)
+    name = loaded.name_of(system)
     built = loaded.systems[name].build(name, loaded.simulation)
-    return environment_of(built, loaded.clock(), **options)
+    with loaded.naming(name):
+        return environment_of(built, loaded.clock(), **options)
 
 
 def environment_of(
@@ -83,19 +85,16 @@ def environment_of(
             that is not one of the above.
         UserCodeError, NotFinite: costs at the start that are not numbers.
     """
-    key = f"systems.{system.name}"
     if system.engine != "mujoco":
-        raise InvalidInput(
-            f"{key}.plant.engine", system.engine, "an environment is of engine 'mujoco'"
-        )
+        raise InvalidInput("system.engine", system.engine, "an environment is of engine 'mujoco'")
     if system.faults:
         raise InvalidInput(
-            f"{key}.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
+            "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
         )
     periods = clock.duration / clock.control_period
     if round(periods) < 1 or abs(periods - round(periods)) > 1e-6:
         raise InvalidInput(
-            "simulation.duration",
+            "clock.duration",
             clock.duration,
             f"an episode is a multiple of the control period {clock.control_period:g} s",
         )
@@ -118,12 +117,9 @@ def environment_of(
 
 def _physics(system: System, timestep: float) -> FleetPhysics:
     kind = MjcfPlant if isinstance(system.agents, MjcfRobots) else MujocoPlant
-    try:
+    with part_of("system"):
         plant = kind(system.agents, timestep, system.integrator)  # type: ignore[arg-type]
         return FleetPhysics(plant, system.game, system.state)
-    except InvalidInput as error:
-        where = f"systems.{system.name}.{error.key}"
-        raise InvalidInput(where, error.value, error.expected) from None
 
 
 def _information(system: System, structure: str | None, graph: Graph | str | None) -> Information:
@@ -135,8 +131,10 @@ def _information(system: System, structure: str | None, graph: Graph | str | Non
     if isinstance(graph, str):
         if graph not in NAMED:
             raise InvalidInput("graph", graph, nearest(graph, NAMED))
-        graph = NAMED[graph](game.agents)
-    return information_of(game, structure, law.graph if graph is None else graph)
+        with named(agents="graph"):
+            graph = NAMED[graph](game.agents)
+    with named(structure="information"):
+        return information_of(game, structure, law.graph if graph is None else graph)
 
 
 def _start(system: System, start: str | Start, spread: float) -> Start | None:

@@ -24,7 +24,7 @@ def law_policy(system: System) -> Policy:
     """
     if system.schedule is not None:
         raise InvalidInput(
-            f"systems.{system.name}.barrier.schedule",
+            "system.schedule",
             system.schedule.kind,
             "the policy does not know the time: leave the schedule out",
         )
@@ -35,7 +35,7 @@ def law_policy(system: System) -> Policy:
             return np.zeros(game.actions)
         if "all/output" not in timestep.observation:
             raise InvalidInput(
-                "information",
+                "timestep.observation",
                 list(timestep.observation),
                 "this law needs the observations of information 'full'",
             )

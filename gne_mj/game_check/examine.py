@@ -39,13 +39,12 @@ def examine(game: Game, start: Array, points: int = _ASKED[0], most: int = _ASKE
         return _Examination(game, points, most).of(start)
 
 
-def refuse(game: Game, start: Array, key: str) -> None:
+def refuse(game: Game, start: Array) -> None:
     """Refuse a game whose author contradicts himself, once for each game.
 
     Args:
         game: one that is tested is not looked at.
         start: (m,) a profile strictly inside.
-        key: what a message calls the system.
 
     Raises:
         InvalidInput: the first thing that differs.
@@ -58,8 +57,7 @@ def refuse(game: Game, start: Array, key: str) -> None:
         report = examine(game, start, *_AT_LOAD)
         for comparison in report.comparisons:
             if comparison.difference is not None:
-                name, value, expected = comparison.difference
-                raise InvalidInput(f"{key}.{name}", value, expected)
+                raise InvalidInput(*comparison.difference)
         done.add(_key(game))
     object.__setattr__(game, "_compared", True)
 

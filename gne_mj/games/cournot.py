@@ -39,23 +39,21 @@ def cournot_game(
         lower_bound: least quantities, one for all or one each.
         upper_bound: greatest quantities, above the least ones.
     """
-    check_count("agents.count", agents, MOST_COUPLED)
+    check_count("agents", agents, MOST_COUPLED)
     cost_of = agents * (1.0 + 0.5 * np.arange(agents)) if unit_cost is None else unit_cost
     columns = {"unit_cost": cost_of, "lower_bound": lower_bound, "upper_bound": upper_bound}
     arrays = {key: np.asarray(values, dtype=np.float64) for key, values in columns.items()}
     for key, array in arrays.items():
         if array.shape != (agents,) and (array.ndim or key == "unit_cost"):
-            raise InvalidInput(f"game.{key}", columns[key], f"it must list {agents} numbers")
+            raise InvalidInput(key, columns[key], f"it must list {agents} numbers")
         if not np.all(np.isfinite(array)):
-            raise InvalidInput(f"game.{key}", columns[key], "every entry must be finite")
+            raise InvalidInput(key, columns[key], "every entry must be finite")
     costs, lower, upper = (np.broadcast_to(array, (agents,)) for array in arrays.values())
     if not np.all(lower < upper):
-        raise InvalidInput(
-            "game.upper_bound", upper_bound, "every entry must be above the lower bound"
-        )
+        raise InvalidInput("upper_bound", upper_bound, "every entry must be above the lower bound")
     intercept = 60.0 * agents if demand_intercept is None else demand_intercept
     if not np.isfinite(intercept):
-        raise InvalidInput("game.demand_intercept", intercept, "it must be finite")
+        raise InvalidInput("demand_intercept", intercept, "it must be finite")
     everyone = list(range(agents))
     return Game(
         name="Cournot",

@@ -42,7 +42,7 @@ def osnr_game(
         total_power_limit: P_0 > 0 in mW.
     """
     agents = np.size(price)
-    check_count("agents.count", agents, MOST_COUPLED)
+    check_count("price", agents, MOST_COUPLED, "its channels")
     columns = {
         "price": price,
         "utility_weight": utility_weight,
@@ -52,19 +52,17 @@ def osnr_game(
     for key, values in columns.items():
         array = np.asarray(values, dtype=np.float64)
         if array.shape != (agents,):
-            raise InvalidInput(f"game.{key}", values, f"it must list {agents} numbers")
+            raise InvalidInput(key, values, f"it must list {agents} numbers")
         if not np.all(np.isfinite(array)) or not np.all(array > 0):
-            raise InvalidInput(f"game.{key}", values, "every entry must be positive and finite")
+            raise InvalidInput(key, values, "every entry must be positive and finite")
     matrix = np.array(system_matrix, dtype=np.float64)
     if matrix.shape != (agents, agents):
-        raise InvalidInput(
-            "game.system_matrix", matrix.shape, f"its shape must be ({agents}, {agents})"
-        )
+        raise InvalidInput("system_matrix", matrix.shape, f"its shape must be ({agents}, {agents})")
     np.fill_diagonal(matrix, 0.0)
     if not np.all(np.isfinite(matrix)) or np.any(matrix < 0):
-        raise InvalidInput("game.system_matrix", "...", "no entry may be negative or not finite")
+        raise InvalidInput("system_matrix", "...", "no entry may be negative or not finite")
     if not (np.isfinite(total_power_limit) and total_power_limit > 0):
-        raise InvalidInput("game.total_power_limit", total_power_limit, "it must be positive")
+        raise InvalidInput("total_power_limit", total_power_limit, "it must be positive")
     everyone = list(range(agents))
     total = Quantity(
         name="total_power",

@@ -46,18 +46,18 @@ def velocity_consensus_game(
     Raises:
         InvalidInput: a bad number or edge, or a connected part of the graph without a leader.
     """
-    reference = _finite("game.reference_velocity", reference_velocity)
-    weight = _finite("game.leader_weight", leader_weight)
+    reference = _finite("reference_velocity", reference_velocity)
+    weight = _finite("leader_weight", leader_weight)
     if np.any(weight < 0):
-        raise InvalidInput("game.leader_weight", leader_weight, "no entry may be negative")
+        raise InvalidInput("leader_weight", leader_weight, "no entry may be negative")
     agents, dimension = len(weight), len(reference)
     pairs = _checked(edges, agents)
     leaders = np.flatnonzero(weight > 0)
     _check_leaders(pairs, weight)
     bounds = np.concatenate(
         [
-            _bounds("game.gap_bound", gap_bound, len(pairs), "edge"),
-            _bounds("game.leader_gap_bound", leader_gap_bound, len(leaders), "leader"),
+            _bounds("gap_bound", gap_bound, len(pairs), "edge"),
+            _bounds("leader_gap_bound", leader_gap_bound, len(leaders), "leader"),
         ]
     )
     rows = [*pairs, *((int(i), agents) for i in leaders)]
@@ -142,11 +142,11 @@ def _checked(edges: Sequence[tuple[int, int]], agents: int) -> list[tuple[int, i
     for i, j in edges:
         shown = [i + 1, j + 1]
         if not (0 <= i < agents and 0 <= j < agents):
-            raise InvalidInput("game.edges", shown, f"agents are numbered 1 to {agents}")
+            raise InvalidInput("edges", shown, f"agents are numbered 1 to {agents}")
         if i == j:
-            raise InvalidInput("game.edges", shown, "an edge joins two agents")
+            raise InvalidInput("edges", shown, "an edge joins two agents")
         if frozenset((i, j)) in seen:
-            raise InvalidInput("game.edges", shown, "each pair may be listed once only")
+            raise InvalidInput("edges", shown, "each pair may be listed once only")
         seen.add(frozenset((i, j)))
     return [(int(i), int(j)) for i, j in edges]
 
@@ -166,7 +166,7 @@ def _check_leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) ->
         apart = [int(i) + 1 for i in np.flatnonzero(part == part[np.argmin(led)])]
         shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
         raise InvalidInput(
-            "game.leader_weight",
+            "leader_weight",
             weight.tolist(),
             "each connected part of the edges needs a leader, an agent of positive weight, and"
             f" that of agent{'s' * (len(apart) > 1)} {shown} has none",

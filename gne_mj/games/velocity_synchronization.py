@@ -40,18 +40,16 @@ def velocity_game(
     """
     bounds = np.broadcast_to(np.asarray(gap_bound, dtype=np.float64), (agents,))
     if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
-        raise InvalidInput("game.gap_bound", gap_bound, "every bound must be positive and finite")
+        raise InvalidInput("gap_bound", gap_bound, "every bound must be positive and finite")
     if desired_velocity is None:
         desired_velocity = reference_velocity
     desired = np.broadcast_to(np.asarray(desired_velocity, dtype=np.float64), (agents,))
     if not np.all(np.isfinite(desired)):
-        raise InvalidInput(
-            "game.desired_velocity", desired_velocity, "every velocity must be finite"
-        )
+        raise InvalidInput("desired_velocity", desired_velocity, "every velocity must be finite")
     weights = np.broadcast_to(np.asarray(desired_weight, dtype=np.float64), (agents,))
     if not np.all(weights >= 0) or not np.all(np.isfinite(weights)):
         raise InvalidInput(
-            "game.desired_weight", desired_weight, "every weight must be finite and not negative"
+            "desired_weight", desired_weight, "every weight must be finite and not negative"
         )
     reach = np.cumsum(bounds)
     gaps = Quantity(

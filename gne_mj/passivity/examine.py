@@ -103,11 +103,11 @@ def examine(
         raise InvalidInput("timestep", timestep, "it must be positive and finite")
     if not (np.isfinite(duration) and duration >= 40 * timestep):
         raise InvalidInput("duration", duration, "it must be finite and at least 40 timesteps")
-    check_count("duration: its timesteps", round(min(duration / timestep, 1e300)), MOST_TRIAL)
+    check_count("duration", round(min(duration / timestep, 1e300)), MOST_TRIAL, "its timesteps")
     check_count("trials", trials, MOST_RUNS)
     channels = build(1, timestep).agents.channels
     held = min(duration / timestep, HOLDS)
-    check_room("agents.count", channels, _KEPT * held * channels, "what a trial of them shows")
+    check_room("build", channels, _KEPT * held * channels, "what a trial of them shows")
     owner = np.arange(channels) if owners is None else np.asarray(owners, dtype=np.int64)
     if owner.shape != (channels,):
         raise InvalidInput("owners", owners, f"it must list {channels} agents, one a channel")

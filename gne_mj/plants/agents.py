@@ -33,18 +33,18 @@ class Agents:
         parameters = np.array(self.parameters, dtype=np.float64)
         if parameters.ndim != 2 or parameters.shape[1] != width:
             raise InvalidInput(
-                "agents.parameters", parameters.shape, f"its shape must be (channels, {width})"
+                "parameters", parameters.shape, f"its shape must be (channels, {width})"
             )
         if self.dimension < 1 or len(parameters) % self.dimension:
             raise InvalidInput(
-                "agents.dimension",
+                "dimension",
                 self.dimension,
                 f"it must be positive and divide the {len(parameters)} channels",
             )
         limit = np.array(self.input_limit, dtype=np.float64)
         if limit.shape != parameters.shape[:1] or not np.all(limit > 0):
             raise InvalidInput(
-                "agents.input_limit", limit, f"it must be {len(parameters)} positive numbers"
+                "input_limit", limit, f"it must be {len(parameters)} positive numbers"
             )
         parameters.flags.writeable = limit.flags.writeable = False
         object.__setattr__(self, "parameters", parameters)

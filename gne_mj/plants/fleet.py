@@ -50,12 +50,12 @@ def compose(
     """
     if dimension not in MODELS:
         raise InvalidInput(
-            "agents.dimension", dimension, "MuJoCo has flexible robots of one or two axes only"
+            "dimension", dimension, "MuJoCo has flexible robots of one or two axes only"
         )
     robots = parameters.reshape(-1, dimension, parameters.shape[1])
     if not np.all(robots[:, :, :2] == robots[:, :1, :2]):
         raise InvalidInput(
-            "agents.main_mass", "one a channel", "a robot's masses must be the same on all axes"
+            "parameters", "one a channel", "a robot's masses must be the same on all axes"
         )
     place, model, ends = MODELS[dimension]
     world = mujoco.MjSpec.from_string(read_model(place))
@@ -137,7 +137,7 @@ def compile_model(
         return world.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
-        raise InvalidInput("agents", "...", f"MuJoCo must compile it: {said}") from None
+        raise InvalidInput("world", "...", f"MuJoCo must compile it: {said}") from None
 
 
 def add_memory(world: mujoco.MjSpec, memory: int) -> None:

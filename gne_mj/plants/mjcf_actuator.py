@@ -90,7 +90,7 @@ def make_force(
         what = "the file's options disable it"
     if what:
         raise InvalidInput(
-            "agents.input",
+            "robot.input",
             robot.input,
             f"in {robot.path.name} {what}, where a law needs a force: make it a <motor>, or name"
             " another actuator",

@@ -86,7 +86,7 @@ def check_apart(
         i, j = min(owners[one]), min(owners[other])
         names = [model.geom(geom).name or "a nameless geom" for geom in (one, other)]
         raise InvalidInput(
-            "agents.file",
+            "robots",
             str(robots[i].path),
             f"at the start '{names[0]}' of agent {i + 1} overlaps '{names[1]}' of agent {j + 1},"
             " 2 m beside it: make its file narrower, or its floor a plane, which all share",

@@ -118,7 +118,7 @@ def _check_finite(path: Path, name: str, numbers: Any) -> None:
 
 
 def _refusal(path: Path | str, expected: str) -> InvalidInput:
-    return InvalidInput("agents.file", str(path), expected)
+    return InvalidInput("path", str(path), expected)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.errors import InvalidInput, nearest
+from gne_mj.errors import InvalidInput, named, nearest
 from gne_mj.native import kernel
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
@@ -92,7 +92,8 @@ class MjcfPlant(Plant):
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
-        world, sizes_of_robots, memory_asked = _world(agents.robots)
+        with named(path="agents.path"):
+            world, sizes_of_robots, memory_asked = _world(agents.robots)
         world.option.timestep = timestep
         world.option.integrator = getattr(
             mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS[integrator].upper()}"
@@ -100,10 +101,11 @@ class MjcfPlant(Plant):
         world.nuserdata = USERDATA_HEADER + userdata
         if memory:
             add_memory(world, memory)
-        self.model = mjcf_file.compiled(world, "...")
-        if memory_asked > self.model.narena:
-            world.memory = memory_asked
+        with named(path="agents.path"):
             self.model = mjcf_file.compiled(world, "...")
+            if memory_asked > self.model.narena:
+                world.memory = memory_asked
+                self.model = mjcf_file.compiled(world, "...")
         self.data = mujoco.MjData(self.model)
         with quiet():
             mujoco.mj_fwdPosition(self.model, self.data)
@@ -154,7 +156,9 @@ class MjcfPlant(Plant):
             raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
         kind = _check_sensor(model, robot, sensor) if sensor >= 0 else None
         own = kind == SENSOR.mjSENS_ACTUATORVEL and model.sensor_objid[sensor] == actuator
-        self._check_limit(i, robot, make_force(model, self.data, robot, actuator, own_velocity=own))
+        with named(robot="agents"):
+            least = make_force(model, self.data, robot, actuator, own_velocity=own)
+        self._check_limit(i, robot, least)
         ctrl = int(model.actuator_ctrladr[actuator])
         if kind is not None:
             if kind != SENSOR.mjSENS_JOINTVEL:
@@ -227,7 +231,8 @@ class MjcfPlant(Plant):
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
-        check_apart(self.model, self.data, self._owners, self.agents.robots)
+        with named(robots="agents.path"):
+            check_apart(self.model, self.data, self._owners, self.agents.robots)
         missed = np.abs(self.state[:, 0] - state[:, 0])
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
@@ -279,7 +284,7 @@ def _check_sensor(model: mujoco.MjModel, robot: RobotFile, sensor: int) -> Any:
     ):
         expected = (
             "the sensor must tell the velocity as it is: leave out its cutoff, delay and interval,"
-            " and declare a fault 'sensor-delay' instead"
+            " and declare late sensors as a fault instead"
         )
     if expected:
         raise InvalidInput("agents.output", robot.output, expected)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.native import callback, compiled, kernel, source_key
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
@@ -163,21 +163,18 @@ class MujocoPlant(Plant):
         decorated: bool = True,
     ) -> None:
         if agents.kind is not flexible_robot:
-            raise InvalidInput(
-                "plant.engine",
-                "mujoco",
-                f"only flexible robots have a model, not {agents.kind.NAME}s",
-            )
+            raise InvalidInput("agents", agents.kind.NAME, "only flexible robots have a model")
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
         self.passive = passive_callback(offsets())
-        self.model = compile_model(
-            compose(agents.parameters, dimension=agents.dimension, decorated=decorated),
-            timestep=timestep,
-            integrator=INTEGRATORS[integrator],
-            userdata=ARCTANGENTS + agents.channels + userdata,
-            memory=memory,
-        )
+        with part_of("agents"), named(world="agents"):
+            self.model = compile_model(
+                compose(agents.parameters, dimension=agents.dimension, decorated=decorated),
+                timestep=timestep,
+                integrator=INTEGRATORS[integrator],
+                userdata=ARCTANGENTS + agents.channels + userdata,
+                memory=memory,
+            )
         self.data = mujoco.MjData(self.model)
         self.table_arrays = self._table_arrays()
         self._table = Table(self.table_arrays)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.bounds import MOST_AGENTS
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, part_of
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
 from gne_mj.scenario_tables.table import (
+    Fills,
     PerAction,
     PerAgent,
     Sizes,
@@ -23,9 +24,12 @@ from gne_mj.scenario_tables.table import (
     per_agent,
 )
 
+# Of N a game and a graph are told as well
+Count = Annotated[int, Fills("game.agents"), Fills("game.count"), Fills("controller.agents")]
+
 
 class _AgentsTable(Table):
-    count: int = Field(gt=0, le=MOST_AGENTS, description="N")
+    count: Count = Field(gt=0, le=MOST_AGENTS, description="N")
     input_limit: PerAction | None = Field(
         None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
@@ -34,16 +38,15 @@ class _AgentsTable(Table):
         """(m,) limits, infinite where none is given."""
         if self.input_limit is None:
             return np.full(sum(sizes), np.inf)
-        limits = per_action("agents.input_limit", self.input_limit, sizes)
+        limits = per_action("input_limit", self.input_limit, sizes)
         if np.any(limits <= 0):
-            raise InvalidInput("agents.input_limit", self.input_limit, "it must be positive")
+            raise InvalidInput("input_limit", self.input_limit, "it must be positive")
         return limits
 
     def rows(self, sizes: Sizes, *names: str, positive: Iterable[str]) -> NDArray[np.float64]:
         """(m, len(names)) parameters, the same for all channels of an agent."""
         columns = [
-            per_agent(f"agents.{n}", getattr(self, n), self.count, positive=n in positive)
-            for n in names
+            per_agent(n, getattr(self, n), self.count, positive=n in positive) for n in names
         ]
         return np.repeat(np.column_stack(columns), sizes, axis=0)
 
@@ -64,7 +67,7 @@ class _RobotTable(_AgentsTable):
         names = flexible_robot.PARAMETERS
         table = self.rows(sizes, *names, positive=("main_mass", "appendage_mass"))
         if np.any(table[:, 4] < 0):
-            raise InvalidInput("agents.damping", self.damping, "no entry may be negative")
+            raise InvalidInput("damping", self.damping, "no entry may be negative")
         return Agents(flexible_robot, table, self.limits(sizes), self.axes)
 
 
@@ -105,7 +108,7 @@ class PiCascadeAgents(_AgentsTable):
         table = self.rows(sizes, *pi_cascade.PARAMETERS, positive=pi_cascade.PARAMETERS)
         if np.any(table[:, 1] >= table[:, 0]):
             raise InvalidInput(
-                "agents.integral_gain",
+                "integral_gain",
                 self.integral_gain,
                 "it must be below decay_rate (0 < k < v)",
             )
@@ -116,7 +119,9 @@ class MjcfAgents(_AgentsTable):
     """Robots of the user's own."""
 
     type: Literal["mjcf-robot"]
-    file: str | list[str] = Field(description="MJCF file, one for all or one each")
+    file: Annotated[str | list[str], Fills("path")] = Field(
+        description="MJCF file, one for all or one each"
+    )
     output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
     input: str | list[str] = Field(description="actuator that u_i drives")
 
@@ -128,9 +133,7 @@ class MjcfAgents(_AgentsTable):
             given = getattr(self, key)
             each = [given] * self.count if isinstance(given, str) else given
             if len(each) != self.count:
-                raise InvalidInput(
-                    f"agents.{key}", given, f"it must be one name or a list of {self.count}"
-                )
+                raise InvalidInput(key, given, f"it must be one name or a list of {self.count}")
             columns.append(each)
         robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
         return mjcf_robots(robots, self.limits(sizes))
@@ -156,11 +159,8 @@ class MixedAgents(Table):
         """The agents, for actions of so many entries each."""
         first, built = 0, []
         for index, group in enumerate(self.groups):
-            try:
+            with part_of(f"groups.{index}"):
                 built.append(group.build(sizes[first : first + group.count]))
-            except InvalidInput as error:
-                key = error.key.replace("agents", f"agents.groups.{index}", 1)
-                raise InvalidInput(key, error.value, error.expected) from None
             first += group.count
         return mixed.join(built, dimension_of(sizes))
 
@@ -169,7 +169,7 @@ def _check_sizes(kind: str, axes: int, sizes: Sizes) -> None:
     for size in sizes:
         if size != axes:
             raise InvalidInput(
-                "agents.type",
+                "type",
                 kind,
                 f"its agents act along {axes} {'axis' if axes == 1 else 'axes'}, and the game's"
                 f" actions have {size}",

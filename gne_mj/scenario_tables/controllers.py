@@ -1,13 +1,13 @@
 """The tables ``[systems.NAME.controller]``, one an information structure."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.game import Game
-from gne_mj.scenario_tables.table import Table
+from gne_mj.scenario_tables.table import Fills, Table
 from gne_mj.user_files import load_law
 
 
@@ -29,9 +29,10 @@ class FullController(_ControllerTable):
 
 
 class _NetworkController(_ControllerTable):
-    graph: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
-        Field("ring", description="a name, or edges as pairs of agents numbered from 1")
-    )
+    graph: Annotated[
+        Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]],
+        Fills("edges"),
+    ] = Field("ring", description="a name, or edges as pairs of agents numbered from 1")
 
     def network(self, count: int) -> graphs.Graph:
         """The communication graph."""
@@ -68,7 +69,9 @@ class CustomController(_NetworkController):
     """A law of the user's own."""
 
     information: Literal["custom"]
-    file: str = Field(description="Python file that defines law(game, graph, ...) or action(...)")
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file that defines law(game, graph, ...) or action(...)"
+    )
     parameters: dict[str, Any] = Field({}, description="handed to it")
 
     def build(self, game: Game) -> Law:

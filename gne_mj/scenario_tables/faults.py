@@ -143,7 +143,7 @@ class MarginTable(Table):
     def disturbance(self, game: Game) -> Disturbance:
         """The bounds, for each channel."""
         each = [
-            np.repeat(per_agent(f"margin.{key}", getattr(self, key), game.agents), game.sizes)
+            np.repeat(per_agent(key, getattr(self, key), game.agents), game.sizes)
             for key in ("push", "noise")
         ]
         return Disturbance(each[0], each[1], self.delay)

@@ -1,12 +1,13 @@
 """The tables ``[systems.NAME.game]``, one a game."""
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj import graph as graphs
+from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import (
@@ -16,7 +17,7 @@ from gne_mj.games import (
     velocity_consensus_game,
     velocity_game,
 )
-from gne_mj.scenario_tables.table import PerAgent, Table, per_agent
+from gne_mj.scenario_tables.table import Fills, PerAgent, Table, per_agent
 from gne_mj.user_files import load_game
 
 # The paper gives no initial velocities, and from rest the first gap would lie on its bound.
@@ -46,9 +47,9 @@ class VelocityGame(GameTable):
         return velocity_game(
             count,
             self.reference_velocity,
-            per_agent("game.gap_bound", self.gap_bound, count, positive=True),
-            None if desired is None else per_agent("game.desired_velocity", desired, count),
-            per_agent("game.desired_weight", self.desired_weight, count),
+            per_agent("gap_bound", self.gap_bound, count, positive=True),
+            None if desired is None else per_agent("desired_velocity", desired, count),
+            per_agent("desired_weight", self.desired_weight, count),
         )
 
     def default_start(self, count: int) -> NDArray[np.float64]:
@@ -78,8 +79,11 @@ class VelocityConsensusGame(GameTable):
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
+        check_count(
+            "agents", count * len(self.reference_velocity), MOST_ACTIONS, "the actions of all"
+        )
         given = self.leader_weight
-        weight = per_agent("game.leader_weight", 0.0 if given is None else given, count)
+        weight = per_agent("leader_weight", 0.0 if given is None else given, count)
         if given is None:
             weight[0] = 1.0
         return velocity_consensus_game(
@@ -93,10 +97,7 @@ class VelocityConsensusGame(GameTable):
     def _edges(self, count: int) -> list[tuple[int, int]]:
         if not isinstance(self.edges, str):
             return [(i - 1, j - 1) for i, j in self.edges]
-        try:
-            return list(graphs.NAMED[self.edges](count).edges)
-        except InvalidInput as error:
-            raise InvalidInput("game.edges", error.value, error.expected) from None
+        return list(graphs.NAMED[self.edges](count).edges)
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """Everyone half a leader's bound below the reference, along the first axis."""
@@ -120,13 +121,13 @@ class OsnrGame(GameTable):
         """The game for ``count`` agents."""
         parameters = ten_channels()
         if self.system_matrix is not None and len({len(row) for row in self.system_matrix}) > 1:
-            raise InvalidInput("game.system_matrix", "...", "its rows must be of one length")
+            raise InvalidInput("system_matrix", "...", "its rows must be of one length")
         given = self.model_dump(exclude={"type"}, exclude_none=True)
         parameters.update(given)
         for key in ("price", "utility_weight", "gain", "noise_power", "system_matrix"):
             if len(parameters[key]) != count:
                 raise InvalidInput(
-                    f"game.{key}",
+                    key,
                     f"{len(parameters[key])} channels",
                     f"agents.count is {count}; every list must have that many entries",
                 )
@@ -162,7 +163,9 @@ class CustomGame(GameTable):
 
     has_default_start: ClassVar[bool] = False
     type: Literal["custom"]
-    file: str = Field(description="Python file that defines game(count, ...)")
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file that defines game(count, ...)"
+    )
     parameters: dict[str, Any] = Field({}, description="handed to it")
 
     def build(self, count: int) -> Game:
@@ -171,4 +174,4 @@ class CustomGame(GameTable):
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """There is none."""
-        raise InvalidInput("initial.action", None, "a custom game has no default start: give one")
+        raise InvalidInput("action", None, "a custom game has no default start: give one")

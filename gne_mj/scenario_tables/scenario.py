@@ -1,7 +1,8 @@
 """The whole of a scenario file: the shared clock and the systems on it."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -11,10 +12,11 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj.barrier import Schedule
-from gne_mj.errors import InfeasibleStart, InvalidInput, nearest
+from gne_mj.controllers import Law
+from gne_mj.errors import InfeasibleStart, InvalidInput, named, nearest, part_of, renaming
 from gne_mj.game import Game
 from gne_mj.loops.base import Present
-from gne_mj.margins import with_margin
+from gne_mj.margins import Disturbance, with_margin
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.scenario_tables.agents import (
@@ -39,7 +41,7 @@ from gne_mj.scenario_tables.games import (
     VelocityConsensusGame,
     VelocityGame,
 )
-from gne_mj.scenario_tables.table import PerAction, Sizes, Table, per_action
+from gne_mj.scenario_tables.table import Fills, PerAction, Sizes, Table, per_action
 from gne_mj.simulation import Simulation
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System
@@ -51,8 +53,8 @@ class BarrierTable(Table):
     """[eq:logbarrier]"""
 
     rho: float = Field(0.1, gt=0, description="at the start, if it has a schedule")
-    schedule: Literal["exponential", "reciprocal", "halving"] | None = Field(
-        None, description="how rho falls in time; constant if left out"
+    schedule: Annotated[Literal["exponential", "reciprocal", "halving"] | None, Fills("kind")] = (
+        Field(None, description="how rho falls in time; constant if left out")
     )
     time_constant: float | None = Field(None, gt=0, description="s, of the schedule; 1 if left out")
     floor: float | None = Field(
@@ -67,9 +69,7 @@ class BarrierTable(Table):
         if self.schedule is None:
             for key in ("floor", "time_constant"):
                 if getattr(self, key) is not None:
-                    raise InvalidInput(
-                        f"barrier.{key}", getattr(self, key), "it goes with barrier.schedule"
-                    )
+                    raise InvalidInput(key, getattr(self, key), "it goes with barrier.schedule")
             return None
         lowest = min(floor, self.rho) if self.floor is None else self.floor
         return Schedule(self.schedule, self.rho, lowest, self.time_constant or 1.0)
@@ -89,12 +89,12 @@ class PlantTable(Table):
 class InitialTable(Table):
     """The start; what is left out rests, relaxed, at the default actions."""
 
-    action: PerAction | None = Field(None, description="y(0)")
+    action: Annotated[PerAction | None, Fills("state")] = Field(None, description="y(0)")
     extension: PerAction | None = Field(None, description="robots: x1(0) in m")
     appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
     position: PerAction | None = Field(None, description="robots: d(0) in m")
     integral: PerAction | None = Field(None, description="PI cascade: s(0)")
-    estimate: float | list[float] | list[list[float]] | None = Field(
+    estimate: Annotated[float | list[float] | list[list[float]] | None, Fills("memory")] = Field(
         None, description="one number, a profile that all agents hold, or one profile each; y(0)"
     )
     filtered: PerAction | None = Field(None, description="distributed law: z(0); y(0) if left out")
@@ -103,7 +103,7 @@ class InitialTable(Table):
         self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
-        y = default() if self.action is None else per_action("initial.action", self.action, sizes)
+        y = default() if self.action is None else per_action("action", self.action, sizes)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
         if agents.kind is flexible_robot:
@@ -113,8 +113,8 @@ class InitialTable(Table):
             if given is None:
                 continue
             if key not in names:
-                raise InvalidInput(f"initial.{key}", given, f"{agents.kind.NAME}s have no {key}")
-            state[:, names.index(key)] = per_action(f"initial.{key}", given, sizes)
+                raise InvalidInput(key, given, f"{agents.kind.NAME}s have no {key}")
+            state[:, names.index(key)] = per_action(key, given, sizes)
         return state
 
 
@@ -133,15 +133,18 @@ class SystemTable(Table):
         | MixedAgents
         | MjcfAgents,
         Field(discriminator="type"),
+        Fills(""),  # N is the game's too
     ]
-    barrier: BarrierTable = BarrierTable()
+    barrier: Annotated[BarrierTable, Fills("")] = BarrierTable()
     controller: Annotated[
         FullController | PartialController | DistributedController | CustomController,
         Field(discriminator="information"),
+        Fills("law"),
+        Fills(""),
     ] = FullController(information="full")
-    plant: PlantTable = PlantTable()
-    initial: InitialTable = InitialTable()
-    margin: MarginTable | None = Field(
+    plant: Annotated[PlantTable, Fills("")] = PlantTable()
+    initial: Annotated[InitialTable, Fills("")] = InitialTable()
+    margin: Annotated[MarginTable | None, Fills("disturbance")] = Field(
         None, description="the barrier is tightened so that these disturbances keep all inside"
     )
     faults: list[Annotated[FaultTable, Field(discriminator="type")]] = Field(
@@ -164,9 +167,9 @@ class SystemTable(Table):
         Raises:
             InvalidInput: no game can be made, or no such profile was found.
         """
-        count, given = self.agents.count, self.initial.action
-        try:
-            game = self.game.build(count)
+        given = self.initial.action
+        with self.naming(name):
+            game = self._game()
             if given is not None:
                 y = per_action("initial.action", given, game.sizes)
             elif self.game.type == "custom":  # it has no default start
@@ -176,11 +179,9 @@ class SystemTable(Table):
                     else 0.5 * (game.box[0] + game.box[1])
                 )
             else:
-                y = self.game.default_start(count)
+                y = self.game.default_start(self.agents.count)
             inside = bool(np.all(game.constraints(y) < 0.0))
             return game, y if inside else interior_profile(game, y)
-        except InvalidInput as error:
-            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
 
     def build(self, name: str, simulation: "SimulationTable", at: Present | None = None) -> System:
         """The system, with the simulation's integrator unless it names its own.
@@ -190,32 +191,27 @@ class SystemTable(Table):
             simulation: the clock's table.
             at: where it starts, in place of the initial table; its memory may be longer.
         """
-        count, integrator = self.agents.count, self.plant.integrator or simulation.integrator
+        with self.naming(name):
+            return self._build(name, simulation, at)
+
+    def _build(self, name: str, simulation: "SimulationTable", at: Present | None) -> System:
         period = simulation.control_period or simulation.timestep
-        try:
-            game, agents = self._parts(simulation)
+        game, agents = self._parts(simulation)
+        with part_of("controller"):
             law = self.controller.build(game)
-            check_estimates(name, game, law)
-            if at is None:
-                state = self.initial.build(
-                    agents, game.sizes, lambda: self.game.default_start(count)
-                )
-                filtered = self.initial.filtered
-                memory = law.initial_memory(
-                    state[:, agents.kind.OUTPUT],
-                    self.initial.estimate,
-                    None
-                    if filtered is None
-                    else per_action("initial.filtered", filtered, game.sizes),
-                )
-            else:
-                state = at.state
-                length = len(law.initial_memory(state[:, agents.kind.OUTPUT]))
-                memory = at.memory[:length].copy()
-            faults = tuple(fault.build() for fault in self.faults)
+        check_estimates(game, law)
+        if at is None:
+            state, memory = self._start(game, agents, law)
+        else:
+            state = at.state
+            length = len(law.initial_memory(state[:, agents.kind.OUTPUT]))
+            memory = at.memory[:length].copy()
+        faults = []
+        for number, fault in enumerate(self.faults):
+            with part_of(f"faults.{number}"):
+                faults.append(fault.build())
+        with part_of("barrier"):
             schedule = self.barrier.build(1e-9)
-        except InvalidInput as error:
-            raise InvalidInput(f"systems.{name}.{error.key}", error.value, error.expected) from None
         system = System(
             name=name,
             game=game,
@@ -223,20 +219,32 @@ class SystemTable(Table):
             law=law,
             rho=self.barrier.rho if schedule is None else schedule.floor,
             schedule=schedule,
-            faults=faults,
+            faults=tuple(faults),
             seed=simulation.seed,
-            disturbance=None if self.margin is None else self.margin.disturbance(game),
+            disturbance=self._disturbance(game),
             state=state,
             memory=memory,
             mode=self.controller.mode,
             decentralised=self.controller.decentralised,
             engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
-            integrator=integrator,
+            integrator=self.plant.integrator or simulation.integrator,
         )
         if schedule is None or self.barrier.floor is not None or system.mode == "implicit":
             return system
         floor = least_rho(system, period if system.mode == "sampled" else simulation.timestep)
         return replace(system, rho=floor, schedule=self.barrier.build(floor))
+
+    @contextmanager
+    def naming(self, name: str) -> Iterator[None]:
+        """Let what is refused within be named by the keys of this system, which has this name."""
+
+        def key_of(parameter: str) -> str:
+            # the clock is all systems'
+            of_all = parameter.startswith("simulation.")
+            return parameter if of_all else f"systems.{name}.{self.key_of(parameter)}"
+
+        with renaming(key_of):
+            yield
 
     def build_inside(
         self, name: str, simulation: "SimulationTable"
@@ -249,9 +257,9 @@ class SystemTable(Table):
         Raises:
             InvalidInput: see :class:`gne_mj.system.System`; no interior profile was found.
         """
-        count = self.agents.count
-        game, _ = self._parts(simulation)
         given = self.initial.action
+        with self.naming(name):
+            game, _ = self._parts(simulation)
         try:
             if given is None and not self.game.has_default_start:
                 why, wanted = "no start is given", np.zeros(game.actions)
@@ -260,11 +268,12 @@ class SystemTable(Table):
         except InfeasibleStart as error:
             why = str(error)
             wanted = (
-                self.game.default_start(count)
+                self.game.default_start(self.agents.count)
                 if given is None
                 else per_action("initial.action", given, game.sizes)
             )
-        profile = interior_profile(game, wanted)
+        with self.naming(name):
+            profile = interior_profile(game, wanted)
         table = self.starting_at(profile, game.sizes)
         # Estimates that were given belong to the start that was given.
         initial = table.initial.model_copy(update={"estimate": None, "filtered": None})
@@ -280,24 +289,52 @@ class SystemTable(Table):
 
     def _parts(self, simulation: "SimulationTable") -> tuple[Game, Agents]:
         """The game, with its margin, and the agents."""
-        game = self.game.build(self.agents.count)
-        agents = self.agents.build(game.sizes)
-        if self.margin is None:
+        game = self._game()
+        with part_of("agents"):
+            agents = self.agents.build(game.sizes)
+        disturbance = self._disturbance(game)
+        if disturbance is None:
             return game, agents
         if self.controller.mode != "implicit":
             raise InvalidInput(
                 "margin", "given", "it is for mode 'implicit', where a margin is a promise"
             )
         period = simulation.control_period or simulation.timestep
-        game = with_margin(
-            game,
-            agents,
-            self.margin.disturbance(game),
-            simulation.timestep,
-            self.plant.integrator or simulation.integrator,
-            max(1, round(period / simulation.timestep)),
-        )
+        with named(period="simulation.control_period"):
+            game = with_margin(
+                game,
+                agents,
+                disturbance,
+                simulation.timestep,
+                self.plant.integrator or simulation.integrator,
+                max(1, round(period / simulation.timestep)),
+            )
         return game, agents
+
+    def _game(self) -> Game:
+        with part_of("game"):
+            return self.game.build(self.agents.count)
+
+    def _disturbance(self, game: Game) -> Disturbance | None:
+        if self.margin is None:
+            return None
+        with part_of("margin"):
+            return self.margin.disturbance(game)
+
+    def _start(
+        self, game: Game, agents: Agents, law: Law
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """States (m, states) and the law's memory, as the initial table has them."""
+        count, sizes, initial = self.agents.count, game.sizes, self.initial
+        with part_of("initial"):
+            state = initial.build(agents, sizes, lambda: self.game.default_start(count))
+            filtered = initial.filtered
+            memory = law.initial_memory(
+                state[:, agents.kind.OUTPUT],
+                initial.estimate,
+                None if filtered is None else per_action("filtered", filtered, sizes),
+            )
+        return state, memory
 
 
 class SimulationTable(Table):
@@ -316,15 +353,17 @@ class SimulationTable(Table):
 class RecordingTable(Table):
     """What is kept."""
 
-    period: float = Field(0.05, gt=0, description="s between samples")
+    period: Annotated[float, Fills("sample_period")] = Field(
+        0.05, gt=0, description="s between samples"
+    )
 
 
 class Scenario(Table):
     """A whole run: systems on one clock."""
 
     description: str = ""
-    simulation: SimulationTable = SimulationTable()
-    recording: RecordingTable = RecordingTable()
+    simulation: Annotated[SimulationTable, Fills("clock")] = SimulationTable()
+    recording: Annotated[RecordingTable, Fills("clock")] = RecordingTable()
     systems: dict[str, SystemTable] = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -338,37 +377,39 @@ class Scenario(Table):
                 )
         return self
 
-    def name_of(self, given: str | None, key: str = "--system") -> str:
+    def name_of(self, system: str | None) -> str:
         """The system of this name, or the only one if none is given.
-
-        Args:
-            given: a name, or None.
-            key: what a message calls it.
 
         Raises:
             InvalidInput: there is no such system, or several and none is named.
         """
-        if given is None and len(self.systems) > 1:
-            raise InvalidInput(key, None, f"name one of {', '.join(self.systems)}")
-        name = given or next(iter(self.systems))
+        if system is None and len(self.systems) > 1:
+            raise InvalidInput("system", None, f"name one of {', '.join(self.systems)}")
+        name = next(iter(self.systems)) if system is None else system
         if name not in self.systems:
-            raise InvalidInput(key, name, nearest(name, self.systems))
+            raise InvalidInput("system", name, nearest(name, self.systems))
         return name
+
+    @contextmanager
+    def naming(self, system: str | None = None) -> Iterator[None]:
+        """Let what is refused within be named by the keys of this scenario.
+
+        Args:
+            system: the name of the one that what is called within has as its parameter ``system``.
+        """
+        with renaming(self.key_of), named(system=f"systems.{system}" if system else "system"):
+            yield
 
     def clock(self) -> Clock:
         """The shared clock."""
         simulation = self.simulation
-        try:
+        with self.naming(), part_of("clock"):
             return Clock(
                 duration=simulation.duration,
                 timestep=simulation.timestep,
                 control_period=simulation.control_period or simulation.timestep,
                 sample_period=self.recording.period,
             )
-        except InvalidInput as error:
-            if error.key == "simulation.sample_period":
-                raise InvalidInput("recording.period", error.value, error.expected) from None
-            raise
 
     def system_objects(self) -> list[System]:
         """The systems, checked.
@@ -393,14 +434,15 @@ class Scenario(Table):
         Raises:
             InvalidInput, InfeasibleStart: see :class:`gne_mj.system.System`.
         """
-        clock = self.clock()
-        return Simulation(
-            self.system_objects(),
-            clock,
-            tolerance=self.simulation.tolerance,
-            seed=self.simulation.seed,
-            source=self.model_dump_json(exclude_none=True),
-        )
+        clock, systems = self.clock(), self.system_objects()
+        with self.naming():
+            return Simulation(
+                systems,
+                clock,
+                tolerance=self.simulation.tolerance,
+                seed=self.simulation.seed,
+                source=self.model_dump_json(exclude_none=True),
+            )
 
 
 def _places(sizes: Sizes) -> NDArray[np.float64]:

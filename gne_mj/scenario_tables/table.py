@@ -1,6 +1,7 @@
 """What all tables of a scenario file share: their checks, and numbers given for each agent."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, get_args
 
 import numpy as np
@@ -23,8 +24,24 @@ Sizes = tuple[int, ...]
 PerAction = float | list[float] | list[list[float]]
 
 
+@dataclass(frozen=True)
+class Fills:
+    """Which parameter of what is built a key fills, where that has another name.
+
+    Args:
+        parameter: its name, behind those of what it is a part of, as in "game.agents". Empty at a
+            table whose keys all fill parameters of the same object as the table around it.
+    """
+
+    parameter: str
+
+
 class Table(BaseModel):
-    """A TOML table: unknown keys and numbers that are not finite are errors."""
+    """A TOML table: unknown keys and numbers that are not finite are errors.
+
+    A key fills the parameter of its own name of the object that its table builds, and those that
+    :class:`Fills` says; by that errors of the parameter are told as errors of the key.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -41,6 +58,15 @@ class Table(BaseModel):
                     )
         return values
 
+    def key_of(self, parameter: str) -> str:
+        """The dotted key in this table that filled a parameter; of a part of one what is known."""
+        parts = parameter.split(".")
+        for known in range(len(parts), 0, -1):
+            found = _filled(self, parts[:known])
+            if found is not None:
+                return ".".join([*found, *parts[known:]])
+        return parameter
+
     @classmethod
     def _hint(cls, key: str) -> str:
         """Where a key that is unknown here belongs, or the nearest one that is known here."""
@@ -55,6 +81,28 @@ class Table(BaseModel):
                         f" {choice} give the whole table{example}"
                     )
         return nearest(key, cls.model_fields)
+
+
+def _filled(value: Any, parts: Sequence[str]) -> list[str] | None:
+    """Which keys lead, in a table or list, to what filled a parameter; None if nothing did."""
+    if not parts:
+        return []
+    if isinstance(value, Table):
+        for name, field in type(value).model_fields.items():
+            fills = [each.parameter for each in field.metadata if isinstance(each, Fills)]
+            for begin in ([name], *(each.split(".") if each else [] for each in fills)):
+                if list(parts[: len(begin)]) == begin:
+                    within = _filled(getattr(value, name), parts[len(begin) :])
+                    if within is not None:
+                        return [name, *within]
+        return None
+    entries = dict(enumerate(value)) if isinstance(value, list) else value
+    if isinstance(entries, Mapping):
+        for key, entry in entries.items():
+            if str(key) == parts[0]:
+                within = _filled(entry, parts[1:])
+                return None if within is None else [parts[0], *within]
+    return None
 
 
 def all_tables() -> list[type[Table]]:

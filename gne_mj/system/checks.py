@@ -1,6 +1,7 @@
 """Whether the parts of a system fit together, and its start lies inside.
 
-Each function raises InvalidInput or InfeasibleStart, naming key, value and what would be right.
+Each function raises InvalidInput or InfeasibleStart, naming the system's parameter, its value and
+what would be right.
 """
 
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ import numpy as np
 
 from gne_mj.bounds import check_room
 from gne_mj.controllers import Law
-from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import (
     Bias,
     Noise,
@@ -34,12 +35,12 @@ ROSENBROCK_AGENTS = 200
 ESTIMATES = 8
 
 
-def check_estimates(name: str, game: Game, law: Law) -> None:
+def check_estimates(game: Game, law: Law) -> None:
     """Refuse laws whose agents' estimates, and what a loop makes of them, fill the memory."""
     if law.graph is not None:
         size = ESTIMATES * game.agents * game.actions
         what = f"what {game.agents} agents estimate of each other"
-        check_room(f"systems.{name}.agents.count", game.agents, size, what)
+        check_room("agents.count", game.agents, size, what)
 
 
 def check_parts(system: "System") -> None:
@@ -47,31 +48,31 @@ def check_parts(system: "System") -> None:
     m = system.game.actions
     if system.agents.channels != m:
         raise InvalidInput(
-            f"systems.{system.name}.agents.count",
+            "agents.count",
             system.agents.channels,
             f"the {system.game.name} game has {m} actions",
         )
     if system.state.shape != (m, system.agents.states):
         raise InvalidInput(
-            f"systems.{system.name}.initial",
+            "state",
             system.state.shape,
             f"the state's shape must be ({m}, {system.agents.states})",
         )
     if system.law.graph is not None and system.law.graph.agents != system.game.agents:
         raise InvalidInput(
-            f"systems.{system.name}.controller.graph",
+            "law.graph",
             system.law.graph.agents,
             f"the game has {system.game.agents} agents",
         )
     if system.mode != "continuous" and not system.law.propagates:
         raise InvalidInput(
-            f"systems.{system.name}.controller.mode",
+            "mode",
             system.mode,
             "a plain law with a memory runs in mode 'continuous'",
         )
     if system.mode == "implicit" and not system.law.implicit:
         raise InvalidInput(
-            f"systems.{system.name}.controller.mode",
+            "mode",
             system.mode,
             "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
             " with; use mode 'sampled'",
@@ -80,17 +81,16 @@ def check_parts(system: "System") -> None:
         system.mode != "implicit" or system.law.theorem is None or system.law.alone
     ):
         raise InvalidInput(
-            f"systems.{system.name}.controller.decentralised",
+            "decentralised",
             True,
             "it is for mode 'implicit' under full or partial information",
         )
     if not np.all(np.isfinite(system.state)):
-        raise InvalidInput(
-            f"systems.{system.name}.initial", "nan or inf", "every entry must be finite"
-        )
+        raise InvalidInput("state", "nan or inf", "every entry must be finite")
     for quantity in system.game.quantities:  # wrong shapes are better found before a run
-        quantity.at(system.start[None], system.game.entries(quantity))
-        quantity.bounds(system.game.entries(quantity))
+        with part_of(f"game.quantities.{quantity.name}"):
+            quantity.at(system.start[None], system.game.entries(quantity))
+            quantity.bounds(system.game.entries(quantity))
 
 
 def check_lists(system: "System", problem: Problem) -> None:
@@ -98,7 +98,7 @@ def check_lists(system: "System", problem: Problem) -> None:
 
     A law of one's own gives both itself, and native code believes what it is given.
     """
-    key = f"systems.{system.name}.controller.graph"
+    key = "law.graph"
     agents, (pointer, neighbour) = system.game.agents, problem.graph
     if system.law.graph is None:
         return
@@ -125,7 +125,7 @@ def check_lists(system: "System", problem: Problem) -> None:
 
 def check_start(system: "System") -> None:
     """Refuse a start that is not strictly inside, or within the barrier's tightening."""
-    key = f"systems.{system.name}.initial.action"
+    key = "state"
     with np.errstate(over="ignore"):  # a constraint that overflows is not kept either
         what = f"initial {system.game.action_name} {np.round(system.start[:6], 4).tolist()}"
         worst, value = system.game.tightest(system.start)
@@ -143,9 +143,7 @@ def check_start(system: "System") -> None:
 def check_memory(system: "System") -> None:
     """Refuse estimates at which an agent would evaluate the barrier outside."""
     if not np.all(np.isfinite(system.memory)):
-        raise InvalidInput(
-            f"systems.{system.name}.initial.estimate", "nan or inf", "every entry must be finite"
-        )
+        raise InvalidInput("memory", "nan or inf", "every entry must be finite")
     data = system.game.data
     profiles = system.law.barrier_profiles(system.game.agent_of_action, system.memory)
     for i, g in enumerate(system.game.constraints(profiles) + system.game.margins):
@@ -153,7 +151,7 @@ def check_memory(system: "System") -> None:
         outside = own[~(g[own] < 0.0)]
         if len(outside):
             raise InfeasibleStart(
-                f"systems.{system.name}.initial.estimate",
+                "memory",
                 f"initial estimates of agent {i + 1}",
                 system.game.constraint_names[outside[0]],
                 float(g[outside[0]]),
@@ -162,32 +160,31 @@ def check_memory(system: "System") -> None:
 
 def check_engine(system: "System") -> None:
     """Refuse agents, laws and modes that the engine or integrator does not run."""
-    key = f"systems.{system.name}.plant"
     if system.schedule is not None and system.integrator == "rosenbrock":
         raise InvalidInput(
-            f"{key}.integrator",
+            "integrator",
             system.integrator,
             "it is for a penalty that does not change in time; use 'rk4'",
         )
     own_model = isinstance(system.agents, MjcfRobots)
     if system.engine == "mujoco" and INTERPRETED:
         raise InvalidInput(
-            f"{key}.engine",
+            "engine",
             system.engine,
             "MuJoCo calls machine code only: unset NUMBA_DISABLE_JIT, or use engine 'ode'",
         )
     if system.engine == "mujoco" and not own_model and system.agents.kind is not flexible_robot:
         raise InvalidInput(
-            f"{key}.engine",
+            "engine",
             system.engine,
             f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
             f" {system.agents.kind.NAME}s on 'ode'",
         )
     if system.engine == "ode" and own_model:
-        raise InvalidInput(f"{key}.engine", system.engine, "MJCF robots run on 'mujoco'")
+        raise InvalidInput("engine", system.engine, "MJCF robots run on 'mujoco'")
     if system.integrator == "rosenbrock" and system.game.agents > ROSENBROCK_AGENTS:
         raise InvalidInput(
-            f"{key}.integrator",
+            "integrator",
             system.integrator,
             f"it keeps N x N x N numbers and is for up to {ROSENBROCK_AGENTS} agents, not"
             f" {system.game.agents}; use mode 'sampled'",
@@ -196,7 +193,7 @@ def check_engine(system: "System") -> None:
         not system.law.rosenbrock or system.mode != "continuous" or system.engine != "ode"
     ):
         raise InvalidInput(
-            f"{key}.integrator",
+            "integrator",
             system.integrator,
             "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4' or"
             " 'euler'",
@@ -205,15 +202,15 @@ def check_engine(system: "System") -> None:
 
 def check_faults(system: "System") -> None:
     """Refuse faults that the integrator, mode or agents do not know."""
-    key = f"systems.{system.name}.faults"
+    key = "faults"
     if system.faults and system.integrator == "rosenbrock":
         raise InvalidInput(key, "given", "integrator 'rosenbrock' knows none; use 'rk4'")
     for number, fault in enumerate(system.faults):
-        try:
+        where = f"{key}.{number}"
+        if fault.needs_graph and system.law.graph is None:
+            raise InvalidInput(where, type(fault).__name__, fault.needs_graph)
+        with part_of(where):
             for_native((fault,), system.game, system.law.graph, system.seed)
-        except InvalidInput as error:
-            where = error.key.replace("faults", f"{key}.{number}", 1)
-            raise InvalidInput(where, error.value, error.expected) from None
     m, graph = system.game.actions, system.law.graph
     kept = (sensor_delay(system.faults) + 1) * m * (system.agents.states + 1)
     if strikes_messages(system.faults) and graph is not None:

@@ -28,22 +28,20 @@ class Clock:
         for key in ("duration", "timestep", "control_period", "sample_period"):
             value = getattr(self, key)
             if not (np.isfinite(value) and value > 0):
-                raise InvalidInput(f"simulation.{key}", value, "it must be positive and finite")
+                raise InvalidInput(key, value, "it must be positive and finite")
             if not SHORTEST <= value <= LONGEST:
-                raise InvalidInput(
-                    f"simulation.{key}", value, f"it must lie from {SHORTEST:g} to {LONGEST:g} s"
-                )
+                raise InvalidInput(key, value, f"it must lie from {SHORTEST:g} to {LONGEST:g} s")
         for key in ("control_period", "sample_period", "duration"):
             steps = getattr(self, key) / self.timestep
             if steps > MOST_STEPS:
                 raise InvalidInput(
-                    f"simulation.{key}",
+                    key,
                     getattr(self, key),
                     f"it must be at most {MOST_STEPS:.0e} timesteps of {self.timestep:g} s",
                 )
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
                 raise InvalidInput(
-                    f"simulation.{key}",
+                    key,
                     getattr(self, key),
                     f"it must be a multiple of the timestep {self.timestep:g} s",
                 )

@@ -49,7 +49,7 @@ def check_step(system: "System", clock: Clock) -> None:
         if system.law.rosenbrock and system.engine == "ode":
             others = "integrator 'rosenbrock' and mode 'sampled' have no such limit"
         raise InvalidInput(
-            "simulation.timestep",
+            "clock.timestep",
             clock.timestep,
             f"the estimates of '{system.name}' follow each other at up to"
             f" {STABLE[system.integrator] / largest:.4g} /s, which '{system.integrator}' can follow"
@@ -62,7 +62,7 @@ def check_slopes(system: "System", clock: Clock) -> None:
     if system.mode != "implicit":
         return
     steps = clock.steps(clock.control_period)
-    check_count("simulation.control_period: its timesteps", steps, MOST_HELD)
+    check_count("clock.control_period", steps, MOST_HELD, "its timesteps")
     if isinstance(system.agents, MjcfRobots):
         return
     effect = influence(system.agents, clock.timestep, system.integrator, steps)
@@ -88,7 +88,7 @@ def _refuse_slopes(system: "System", slope: NDArray[np.float64], clock: Clock) -
     if not slope[worst] > 0:
         agent = int(system.game.agent_of_action[worst]) + 1
         raise InvalidInput(
-            "simulation.control_period",
+            "clock.control_period",
             clock.control_period,
             f"over it the output of agent {agent} of '{system.name}' does not rise with its input"
             f" (dy+/du = {slope[worst]:.4g}), which mode 'implicit' needs",

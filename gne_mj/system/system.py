@@ -13,7 +13,7 @@ from gne_mj.controllers import Law
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.controllers.settings import LINKS
 from gne_mj.equilibrium import Equilibrium, middle, order, penalised_equilibrium
-from gne_mj.errors import InvalidInput, SolverError
+from gne_mj.errors import InvalidInput, SolverError, named
 from gne_mj.faults import (
     Fault,
     for_native,
@@ -97,14 +97,14 @@ class System:
         object.__setattr__(self, "barrier", LogBarrier(self.game, self.rho))
         checks.check_parts(self)
         checks.check_start(self)
-        refuse(self.game, self.start, f"systems.{self.name}")
-        checks.check_estimates(self.name, self.game, self.law)
+        refuse(self.game, self.start)
+        checks.check_estimates(self.game, self.law)
         expected = self.law.initial_memory(self.start)
         if not len(self.memory):
             object.__setattr__(self, "memory", expected)
         elif self.memory.shape != expected.shape:
             raise InvalidInput(
-                f"systems.{self.name}.memory",
+                "memory",
                 f"shape {self.memory.shape}",
                 f"the {self.law.information} law's memory has shape {expected.shape}",
             )
@@ -265,6 +265,12 @@ class System:
         settings = self.law.settings(self.rho)
         if strikes_messages(self.faults):
             settings[LINKS] = len(self.memory)
+        with named(period="clock.control_period"):
+            propagator = (
+                no_propagator()
+                if self.mode == "continuous"
+                else self.law.propagator(clock.control_period)
+            )
         problem = Problem(
             data=self.game.data,
             graph=self.law.graph_data,
@@ -272,11 +278,7 @@ class System:
             limit=self.agents.input_limit,
             equilibrium=self.centre,
             size=self.typical_sizes,
-            propagator=(
-                no_propagator()
-                if self.mode == "continuous"
-                else self.law.propagator(clock.control_period)
-            ),
+            propagator=propagator,
             schedule=np.zeros(4) if self.schedule is None else self.schedule.numbers,
             order=self.rows,
             functions=self.functions,
@@ -334,22 +336,15 @@ class System:
             )  # fmt: skip
             fleet.reset(self.state)
             return fleet
-        try:
-            plant = MjcfPlant(
-                self.agents, timestep, self.integrator, userdata=userdata, memory=memory
-            )
-            plant.reset(self.state)
-        except InvalidInput as error:
-            raise InvalidInput(
-                f"systems.{self.name}.{error.key}", error.value, error.expected
-            ) from None
+        plant = MjcfPlant(self.agents, timestep, self.integrator, userdata=userdata, memory=memory)
+        plant.reset(self.state)
         if (
             not plant.measures_every_stage
             and self.mode == "continuous"
             and (self.integrator != "euler")
         ):
             raise InvalidInput(
-                f"systems.{self.name}.agents.output",
+                "agents.output",
                 [robot.output for robot in self.agents.robots],
                 "a tendon's or actuator's sensor is read once a step: use mode 'sampled', or"
                 " integrator 'euler', or name a joint",

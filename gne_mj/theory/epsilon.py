@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, part_of
 from gne_mj.system import Clock, System
 from gne_mj.theory.trials import stays_inside
 
@@ -37,6 +37,7 @@ class EpsilonSearch:
     note: str | None = None
 
 
+@part_of("system", "clock")
 def search_epsilon(
     system: System, clock: Clock, progress: Callable[[str], None] | None = None
 ) -> EpsilonSearch:
@@ -53,7 +54,7 @@ def search_epsilon(
     law = system.law
     if law.epsilon is None:
         raise InvalidInput(
-            f"systems.{system.name}.controller.information",
+            "law.information",
             law.information,
             "only the distributed law has an epsilon",
         )

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
+from gne_mj.errors import part_of
 from gne_mj.game import Box
 from gne_mj.system import Clock, System
 from gne_mj.system.steps import largest_step
@@ -54,6 +55,7 @@ class Guarantees:
         return plain
 
 
+@part_of("system", "clock")
 @np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock.
@@ -61,8 +63,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     Raises:
         InvalidInput: so many actions that matrices of so many rows and columns fill the memory.
     """
-    actions = f"systems.{system.name}.agents.count: the actions of all"
-    check_count(actions, system.game.actions, MOST_EXAMINED)
+    check_count("agents.count", system.game.actions, MOST_EXAMINED, "the actions of all")
     theorem = Theorem(system)
     held = Held(system, clock) if system.mode == "implicit" else None
     law, game, pieces = system.law, system.game, forecast(system, clock)

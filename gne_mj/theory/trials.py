@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import Fault, Push, steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import with_margin
@@ -75,6 +75,7 @@ def held_for(system: System, timestep: float, steps: int) -> System:
     return replace(system, game=game)
 
 
+@part_of("system", "clock")
 def search_period(
     system: System, clock: Clock, progress: Callable[[str], None] | None = None
 ) -> PeriodSearch:
@@ -87,9 +88,7 @@ def search_period(
         InvalidInput: mode continuous, which has no period.
     """
     if system.mode == "continuous":
-        raise InvalidInput(
-            f"systems.{system.name}.controller.mode", system.mode, "it holds no input"
-        )
+        raise InvalidInput("mode", system.mode, "it holds no input")
     trials: list[tuple[float, bool]] = []
 
     def stays(steps: int) -> bool:
@@ -124,6 +123,7 @@ def search_period(
     return PeriodSearch(good * h if good else None, bad and bad * h, tuple(trials), note)
 
 
+@part_of("system", "clock")
 def search_push(
     system: System, clock: Clock, progress: Callable[[str], None] | None = None
 ) -> PushSearch:

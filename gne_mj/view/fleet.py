@@ -53,7 +53,7 @@ class Fleet:
             recorded, now = values["configuration"], self.plant.model.nq
             if recorded.shape[1] != now:
                 raise InvalidInput(
-                    "agents.file",
+                    "trajectory",
                     f"{now} joint positions",
                     f"the run has recorded {recorded.shape[1]}: the robots' files have changed",
                 )

@@ -77,7 +77,7 @@ class Server:
             self._socket = socket.create_server((HOST, port))
         except OSError as error:
             raise InvalidInput(
-                "--port", port, f"it cannot be listened on ({error.strerror}); leave it out"
+                "port", port, f"it cannot be listened on ({error.strerror}); leave it out"
             ) from None
         self._socket.setblocking(False)
         self.port = int(self._socket.getsockname()[1])

@@ -13,7 +13,7 @@ import numpy as np
 from meshcat import Visualizer
 
 from gne_mj.certificate import status_now
-from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
+from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, part_of
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System
@@ -256,10 +256,11 @@ class Session:
         scenario = load_scenario(tables, {changed: given})
         run = self.simulation.runs[control.system]
         if run.inside and not self.simulation.ended:
-            system = _changed(run, scenario, control, value)
-            self._try(system, control, value)
-            what = f"{control.key} = {value!r}"
-            self.simulation.change(system, what, key=control.key, value=value)
+            what, own = f"{control.key} = {value!r}", ("clock", "systems", "simulation")
+            with scenario.naming(control.system), part_of("system", *own):
+                system = _changed(run, scenario, control, value)
+                self._try(system, control, value)
+                self.simulation.change(system, what, key=control.key, value=value)
             self._tell_interventions()
         else:
             self._notice("This holds from the next start on: its run has ended.", level="info")
