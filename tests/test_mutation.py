@@ -15,7 +15,7 @@ def operators():
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(FOLDER)
         yield importlib.import_module("operators")
-        for name in ("operators", "judge", "tree"):
+        for name in ("operators", "judge", "copies"):
             sys.modules.pop(name, None)
 
 

@@ -15,8 +15,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import coverage
+from copies import Tree, environment
 from operators import Mutant
-from tree import Tree, environment
 
 # Pages, packages and other products have tests that these modules hardly concern
 LEFT_OUT = ("test_browser", "test_notebook", "test_packaging", "test_peers", "test_view_")

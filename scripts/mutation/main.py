@@ -14,8 +14,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import judge
+from copies import Tree
 from operators import Mutant, differs, mutants
-from tree import Tree
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MODULES = (
