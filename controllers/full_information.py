@@ -6,12 +6,15 @@ u_i = -dJ_i/dy_i(y) - dphi/dy_i(y). A static law: it has no memory.
 import sys
 from dataclasses import dataclass
 from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
+from gne_mj.controllers.table import LawTable
 from gne_mj.controllers.theorem import LawTheorem
+from gne_mj.game import Game
 from gne_mj.native import copy, kernel
+from gne_mj.registry import LAWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,3 +89,14 @@ def propagate(problem, y, memory, scratch):
 def storage(problem, memory):
     """No memory, no storage."""
     return 0.0
+
+
+@LAWS.register
+class FullController(LawTable):
+    """[eq:nonlinFIfeedback]"""
+
+    information: Literal["full"]
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        return FullInformation()

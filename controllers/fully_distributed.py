@@ -10,10 +10,11 @@ The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`),
 import sys
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.controllers.estimates import (
     barrier_profile,
@@ -30,10 +31,13 @@ from gne_mj.controllers.law import (
     initial_estimates,
 )
 from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
+from gne_mj.controllers.table import NetworkTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
+from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
+from gne_mj.registry import LAWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,3 +228,16 @@ def propagate(problem, y, memory, scratch):
 def storage(problem, memory):
     """Nothing is claimed of the estimates."""
     return 0.0
+
+
+@LAWS.register
+class DistributedController(NetworkTable):
+    """[eq:CenterFeedback]"""
+
+    information: Literal["distributed"]
+    epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
+    gain: float = Field(1.0, gt=0, description="k")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        return FullyDistributed(self.network(game.agents), self.epsilon, self.gain)

@@ -13,10 +13,11 @@ The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`).
 import sys
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.estimates import (
@@ -34,9 +35,12 @@ from gne_mj.controllers.law import (
     initial_estimates,
 )
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
+from gne_mj.controllers.table import NetworkTable
 from gne_mj.controllers.theorem import LawTheorem
+from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
+from gne_mj.registry import LAWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,3 +172,16 @@ def storage(problem, memory):
         for r in range(at[i + 1], m):
             total += (memory[i * m + r] - y[r]) ** 2
     return 0.5 * problem.settings[TIME_CONSTANT] * total
+
+
+@LAWS.register
+class PartialController(NetworkTable):
+    """[eq:nonlinearPIFeedback]"""
+
+    information: Literal["partial"]
+    coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
+    time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        return PartialInformation(self.network(game.agents), self.coupling, self.time_constant)

@@ -173,6 +173,10 @@ class EngineError(GneError, RuntimeError):
     """MuJoCo cannot be driven natively here (unknown version, or callbacks already in use)."""
 
 
+class PluginError(GneError, RuntimeError):
+    """Another package's plug-in cannot be loaded; the cause is chained."""
+
+
 class SolverError(GneError, RuntimeError):
     """An iteration ended without reaching its tolerance; the numbers are attributes."""
 

@@ -1,11 +1,12 @@
-"""A user's own game or law: one Python file, of plain functions or of kernels.
+"""A user's own game, law or agent type: one Python file, of plain functions or of kernels.
 
 A game's file has ``game(count, **parameters)``, which returns a :class:`gne_mj.game.Game`; its
 functions are plain ones or all kernels (see :mod:`gne_mj.game` for their names). A law's file has
 ``law(game, graph, **parameters)``, which returns a :class:`gne_mj.controllers.Law`, or the plain
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
 for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; all of them take
-the scenario's parameters too, by name.
+the scenario's parameters too, by name. An agent type's file has constants and kernels as
+:mod:`gne_mj.plants.agent_type` lists them.
 """
 
 import hashlib
@@ -17,15 +18,26 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
+from gne_mj.controllers.table import NetworkTable
 from gne_mj.errors import USER_MODULES, GneError, InvalidInput, named, raised
 from gne_mj.game import Game
+from gne_mj.games.table import GameTable
 from gne_mj.graph import Graph
 from gne_mj.native import is_kernel
 from gne_mj.plain import check_arguments
+from gne_mj.plants.agent_type import complete
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.table import AgentsTable
+from gne_mj.registry import AGENTS, GAMES, LAWS
+from gne_mj.toml_table import Fills, PerAgent, Sizes, dimension_of, per_agent
 
 # What the functions of a plain law are called, and take besides the scenario's parameters
 _LAW_FUNCTIONS = {
@@ -86,6 +98,15 @@ def load_law(
             functions[name] = partial(function, **parameters)
     with named(rate="path"):
         return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
+
+
+def load_agent_type(path: str | Path) -> ModuleType:
+    """The agent type of a file.
+
+    Raises:
+        InvalidInput: the file cannot be read or run, or is no agent type.
+    """
+    return complete(_load(path), "path", Path(path).name)
 
 
 def _check_law(law: Law, file: str) -> None:
@@ -166,3 +187,62 @@ def _load(path: str | Path) -> ModuleType:
             raise
         raise InvalidInput("path", str(path), f"Python must run it: {raised(error)}") from error
     return module
+
+
+@GAMES.register
+class CustomGame(GameTable):
+    """A game of the user's own."""
+
+    has_default_start: ClassVar[bool] = False
+    type: Literal["custom"]
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file that defines game(count, ...)"
+    )
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        return load_game(self.file, count, self.parameters)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """There is none."""
+        raise InvalidInput("action", None, "a custom game has no default start: give one")
+
+
+@LAWS.register
+class CustomController(NetworkTable):
+    """A law of the user's own."""
+
+    information: Literal["custom"]
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file that defines law(game, graph, ...) or action(...)"
+    )
+    parameters: dict[str, Any] = Field({}, description="handed to it")
+
+    def build(self, game: Game) -> Law:
+        """The law."""
+        return load_law(self.file, game, self.network(game.agents), self.parameters)
+
+
+@AGENTS.register
+class CustomAgents(AgentsTable):
+    """Agents of the user's own, given by their differential equation."""
+
+    type: Literal["custom"]
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file with the kernels of an agent type"
+    )
+    parameters: dict[str, PerAgent] = Field({}, description="its PARAMETERS, by name")
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        kind = load_agent_type(self.file)
+        if set(self.parameters) != set(kind.PARAMETERS):
+            wanted = ", ".join(kind.PARAMETERS) or "none"
+            raise InvalidInput("parameters", sorted(self.parameters), f"{kind.NAME}s have {wanted}")
+        columns = [
+            np.repeat(per_agent(f"parameters.{name}", self.parameters[name], self.count), sizes)
+            for name in kind.PARAMETERS
+        ]
+        table = np.column_stack(columns) if columns else np.zeros((sum(sizes), 0))
+        return Agents(kind, table, self.limits(sizes), dimension_of(sizes))

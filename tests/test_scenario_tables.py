@@ -7,11 +7,14 @@ from builders import V0
 from gne_mj import faults
 from gne_mj.errors import InvalidInput
 from gne_mj.games import velocity_consensus_game
+from gne_mj.games.cournot import CournotTable
+from gne_mj.games.osnr import OsnrTable
+from gne_mj.games.velocity_consensus import VelocityConsensusTable
+from gne_mj.games.velocity_synchronization import VelocityTable
 from gne_mj.scenario import load_scenario
 from gne_mj.scenario_tables import faults as tables
-from gne_mj.scenario_tables.games import CournotGame, OsnrGame, VelocityConsensusGame, VelocityGame
 from gne_mj.scenario_tables.scenario import BarrierTable
-from gne_mj.scenario_tables.table import dimension_of, per_action, per_agent
+from gne_mj.toml_table import dimension_of, per_action, per_agent
 
 # Each kind with the keys it needs, all keys, and the faults that they mean
 KINDS = {
@@ -121,16 +124,16 @@ def test_numbers_for_agents():
 
 
 def test_default_starts():
-    cournot = CournotGame(type="cournot", lower_bound=[2.0, 4.0, 6.0], upper_bound=10.0)
+    cournot = CournotTable(type="cournot", lower_bound=[2.0, 4.0, 6.0], upper_bound=10.0)
     assert cournot.default_start(3).tolist() == [6.0, 7.0, 8.0]
-    assert CournotGame(type="cournot").default_start(2).tolist() == [53.5, 53.5]
-    line = VelocityGame(type="velocity-synchronization", gap_bound=[2.0, 9.0])
+    assert CournotTable(type="cournot").default_start(2).tolist() == [53.5, 53.5]
+    line = VelocityTable(type="velocity-synchronization", gap_bound=[2.0, 9.0])
     assert line.default_start(2).tolist() == [V0 - 1.0] * 2
     assert line.default_start(5).tolist() == [1.0, 0.0, -1.0, 0.5, 2.0]
-    plane = VelocityConsensusGame(type="velocity-consensus", leader_gap_bound=[4.0, 2.0])
+    plane = VelocityConsensusTable(type="velocity-consensus", leader_gap_bound=[4.0, 2.0])
     assert plane.default_start(2).tolist() == [0.0, 1.0, 0.0, 1.0]
-    assert OsnrGame(type="osnr", total_power_limit=5.0).default_start(4).tolist() == [1.0] * 4
-    assert OsnrGame(type="osnr").default_start(10) == pytest.approx(np.full(10, 0.2))
+    assert OsnrTable(type="osnr", total_power_limit=5.0).default_start(4).tolist() == [1.0] * 4
+    assert OsnrTable(type="osnr").default_start(10) == pytest.approx(np.full(10, 0.2))
 
 
 @pytest.mark.parametrize("name", ["velocity-sync", "cournot", "planar-sync"])

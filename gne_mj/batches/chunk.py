@@ -23,8 +23,8 @@ from gne_mj.loops.batch import Case
 from gne_mj.loops.faults import SEED
 from gne_mj.loops.layout import Setup
 from gne_mj.plain import raise_pending
-from gne_mj.scenario_tables.table import per_action
 from gne_mj.system import Clock, System
+from gne_mj.toml_table import per_action
 from gne_mj.variables import Labelled
 
 _STRUCTURES, _COMBINATIONS = 16, 1024  # that are kept; a structure has a model, rows and threads

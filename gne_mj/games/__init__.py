@@ -1,4 +1,7 @@
-"""Games that come with the package."""
+"""Games that come with the package: each file of this folder is one, and is found by being here."""
+
+from importlib import import_module
+from pkgutil import iter_modules
 
 from gne_mj.games.cournot import cournot_game
 from gne_mj.games.osnr import osnr_game, ten_channels
@@ -12,3 +15,6 @@ __all__ = [
     "velocity_consensus_game",
     "velocity_game",
 ]
+
+for _file in iter_modules(__path__):  # so that its table is registered
+    import_module(f"{__name__}.{_file.name}")

@@ -13,14 +13,19 @@ Parameters q = [N, D, c (N), lower (N), upper (N)].
 
 import sys
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.bounds import MOST_COUPLED, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
+from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
+from gne_mj.registry import GAMES
+from gne_mj.toml_table import PerAgent
 
 
 def cournot_game(
@@ -124,3 +129,23 @@ def constraint_gradient(q, l, a, y):
 def constraint_hessian(q, l, a, b, y):
     """All constraints are affine."""
     return 0.0
+
+
+@GAMES.register
+class CournotTable(GameTable):
+    """Firms of one product; what is left out has the published numbers for ``count`` firms."""
+
+    type: Literal["cournot"]
+    unit_cost: list[float] | None = Field(None, description="c_i; N (1 + (i - 1) / 2)")
+    demand_intercept: float | None = Field(None, description="D, price of an empty market; 60 N")
+    lower_bound: PerAgent = Field(7.0, description="least quantity of each firm")
+    upper_bound: PerAgent = Field(100.0, description="greatest quantity of each firm")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        return cournot_game(count, **self.model_dump(exclude={"type"}))
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """Every firm half way between its bounds."""
+        middle = 0.5 * (np.asarray(self.lower_bound) + np.asarray(self.upper_bound))
+        return np.broadcast_to(middle, (count,)).copy()

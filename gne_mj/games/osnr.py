@@ -11,16 +11,19 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from importlib.resources import files
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.bounds import MOST_COUPLED, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Box, Game
+from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
+from gne_mj.registry import GAMES
 
 
 def osnr_game(
@@ -198,3 +201,37 @@ def constraint_gradient(q, l, a, y):
 def constraint_hessian(q, l, a, b, y):
     """All constraints are affine."""
     return 0.0
+
+
+@GAMES.register
+class OsnrTable(GameTable):
+    """[eq:osnrGNE]; what is left out is taken from the ten-channel link."""
+
+    type: Literal["osnr"]
+    total_power_limit: float | None = Field(None, gt=0, description="P_0 in mW")
+    price: list[float] | None = None
+    utility_weight: list[float] | None = None
+    gain: list[float] | None = None
+    noise_power: list[float] | None = None
+    system_matrix: list[list[float]] | None = None
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        parameters = ten_channels()
+        if self.system_matrix is not None and len({len(row) for row in self.system_matrix}) > 1:
+            raise InvalidInput("system_matrix", "...", "its rows must be of one length")
+        given = self.model_dump(exclude={"type"}, exclude_none=True)
+        parameters.update(given)
+        for key in ("price", "utility_weight", "gain", "noise_power", "system_matrix"):
+            if len(parameters[key]) != count:
+                raise InvalidInput(
+                    key,
+                    f"{len(parameters[key])} channels",
+                    f"agents.count is {count}; every list must have that many entries",
+                )
+        return osnr_game(**parameters)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """80% of the power limit, shared equally."""
+        limit = self.total_power_limit or ten_channels()["total_power_limit"]
+        return np.full(count, 0.8 * limit / count)

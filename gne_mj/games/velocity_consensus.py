@@ -13,16 +13,23 @@ where each agent's neighbours start (N + 1), neighbours].
 
 import sys
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from gne_mj import graph as graphs
+from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Box, Game
+from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
+from gne_mj.registry import GAMES
+from gne_mj.toml_table import PerAgent, per_agent
 
 HEADER = 3
 
@@ -277,3 +284,50 @@ def constraint_hessian(q, l, a, b, y):
     if a % d != b % d:
         return 0.0
     return 2.0 if a == b else -2.0
+
+
+@GAMES.register
+class VelocityConsensusTable(GameTable):
+    """Velocity vectors synchronised over any graph, some agents knowing the reference."""
+
+    type: Literal["velocity-consensus"]
+    reference_velocity: list[float] = Field([1.0, 1.0], description="v_0 in m/s")
+    edges: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
+        Field("ring", description="a name, or pairs of agents numbered from 1; of the game, not"
+              " of who hears whom")
+    )  # fmt: skip
+    leader_weight: PerAgent | None = Field(
+        None, description="w_i, positive for leaders and 0 for others; if left out agent 1 leads"
+    )
+    gap_bound: PerAgent = Field(3.0, description="in m/s, positive; one or one for each edge")
+    leader_gap_bound: PerAgent = Field(
+        3.0, description="to v_0 in m/s, positive; one or one for each leader"
+    )
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        check_count(
+            "agents", count * len(self.reference_velocity), MOST_ACTIONS, "the actions of all"
+        )
+        given = self.leader_weight
+        weight = per_agent("leader_weight", 0.0 if given is None else given, count)
+        if given is None:
+            weight[0] = 1.0
+        return velocity_consensus_game(
+            self._edges(count),
+            weight.tolist(),
+            self.reference_velocity,
+            self.gap_bound,
+            self.leader_gap_bound,
+        )
+
+    def _edges(self, count: int) -> list[tuple[int, int]]:
+        if not isinstance(self.edges, str):
+            return [(i - 1, j - 1) for i, j in self.edges]
+        return list(graphs.NAMED[self.edges](count).edges)
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """Everyone half a leader's bound below the reference, along the first axis."""
+        start = np.tile(np.array(self.reference_velocity), (count, 1))
+        start[:, 0] -= 0.5 * np.min(self.leader_gap_bound)
+        return start.ravel()

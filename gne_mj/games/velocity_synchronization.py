@@ -9,14 +9,19 @@ Parameters q = [v_0, delta_1, ..., delta_N, v_1^d, ..., v_N^d, w_1, ..., w_N].
 """
 
 import sys
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
+from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
+from gne_mj.registry import GAMES
+from gne_mj.toml_table import PerAgent, per_agent
 
 
 def velocity_game(
@@ -140,3 +145,38 @@ def constraint_gradient(q, l, a, y):
 def constraint_hessian(q, l, a, b, y):
     """2 on the diagonal of the two agents' block, -2 off it."""
     return 2.0 if a == b else -2.0
+
+
+# The paper gives no initial velocities, and from rest the first gap would lie on its bound.
+DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
+
+
+@GAMES.register
+class VelocityTable(GameTable):
+    """[eq:sensorNetGNE]"""
+
+    type: Literal["velocity-synchronization"]
+    reference_velocity: float = Field(3.0, description="v_0 in m/s")
+    gap_bound: PerAgent = Field(3.0, description="delta_i in m/s, positive")
+    desired_velocity: PerAgent | None = Field(
+        None, description="v_i^d in m/s; the reference velocity if left out"
+    )
+    desired_weight: PerAgent = Field(0.0, description="w_i, not negative")
+
+    def build(self, count: int) -> Game:
+        """The game for ``count`` agents."""
+        desired = self.desired_velocity
+        return velocity_game(
+            count,
+            self.reference_velocity,
+            per_agent("gap_bound", self.gap_bound, count, positive=True),
+            None if desired is None else per_agent("desired_velocity", desired, count),
+            per_agent("desired_weight", self.desired_weight, count),
+        )
+
+    def default_start(self, count: int) -> NDArray[np.float64]:
+        """The named start for five agents; else everyone half a bound below the reference."""
+        if count == len(DEFAULT_VELOCITIES):
+            return np.array(DEFAULT_VELOCITIES)
+        first = self.gap_bound if isinstance(self.gap_bound, float) else self.gap_bound[0]
+        return np.full(count, self.reference_velocity - 0.5 * first)

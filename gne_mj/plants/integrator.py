@@ -8,9 +8,16 @@ given parameters meet the theory's assumption), and the kernels below; x' is aff
 define ``energy_balance``, from which the theory's rates follow.
 """
 
+import sys
+from typing import Literal
+
 import numpy as np
 
 from gne_mj.native import kernel
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.table import AgentsTable
+from gne_mj.registry import AGENTS
+from gne_mj.toml_table import Sizes, dimension_of
 
 NAME = "integrator"
 PARAMETERS: tuple[str, ...] = ()
@@ -80,3 +87,15 @@ def rate_given(q, x, u, known, out):
 def storage_given(q, x, rest, known):
     """As :func:`storage`, likewise."""
     return storage(q, x, rest)
+
+
+@AGENTS.register
+class IntegratorAgents(AgentsTable):
+    """[eq:int]"""
+
+    type: Literal["integrator"]
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = np.zeros((sum(sizes), 0))
+        return Agents(sys.modules[__name__], table, self.limits(sizes), dimension_of(sizes))

@@ -8,13 +8,18 @@ and the type's own numbers, padded with zeros.
 import sys
 from collections.abc import Sequence
 from types import ModuleType
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from gne_mj.errors import part_of
 from gne_mj.native import kernel
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
+from gne_mj.registry import AGENTS
+from gne_mj.toml_table import Sizes, Table, dimension_of
 
 NAME = "mixed fleet"
 STATES = (
@@ -150,3 +155,34 @@ def storage_given(q, x, rest, known):
     if q[0] == ROBOT:
         return flexible_robot.storage_given(q[1:], x, rest, known)
     return storage(q, x, rest)
+
+
+@AGENTS.register
+class MixedAgents(Table):
+    """Agents of several types."""
+
+    engine: ClassVar[str] = "ode"
+    type: Literal["mixed"]
+    groups: list[
+        Annotated[
+            flexible_robot.RobotAgents
+            | flexible_robot.PlanarRobotAgents
+            | integrator.IntegratorAgents
+            | pi_cascade.PiCascadeAgents,
+            Field(discriminator="type"),
+        ]
+    ] = Field(min_length=1, description="tables of agents, one behind the other")
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return sum(group.count for group in self.groups)
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        first, built = 0, []
+        for index, group in enumerate(self.groups):
+            with part_of(f"groups.{index}"):
+                built.append(group.build(sizes[first : first + group.count]))
+            first += group.count
+        return join(built, dimension_of(sizes))

@@ -7,12 +7,17 @@ of it; :mod:`gne_mj.passivity` examines them by experiment. Channel parameters: 
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+from pydantic import Field
 
+from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.table import AgentsTable, check_sizes
+from gne_mj.registry import AGENTS
+from gne_mj.toml_table import Fills, Sizes
 
 NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
@@ -76,3 +81,29 @@ def equilibrium(q, y, out):
 def storage(q, x, rest):
     """Not known: nothing is measured."""
     return 0.0
+
+
+@AGENTS.register
+class MjcfAgents(AgentsTable):
+    """Robots of the user's own."""
+
+    engine: ClassVar[str] = "mujoco"
+    type: Literal["mjcf-robot"]
+    file: Annotated[str | list[str], Fills("path")] = Field(
+        description="MJCF file, one for all or one each"
+    )
+    output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
+    input: str | list[str] = Field(description="actuator that u_i drives")
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of one entry each."""
+        check_sizes(self.type, 1, sizes)
+        columns = []
+        for key in ("file", "output", "input"):
+            given = getattr(self, key)
+            each = [given] * self.count if isinstance(given, str) else given
+            if len(each) != self.count:
+                raise InvalidInput(key, given, f"it must be one name or a list of {self.count}")
+            columns.append(each)
+        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
+        return mjcf_robots(robots, self.limits(sizes))

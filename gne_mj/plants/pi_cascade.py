@@ -7,9 +7,18 @@ r = k / (v - k); for v = 1, k = 1/2 it is [[2, -1], [-1, 1]].
 Channel parameters q = [v, k], both in 1/s.
 """
 
-import numpy as np
+import sys
+from typing import Literal
 
+import numpy as np
+from pydantic import Field
+
+from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
+from gne_mj.plants.agents import Agents
+from gne_mj.plants.table import AgentsTable
+from gne_mj.registry import AGENTS
+from gne_mj.toml_table import PerAgent, Sizes, dimension_of
 
 NAME = "PI cascade"
 PARAMETERS = ("decay_rate", "integral_gain")
@@ -87,3 +96,23 @@ def rate_given(q, x, u, known, out):
 def storage_given(q, x, rest, known):
     """As :func:`storage`, likewise."""
     return storage(q, x, rest)
+
+
+@AGENTS.register
+class PiCascadeAgents(AgentsTable):
+    """[eq:cascadePI]"""
+
+    type: Literal["pi-cascade"]
+    decay_rate: PerAgent = Field(1.0, description="v in 1/s")
+    integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
+
+    def build(self, sizes: Sizes) -> Agents:
+        """The agents, for actions of so many entries each."""
+        table = self.rows(sizes, *PARAMETERS, positive=PARAMETERS)
+        if np.any(table[:, 1] >= table[:, 0]):
+            raise InvalidInput(
+                "integral_gain",
+                self.integral_gain,
+                "it must be below decay_rate (0 < k < v)",
+            )
+        return Agents(sys.modules[__name__], table, self.limits(sizes), dimension_of(sizes))

@@ -5,6 +5,6 @@ object they describe.
 """
 
 from gne_mj.scenario_tables.scenario import Scenario, SystemTable
-from gne_mj.scenario_tables.table import union_tags
+from gne_mj.toml_table import union_tags
 
 __all__ = ["Scenario", "SystemTable", "union_tags"]

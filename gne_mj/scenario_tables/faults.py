@@ -8,10 +8,13 @@ from pydantic import Field
 from gne_mj import faults
 from gne_mj.game import Game
 from gne_mj.margins import Disturbance
-from gne_mj.scenario_tables.table import PerAgent, Table, per_agent
+from gne_mj.registry import FAULTS
+from gne_mj.toml_table import PerAgent, Table, per_agent
 
 
-class _FaultTable(Table):
+class FaultTable(Table):
+    """A fault."""
+
     fault: ClassVar[type[faults.Fault]]
 
     def build(self) -> faults.Fault:
@@ -26,7 +29,7 @@ class _FaultTable(Table):
         return self.fault(**given)
 
 
-class _SomeTable(_FaultTable):
+class _SomeTable(FaultTable):
     agents: list[int] | None = Field(
         None, min_length=1, description="numbered from 1; all if left out"
     )
@@ -34,6 +37,7 @@ class _SomeTable(_FaultTable):
     end: float | None = Field(None, gt=0, description="s; the run's end if left out")
 
 
+@FAULTS.register
 class PushTable(_SomeTable):
     """A force besides the input."""
 
@@ -47,6 +51,7 @@ class PushTable(_SomeTable):
     period: float = Field(1.0, gt=0, description="s, of 'sine' and 'square'")
 
 
+@FAULTS.register
 class SaturationTable(_SomeTable):
     """Actuators that deliver less."""
 
@@ -55,6 +60,7 @@ class SaturationTable(_SomeTable):
     limit: float = Field(ge=0, description="greatest |u| meanwhile")
 
 
+@FAULTS.register
 class NoiseTable(_SomeTable):
     """Outputs read with noise."""
 
@@ -63,6 +69,7 @@ class NoiseTable(_SomeTable):
     amplitude: float = Field(ge=0, description="greatest error, uniform")
 
 
+@FAULTS.register
 class BiasTable(_SomeTable):
     """Outputs read with a constant error."""
 
@@ -71,7 +78,8 @@ class BiasTable(_SomeTable):
     offset: float = Field(description="what is read less what is")
 
 
-class SensorDelayTable(_FaultTable):
+@FAULTS.register
+class SensorDelayTable(FaultTable):
     """All sensors read what was some periods ago."""
 
     fault = faults.SensorDelay
@@ -85,6 +93,7 @@ class _LinksTable(_SomeTable):
     )
 
 
+@FAULTS.register
 class MessageLossTable(_LinksTable):
     """Messages that do not arrive."""
 
@@ -93,6 +102,7 @@ class MessageLossTable(_LinksTable):
     probability: float = Field(ge=0, le=1)
 
 
+@FAULTS.register
 class MessageDelayTable(_LinksTable):
     """Messages that arrive late."""
 
@@ -101,6 +111,7 @@ class MessageDelayTable(_LinksTable):
     periods: int = Field(ge=0, description="control periods")
 
 
+@FAULTS.register
 class SilenceTable(_LinksTable):
     """Edges or agents that go silent."""
 
@@ -108,7 +119,8 @@ class SilenceTable(_LinksTable):
     type: Literal["silence"]
 
 
-class CorruptionTable(_FaultTable):
+@FAULTS.register
+class CorruptionTable(FaultTable):
     """Estimates shifted once, at the start."""
 
     fault = faults.Corruption
@@ -118,19 +130,6 @@ class CorruptionTable(_FaultTable):
     )
     start: float = Field(0.0, ge=0, description="s")
     amplitude: float = Field(ge=0, description="greatest shift, uniform")
-
-
-FaultTable = (
-    PushTable
-    | SaturationTable
-    | NoiseTable
-    | BiasTable
-    | SensorDelayTable
-    | MessageLossTable
-    | MessageDelayTable
-    | SilenceTable
-    | CorruptionTable
-)
 
 
 class MarginTable(Table):

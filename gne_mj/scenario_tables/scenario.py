@@ -11,42 +11,29 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+import gne_mj.user_files  # noqa: F401  registers games and laws of the user's own
 from gne_mj.barrier import Schedule
 from gne_mj.controllers import Law
+from gne_mj.controllers.full_information import FullController
+from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InfeasibleStart, InvalidInput, named, nearest, part_of, renaming
 from gne_mj.game import Game
+from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
-from gne_mj.scenario_tables.agents import (
-    IntegratorAgents,
-    MixedAgents,
-    MjcfAgents,
-    PiCascadeAgents,
-    PlanarRobotAgents,
-    RobotAgents,
-)
-from gne_mj.scenario_tables.controllers import (
-    CustomController,
-    DistributedController,
-    FullController,
-    PartialController,
-)
+from gne_mj.plants.table import AgentsTable
+from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, load_plugins
 from gne_mj.scenario_tables.faults import FaultTable, MarginTable
-from gne_mj.scenario_tables.games import (
-    CournotGame,
-    CustomGame,
-    OsnrGame,
-    VelocityConsensusGame,
-    VelocityGame,
-)
-from gne_mj.scenario_tables.table import Fills, PerAction, Sizes, Table, per_action
 from gne_mj.simulation import Simulation
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System
 from gne_mj.system.checks import check_estimates
 from gne_mj.theory.periods import least_rho
+from gne_mj.toml_table import Fills, PerAction, Sizes, Table, per_action
+
+load_plugins()  # the tables below hold any of those that are registered
 
 
 class BarrierTable(Table):
@@ -121,33 +108,19 @@ class InitialTable(Table):
 class SystemTable(Table):
     """One game with its agents."""
 
-    game: Annotated[
-        VelocityGame | VelocityConsensusGame | OsnrGame | CournotGame | CustomGame,
-        Field(discriminator="type"),
-    ]
-    agents: Annotated[
-        RobotAgents
-        | PlanarRobotAgents
-        | IntegratorAgents
-        | PiCascadeAgents
-        | MixedAgents
-        | MjcfAgents,
-        Field(discriminator="type"),
-        Fills(""),  # N is the game's too
-    ]
+    game: Annotated[GameTable, GAMES]
+    # N is the game's too
+    agents: Annotated[AgentsTable, AGENTS, Fills("")]
     barrier: Annotated[BarrierTable, Fills("")] = BarrierTable()
-    controller: Annotated[
-        FullController | PartialController | DistributedController | CustomController,
-        Field(discriminator="information"),
-        Fills("law"),
-        Fills(""),
-    ] = FullController(information="full")
+    controller: Annotated[LawTable, LAWS, Fills("law"), Fills("")] = FullController(
+        information="full"
+    )
     plant: Annotated[PlantTable, Fills("")] = PlantTable()
     initial: Annotated[InitialTable, Fills("")] = InitialTable()
     margin: Annotated[MarginTable | None, Fills("disturbance")] = Field(
         None, description="the barrier is tightened so that these disturbances keep all inside"
     )
-    faults: list[Annotated[FaultTable, Field(discriminator="type")]] = Field(
+    faults: list[Annotated[FaultTable, FAULTS]] = Field(
         [], description="what goes wrong, each from a start (s) to an end"
     )
 
@@ -172,7 +145,7 @@ class SystemTable(Table):
             game = self._game()
             if given is not None:
                 y = per_action("initial.action", given, game.sizes)
-            elif self.game.type == "custom":  # it has no default start
+            elif not self.game.has_default_start:
                 y = (
                     np.zeros(game.actions)
                     if game.box is None
@@ -226,7 +199,7 @@ class SystemTable(Table):
             memory=memory,
             mode=self.controller.mode,
             decentralised=self.controller.decentralised,
-            engine=self.plant.engine or ("mujoco" if self.agents.type == "mjcf-robot" else "ode"),
+            engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
         )
         if schedule is None or self.barrier.floor is not None or system.mode == "implicit":

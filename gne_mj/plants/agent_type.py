@@ -1,0 +1,74 @@
+"""What a module needs to be an agent type, looked at once, and what is made where it has none.
+
+See :mod:`gne_mj.plants.integrator` for what each name means.
+"""
+
+from types import ModuleType
+from typing import Any
+
+from gne_mj.errors import InvalidInput
+from gne_mj.native import is_kernel, kernel
+from gne_mj.plain import check_arguments
+
+CONSTANTS = ("NAME", "PARAMETERS", "STATES", "OUTPUT", "INPUT_UNIT")
+KERNELS = {
+    "rate": ("q", "x", "u", "out"),
+    "jacobian": ("q", "x", "out"),
+    "equilibrium": ("q", "y", "out"),
+    "storage": ("q", "x", "rest"),
+}
+
+
+def complete(module: ModuleType, key: str = "module", name: str = "") -> ModuleType:
+    """The same module, with the kernels that follow from its others.
+
+    Args:
+        module: with what CONSTANTS and KERNELS list.
+        key, name: what a message calls the module, and its name there.
+
+    Raises:
+        InvalidInput: something is missing, or takes other arguments.
+    """
+    name = name or module.__name__
+    for constant in CONSTANTS:
+        if not hasattr(module, constant):
+            raise InvalidInput(key, name, f"it must define {constant}")
+    states, output = module.STATES, module.OUTPUT
+    if not all(isinstance(each, tuple) and len(each) == 2 for each in states):
+        raise InvalidInput(key, name, "its STATES must be pairs of a name and a unit")
+    if not (isinstance(output, int) and 0 <= output < len(states)):
+        raise InvalidInput(
+            key, name, f"its OUTPUT must be the number of one of {len(states)} states"
+        )
+    for kind, arguments in KERNELS.items():
+        function = getattr(module, kind, None)
+        if not is_kernel(function):
+            raise InvalidInput(key, name, f"it must define a kernel {kind}({', '.join(arguments)})")
+        check_arguments(key, name, function, kind, arguments)
+    for made, function in _made(module.rate, module.storage, len(states)).items():
+        if not hasattr(module, made):
+            setattr(module, made, function)
+    return module
+
+
+def _made(rate: Any, storage: Any, states: int) -> dict[str, Any]:
+    @kernel
+    def euler_step(q, x, u, h, out):
+        rate(q, x, u, out)
+        for s in range(states):
+            out[s] = x[s] + h * out[s]
+
+    @kernel
+    def shared(q, x):
+        return 0.0
+
+    @kernel
+    def rate_given(q, x, u, known, out):
+        rate(q, x, u, out)
+
+    @kernel
+    def storage_given(q, x, rest, known):
+        return storage(q, x, rest)
+
+    made = (euler_step, shared, rate_given, storage_given)
+    return {function.__name__: function for function in made}
