@@ -19,6 +19,7 @@ from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.errors import InvalidInput, named
 from gne_mj.game import Game
 from gne_mj.plants import mixed
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.agents import Agents, input_columns
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ def influence(
     Raises:
         InvalidInput: agents of which no ODE is known.
     """
-    if not hasattr(agents.kind, "rate"):
+    if not has_ode(agents.kind):
         raise InvalidInput(
             "agents",
             agents.kind.NAME,

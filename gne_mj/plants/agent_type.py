@@ -6,6 +6,9 @@ See :mod:`gne_mj.plants.integrator` for what each name means.
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gne_mj.errors import InvalidInput
 from gne_mj.native import is_kernel, kernel
 from gne_mj.plain import check_arguments
@@ -49,6 +52,29 @@ def complete(module: ModuleType, key: str = "module", name: str = "") -> ModuleT
         if not hasattr(module, made):
             setattr(module, made, function)
     return module
+
+
+def has_ode(kind: ModuleType) -> bool:
+    """Whether a type is given by a differential equation; of MJCF robots only MuJoCo knows it."""
+    return hasattr(kind, "rate")
+
+
+def knows_storage(kind: ModuleType) -> bool:
+    """Whether it has a storage function; without one, ``storage`` is zero."""
+    return bool(getattr(kind, "KNOWS_STORAGE", True))
+
+
+def is_passive(kind: ModuleType, parameters: NDArray[np.float64]) -> bool:
+    """Whether it says that channels with these numbers meet [asmp:nonlinearPlant]."""
+    return bool(getattr(kind, "is_passive", lambda _: False)(parameters))
+
+
+def energy_balance(
+    kind: ModuleType, parameters: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """P and D of channels with these numbers, each (m, s, s); None where it tells none."""
+    tells = getattr(kind, "energy_balance", None)
+    return None if tells is None else tells(parameters)
 
 
 def _made(rate: Any, storage: Any, states: int) -> dict[str, Any]:

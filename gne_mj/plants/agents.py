@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import compiled, source_key
+from gne_mj.plants.agent_type import has_ode, knows_storage
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +77,14 @@ class Agents:
     @cached_property
     def mobility(self) -> NDArray[np.float64] | None:
         """dy'/du of each channel, shape (m,), as 1/M of a robot; None where no ODE is known."""
-        if not hasattr(self.kind, "rate"):
+        if not has_ode(self.kind):
             return None
         return input_columns(self.kind, self.parameters)[:, self.kind.OUTPUT]
 
     @property
     def knows_storage(self) -> bool:
         """Whether the type has a storage function; without one, ``storage`` is zero."""
-        return bool(getattr(self.kind, "KNOWS_STORAGE", True))
+        return knows_storage(self.kind)
 
     def equilibrium(self, y: ArrayLike) -> NDArray[np.float64]:
         """pi(y): the states (m, states) that rest at the outputs y (m,) with u = 0."""

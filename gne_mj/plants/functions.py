@@ -22,6 +22,7 @@ from gne_mj.native import (
     shaped,
     source_key,
 )
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.table import floats_at
 
 EULER, RK4 = 0, 1
@@ -34,7 +35,7 @@ _whole, _real = types.int64, types.float64
 
 def compiled_functions(agent: ModuleType) -> NDArray[np.int64]:
     """The addresses for ``Channels.functions``; 0 for a type that only MuJoCo knows."""
-    if not hasattr(agent, "rate"):
+    if not has_ode(agent):
         return np.zeros(_COUNT, dtype=np.int64)
     return np.array([owner.address for owner in _compiled(agent)], dtype=np.int64)
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gne_mj.margins import is_affine
+from gne_mj.plants.agent_type import energy_balance, is_passive
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
@@ -70,9 +71,9 @@ def plants(system: System) -> Assumption:
     label = "asmp:nonlinearPlant"
     kinds = types(system.agents)
     names = ", ".join(f"{kind.NAME}s" for kind, _ in kinds)
-    if all(getattr(kind, "is_passive", lambda _: False)(rows) for kind, rows in kinds):
+    if all(is_passive(kind, rows) for kind, rows in kinds):
         return Assumption(label, MET, f"{names} with these parameters are passive")
-    if all(hasattr(kind, "energy_balance") for kind, _ in kinds):
+    if all(energy_balance(kind, rows) is not None for kind, rows in kinds):
         return Assumption(label, FAILS, f"{names} with these parameters need not be passive")
     return Assumption(label, UNKNOWN, f"nothing is known of the storage function of {names}")
 
@@ -100,7 +101,7 @@ def output_to_state(gain: Gain) -> Assumption:
 def smooth(system: System) -> Assumption:
     """[asmp:C2]: f and F twice, V three times continuously differentiable."""
     game = system.game
-    known = all(hasattr(kind, "energy_balance") for kind, _ in types(system.agents))
+    known = all(energy_balance(*each) is not None for each in types(system.agents))
     if known and (game.affine or (game.smooth and game.tested)):
         return Assumption("asmp:C2", MET, "agents and game are smooth")
     return Assumption("asmp:C2", ASSUMED, "smoothness is the author's duty")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from gne_mj.plants import mixed
+from gne_mj.plants.agent_type import energy_balance
 from gne_mj.plants.agents import Agents
 
 Array = NDArray[np.float64]
@@ -56,10 +57,11 @@ def required_gain(agents: Agents, mu: float | None, gain: float) -> Gain:
     """
     balances, fails, unknown, beta = [], [], [], 0.0
     for kind, parameters in types(agents):
-        if not hasattr(kind, "energy_balance"):
+        balance = energy_balance(kind, parameters)
+        if balance is None:
             unknown.append(kind.NAME)
             continue
-        storage, dissipation = kind.energy_balance(parameters)
+        storage, dissipation = balance
         least = least_beta(dissipation, kind.OUTPUT)
         if np.all(np.isfinite(least)):
             beta = max(beta, float(np.max(least)))
