@@ -318,6 +318,18 @@ def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
     assert monitor[watch.EXIT] == watch.STEP_TOO_SMALL
 
 
+def test_a_slack_is_used_up_by_stages_too():
+    """Three quarters at the second stage, none at the end; and twice as much at the third."""
+    work = room_for_pieces(1, 2)
+    problem = SimpleNamespace(data=SimpleNamespace(tightening=np.array([0.0, 0.5])))
+    stages = division.stages_of(work.division, 1, 2)
+    stages.g[:] = [-1.0, -1.5, -0.25, -1.5, -1.0, -2.5, -1.0, -1.5]  # stage by stage
+    work.g[:] = [-1.0, -1.25]
+    assert division.use_of(4, problem, work, stages, 0) == (0.75, 0.0)
+    assert division.use_of(4, problem, work, stages, 1) == (0.25, 1.0)
+    assert division.use_of(1, problem, work, stages, 0) == (0.0, 0.0)
+
+
 def piece_of(rate, g, y, h):
     """What division.judge says of one Runge-Kutta piece of y' = rate(y) with constraints g."""
     y = np.asarray(y, dtype=float)

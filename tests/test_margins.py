@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from builders import (
     EQUAL,
+    UNEQUAL,
     V0,
     integrators,
     pi_cascades,
@@ -78,6 +79,46 @@ def test_no_push_and_no_error_of_an_output_does_more(seed, integrator, steps, ki
     plant.reset(wrong)
     plant.step(u, steps)
     assert np.all(np.abs(plant.output - expected) <= effect.noise_gain * (1 + 1e-9) + 1e-12)
+
+
+def test_bounds_take_the_greater_entries_of_a_spring_at_rest_and_far_out():
+    """Against the map's derivatives by differences, whose absolute values are multiplied out."""
+    agents, h, steps = robots(UNEQUAL), 0.005, 60
+    effect = influence(agents, h, "euler", steps)
+    plant, n, out = OdePlant(agents, h, "euler"), agents.states, agents.kind.OUTPUT
+
+    def step_from(state, u):
+        plant.reset(state)
+        plant.step(u)
+        return plant.state
+
+    none, one = np.zeros(5), np.ones(5)
+    slopes = []
+    for extension, size in ((0.0, 1e-6), (1e7, 1.0)):
+        middle = np.zeros((5, n))
+        middle[:, 0] = extension
+        from_middle = step_from(middle, none)
+        slope = np.empty((5, n, n))
+        for column in range(n):
+            moved = middle.copy()
+            moved[:, column] += size
+            slope[:, :, column] = (step_from(moved, none) - from_middle) / size
+        slopes.append(np.abs(slope))
+        push = np.abs(step_from(np.zeros((5, n)), one))
+    greater, less = np.maximum(*slopes), np.minimum(*slopes)
+    gains = []
+    for matrix in (greater, less):
+        pushed, read = np.zeros((5, n)), np.zeros((5, n))
+        read[:, out] = 1.0
+        for _ in range(steps):
+            pushed = np.einsum("rij,rj->ri", matrix, pushed) + push
+            read = np.einsum("rij,rj->ri", matrix, read)
+        gains.append((pushed[:, out], read[:, out]))
+    bent = np.array(UNEQUAL["atan_coefficient"]) > 0  # the others are linear, and exact
+    assert np.sum(bent) == 4
+    assert np.allclose(effect.push_gain[bent], gains[0][0][bent], rtol=1e-5)
+    assert np.allclose(effect.noise_gain[bent], gains[0][1][bent], rtol=1e-5)
+    assert np.all(effect.noise_gain[bent] > (1.0 + 1e-3) * gains[1][1][bent])
 
 
 def test_bounds_are_close_for_short_periods():
