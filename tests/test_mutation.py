@@ -105,20 +105,25 @@ def test_coverage_is_told_by_tests(operators, tmp_path):
 
 def test_tests_that_execute_a_mutant_come_first(operators, monkeypatch):
     judge = importlib.import_module("judge")
-    tests = {"t.py::a": 2.0, "t.py::b": 1.0, "t.py::c": 0.5}
+    tests = {"t.py::a": 2.0, "t.py::b": 1.0, "t.py::c": 0.5, "process.py::d": 3.0, "u.py::e": 1.0}
     known = {
         "plain": judge.Baseline({"t.py::c": 0.1}, {"some.py": {"inner": ["t.py::c"]}}),
         "compiled": judge.Baseline(tests, {"some.py": {"plain": ["t.py::a", "t.py::b"]}}),
     }
-    monkeypatch.setattr(
-        judge, "_Rank", lambda mutant, tree: SimpleNamespace(stages=lambda left: [sorted(left)])
-    )
+
+    def stages(left):
+        near = [test for test in left if test.startswith("t.py")]
+        return near, sorted(set(left) - set(near))
+
+    monkeypatch.setattr(judge, "_Rank", lambda mutant, tree: SimpleNamespace(stages=stages))
+    monkeypatch.setattr(judge, "_starting_processes", lambda tree: {"process.py"})
     found = {m.function: m for m in operators.mutants("some.py", SOURCE.encode())}
     assert list(judge._stages(found["plain"], None, known)) == [
-        (False, ["t.py::b", "t.py::a"]), (False, ["t.py::c"])
+        (False, ["t.py::b", "t.py::a"]), (False, ["t.py::c"]), (False, ["process.py::d"]),
     ]  # fmt: skip
     assert list(judge._stages(found["inner"], None, known)) == [
-        (True, ["t.py::c"]), (False, ["t.py::a", "t.py::b"])
+        (True, ["t.py::c"]), (False, ["t.py::a", "t.py::b"]), (False, ["process.py::d", "u.py::e"])
     ]  # fmt: skip
-    later = known["compiled"].without({"t.py"})
-    assert (later.seconds, later.executing) == ({}, {"some.py": {"plain": []}})
+    later = known["compiled"].without({"t.py", "process.py"})
+    assert later.seconds == {"u.py::e": 1.0}
+    assert later.executing == {"some.py": {"plain": []}}

@@ -184,8 +184,9 @@ def _stages(
 ) -> Iterator[tuple[bool, list[str]]]:
     """Lists of tests to run one after the other, and whether as plain Python.
 
-    First those that are known to execute the mutant's function; then those of near files, and all
-    others, since a cache or a process may hide from what is known.
+    First those that are known to execute the mutant's function; then those of near files, since a
+    cache may hide others, and those that start processes, of which nothing is known. Of machine
+    code nothing is known: all others.
     """
     rank, compiled, done = _Rank(mutant, tree), known["compiled"], set()
 
@@ -205,8 +206,18 @@ def _stages(
             yield False, first
         done = set(first)
     left = {test: seconds for test, seconds in compiled.seconds.items() if test not in done}
-    for tests in rank.stages(left):
+    near, others = rank.stages(left)
+    if done and not mutant.native:
+        hidden = _starting_processes(tree)
+        others = [test for test in others if test.partition("::")[0] in hidden]
+    for tests in filter(None, (near, others)):
         yield False, tests
+
+
+def _starting_processes(tree: Tree) -> set[str]:
+    words = re.compile(r"\bsubprocess\b|from commands import .*\b(gne|running)\b|multiprocessing")
+    paths = _test_files(tree.base)
+    return {str(p.relative_to(tree.base)) for p in paths if words.search(p.read_text("utf-8"))}
 
 
 class _Rank:
@@ -228,7 +239,7 @@ class _Rank:
                 + (file in through)
             )
 
-    def stages(self, seconds: dict[str, float]) -> list[list[str]]:
+    def stages(self, seconds: dict[str, float]) -> tuple[list[str], list[str]]:
         """The tests of near files, nearest and quickest first, and then all others."""
         total: dict[str, float] = {}
         for test, each in seconds.items():
@@ -241,7 +252,7 @@ class _Rank:
 
         order = sorted(seconds, key=key)
         near = [test for test in order if self._near.get(test.partition("::")[0])]
-        return [tests for tests in (near, order[len(near) :]) if tests]
+        return near, order[len(near) :]
 
 
 def _test_files(base: Path) -> list[Path]:
