@@ -237,7 +237,7 @@ def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
             text = f"none up to {search['largest_tried']:.4g} leaves the set"
         else:
             text = f"{least:.4g} leaves the set ({search['pattern']})"
-            if held["largest_push"] and least:
+            if held["largest_push"]:
                 text += f"; the certified push is {held['largest_push'] / least:.0%} of it"
         yield "adversarial search", f"{text}, by {search['runs']} runs from this start"
     search = held["period_search"]
