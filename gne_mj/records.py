@@ -75,7 +75,11 @@ def count(record: Any) -> int:
 
 
 def place(record: Any, name: str) -> int:
-    """How many arrays come before a field."""
+    """How many arrays come before a field.
+
+    Raises:
+        KeyError: the record has no such field.
+    """
     at = 0
     for other, field in fields(record).items():
         if other == name:
@@ -84,17 +88,11 @@ def place(record: Any, name: str) -> int:
     raise KeyError(name)
 
 
-def fresh(record: Any, known: dict[str, Any] | None = None, **sizes: int) -> Any:
-    """A record of zeros.
-
-    Args:
-        record: which.
-        known: names besides sizes that its shapes use.
-        sizes: what the names in its shapes stand for.
-    """
+def fresh(record: Any, **names: Any) -> Any:
+    """A record of zeros, ``names`` being what the names in its shapes stand for."""
     made = []
     for field in fields(record).values():
-        shape = eval(f"({field.shape},)", {**(known or {}), **sizes})  # of our own declarations
+        shape = eval(f"({field.shape},)", names)  # of our own declarations
         made.append(np.zeros(shape, dtype=np.int64 if field.whole else np.float64))
     return record(*made)
 

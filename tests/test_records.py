@@ -78,7 +78,7 @@ def test_numbers_are_read_by_name():
 
 
 def test_fresh_arrays_have_the_declared_shapes():
-    made = fresh(Parts, {"twice": twice}, m=2, p=3, extra=4)
+    made = fresh(Parts, twice=twice, m=2, p=3, extra=4)
     assert [a.shape for a in made] == [(4,), (2, 4), (4,)]
     assert fresh(GameData, N=2, m=3, p=4, n=1).offsets.dtype == np.int64
 
@@ -92,6 +92,6 @@ def test_every_array_of_a_loop_is_declared(record):
 
 def test_the_solvers_length_is_that_of_its_arrays():
     sizes = {"m": 4, "p": 3, "entries": 6, "states": 2, "b": 1}
-    made = fresh(Solver, {"count": COUNT}, **sizes)
+    made = fresh(Solver, count=COUNT, **sizes)
     assert solver_length(*sizes.values()) == sum(a.size for a in made)
     assert made.band.shape == (4, 3)
