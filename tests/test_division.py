@@ -330,6 +330,18 @@ def test_a_slack_is_used_up_by_stages_too():
     assert division.use_of(1, problem, work, stages, 0) == (0.0, 0.0)
 
 
+def test_sizes_are_those_that_the_start_shows():
+    """At least what is given; rounding and errors are measured by them."""
+    work = room_for_pieces(3, 2)
+    problem = SimpleNamespace(
+        data=SimpleNamespace(tightening=np.array([0.0, 0.5])), size=np.array([1.0, 0.25, 4.0])
+    )
+    for y in ([0.5, -7.0, 2.0], [90.0, 0.0, 0.0]):  # the start, and what comes later
+        work.y[:], work.g[:] = y, [-3.0, -1.5]
+        division.note(0, problem, work)
+        assert list(division.stages_of(work.division, 3, 2).size) == [7.0, 3.0, 4.0]
+
+
 def piece_of(rate, g, y, h):
     """What division.judge says of one Runge-Kutta piece of y' = rate(y) with constraints g."""
     y = np.asarray(y, dtype=float)

@@ -106,6 +106,22 @@ def test_fully_distributed_agents_look_where_z_will_be():
             assert found.u[k, i] == pytest.approx(-0.7 * expected, abs=1e-6)
 
 
+def test_a_prediction_that_moves_far_is_checked_where_it_arrives():
+    """Maps of an affine plant in a period: two for slopes, one to begin, one more if it is far."""
+    maps = {}
+    for h in (1e-5, 0.1):
+        maps[h] = 0
+
+        def predict(*arguments, h=h):
+            maps[h] += 1
+            held_map.predict(*arguments)
+
+        counted = SimpleNamespace(predict=predict, is_affine=held_map.is_affine, roll=held_map.roll)
+        system = robot_system(robot_state(FIVE), UNEQUAL, mode="implicit", integrator="euler")
+        run_plain(system, clock(h), 1, counted)
+    assert maps == {1e-5: 3, 0.1: 4}
+
+
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_known_delay_does_not_deceive_mode_implicit(steps):
     """A state of two periods ago is moved on under the inputs since: the law at what comes next."""
@@ -228,6 +244,14 @@ def test_an_agent_without_an_action_says_at_which_constraint():
     parts.problem.order.band[1] = 0  # without shares
     residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
     assert parts.work.now[SHELL_VALUE] == pytest.approx(1.95**2 + 1.2**2 + 0.25 + 0.04 - 4.0)
+
+
+def test_all_agents_without_actions_say_at_which_constraint():
+    residual, parts = equation_of(joint, coupled_system(), 3)
+    outside = np.array([1.95, 1.2, 0.5, -0.2])
+    assert not residual(0, 3, outside)[0]
+    assert parts.work.now[SHELL] == 0.0
+    assert parts.work.now[SHELL_VALUE] == pytest.approx(outside @ outside - 4.0)
 
 
 def test_a_steps_length_is_measured_where_the_agent_looks():
