@@ -12,9 +12,7 @@ from gne_mj.environment.physics import FleetPhysics
 from gne_mj.environment.task import FleetEnvironment, FleetTask, Start, finite_costs
 from gne_mj.errors import InvalidInput, named, nearest, part_of
 from gne_mj.graph import NAMED, Graph
-from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mjcf_robot import MjcfRobots
-from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.plants.fleet_plant import build_fleet
 from gne_mj.scenario import load_scenario
 from gne_mj.starts import random_starts
 from gne_mj.system import Clock, System
@@ -116,9 +114,8 @@ def environment_of(
 
 
 def _physics(system: System, timestep: float) -> FleetPhysics:
-    kind = MjcfPlant if isinstance(system.agents, MjcfRobots) else MujocoPlant
     with part_of("system"):
-        plant = kind(system.agents, timestep, system.integrator)  # type: ignore[arg-type]
+        plant = build_fleet(system.agents, timestep, system.integrator)
         return FleetPhysics(plant, system.game, system.state)
 
 

@@ -23,7 +23,6 @@ from gne_mj.passivity.report import (
 from gne_mj.passivity.trials import HOLDS, Build, Rest, Storage, Trials, least_storage
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
-from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import OdePlant
 
 # How many times the outputs' range is gone through; beyond SIMULATED only where V is negative, by
@@ -47,13 +46,9 @@ def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
         if engine == "ode":
             return OdePlant(agents.repeated(copies), timestep, method)
         # Late: MuJoCo is slow to import, and the twins do not need it.
-        from gne_mj.plants.mjcf_fleet import MjcfPlant
-        from gne_mj.plants.mujoco import MujocoPlant
+        from gne_mj.plants.fleet_plant import build_fleet
 
-        fleet = agents.repeated(copies)
-        if isinstance(fleet, MjcfRobots):
-            return MjcfPlant(fleet, timestep, method)
-        return MujocoPlant(fleet, timestep, method, decorated=False)
+        return build_fleet(agents.repeated(copies), timestep, method, decorated=False)
 
     return build
 
