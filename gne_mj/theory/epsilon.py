@@ -68,7 +68,27 @@ def search_epsilon(
         trials.append((epsilon, stayed))
         return stayed
 
-    good, bad, note = _bracket(stays, law.epsilon, MOST * clock.duration)
+    note = None
+    factor = 2.0 if stays(law.epsilon) else 0.5
+    good = bad = epsilon = law.epsilon
+    while True:
+        following = factor * epsilon
+        too_long = factor > 1.0 and following > MOST * clock.duration
+        if following < LEAST * law.epsilon or too_long:
+            note = f"{following:.4g} s was not tried"
+            break
+        try:
+            stayed = stays(following)
+        except InvalidInput as error:  # a step too long for a smaller epsilon
+            note = f"{following:.4g} s cannot be tried: {error.expected}"
+            break
+        epsilon *= factor
+        if stayed:
+            good = epsilon
+        else:
+            bad = epsilon
+        if stayed != (factor > 1.0):
+            break
     while note is None and bad / good > PRECISION:
         middle = float(np.sqrt(good * bad))
         if stays(middle):
@@ -81,26 +101,3 @@ def search_epsilon(
         default=None,
     )
     return EpsilonSearch(inside, outside, tuple(trials), note)
-
-
-def _bracket(
-    stays: Callable[[float], bool], given: float, longest: float
-) -> tuple[float, float, str | None]:
-    """An epsilon that stays inside, one that does not, and why there is no such pair if so."""
-    factor = 2.0 if stays(given) else 0.5
-    good = bad = epsilon = given
-    while True:
-        following = factor * epsilon
-        if following < LEAST * given or (factor > 1.0 and following > longest):
-            return good, bad, f"{following:.4g} s was not tried"
-        try:
-            stayed = stays(following)
-        except InvalidInput as error:  # a step too long for a smaller epsilon
-            return good, bad, f"{following:.4g} s cannot be tried: {error.expected}"
-        epsilon = following
-        if stayed:
-            good = epsilon
-        else:
-            bad = epsilon
-        if stayed != (factor > 1.0):
-            return good, bad, None

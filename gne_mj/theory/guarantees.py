@@ -67,7 +67,8 @@ def certify(system: System, clock: Clock) -> Guarantees:
     check_count("agents.count", system.game.actions, MOST_EXAMINED, "the actions of all")
     theorem = Theorem(system)
     held = Held(system, clock) if mode_of(system).promises else None
-    pieces, known = forecast(system, clock), system.known_equilibrium
+    law, pieces = system.law, forecast(system, clock)
+    known = system.known_equilibrium
     return Guarantees(
         system=_system(system),
         status=HELD if held is not None and held.promised else theorem.status,
@@ -78,12 +79,12 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "continuous": theorem.continuous,
         },
         constants=_constants(theorem),
-        graph=None if system.law.graph is None else _graph(system.law.graph),
+        graph=None if law.graph is None else _graph(law.graph),
         coupling=_coupling(theorem),
         gain=None if theorem.gain is None else asdict(theorem.gain),
         epsilon=None
-        if system.law.epsilon is None
-        else {"given": system.law.epsilon, "star": None, "search": None},
+        if law.epsilon is None
+        else {"given": law.epsilon, "star": None, "search": None},
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": None if known is None else known.action.tolist(),
