@@ -89,6 +89,25 @@ def environment_of(
         raise InvalidInput(
             "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
         )
+    periods = _episode(clock)
+    if exit_cost is None:
+        costs = finite_costs(system.game, system.start)
+        exit_cost = float(np.maximum(0.0, periods * costs.sum()))
+    physics = _physics(system, clock.timestep)
+    task = FleetTask(
+        system,
+        _information(system, information, graph),
+        periods,
+        reward=reward,
+        exit_cost=exit_cost,
+        start=_start(system, start, spread),
+        rng=np.random.default_rng(random),
+    )
+    return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
+
+
+def _episode(clock: Clock) -> int:
+    """Control periods of an episode."""
     periods = clock.duration / clock.control_period
     if round(periods) < 1 or abs(periods - round(periods)) > 1e-6:
         raise InvalidInput(
@@ -96,21 +115,7 @@ def environment_of(
             clock.duration,
             f"an episode is a multiple of the control period {clock.control_period:g} s",
         )
-    if exit_cost is None:
-        exit_cost = float(
-            np.maximum(0.0, round(periods) * finite_costs(system.game, system.start).sum())
-        )
-    physics = _physics(system, clock.timestep)
-    task = FleetTask(
-        system,
-        _information(system, information, graph),
-        round(periods),
-        reward=reward,
-        exit_cost=exit_cost,
-        start=_start(system, start, spread),
-        rng=np.random.default_rng(random),
-    )
-    return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
+    return round(periods)
 
 
 def _physics(system: System, timestep: float) -> FleetPhysics:
