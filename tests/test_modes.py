@@ -129,7 +129,9 @@ def test_a_schedule_more_is_what_the_law_and_the_results_have(monkeypatch):
 
 def test_the_kinds_of_schedules_are_those_that_are_registered():
     assert [fall.name for fall in SCHEDULES] == ["exponential", "reciprocal", "halving"]
-    with pytest.raises(InvalidInput, match=r"^kind: got 'recipocal', but did you mean 'reciprocal'"):
+    with pytest.raises(
+        InvalidInput, match=r"^kind: got 'recipocal', but did you mean 'reciprocal'"
+    ):
         Schedule("recipocal", 1.0, 0.1, 1.0)
     with pytest.raises(InvalidInput, match=r"barrier\.schedule: got 'half', but"):
         load_scenario("velocity-sync", {"barrier.schedule": "half"})
