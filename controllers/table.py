@@ -8,13 +8,14 @@ from pydantic import Field
 from gne_mj import graph as graphs
 from gne_mj.controllers.law import Law
 from gne_mj.game import Game
+from gne_mj.registry import MODES
 from gne_mj.toml_table import Fills, Table
 
 
 class LawTable(Table):
     """A law and how it acts."""
 
-    mode: Literal["continuous", "sampled", "implicit"] = "continuous"
+    mode: Annotated[str, MODES] = "continuous"
     decentralised: bool = Field(
         False, description="mode implicit: each agent keeps to its share of every bound's slack"
     )

@@ -15,7 +15,10 @@ BLOCK, LARGE = 32, 128
 
 @kernel
 def factorise(band, n, b, pivots):
-    """LU factors of the first n rows in place, with partial pivoting; False if singular."""
+    """LU factors of the first n rows in place, with partial pivoting; False if singular.
+
+    The package's only one with pivoting, for dense matrices too (b = n - 1).
+    """
     if n < LARGE or b < n - 1:
         return eliminate(band, 0, n, n, n, b, pivots)
     for first in range(0, n, BLOCK):

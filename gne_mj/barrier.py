@@ -3,23 +3,39 @@
 Its gradient is sum_l w_l dg_l/dy with the weights w_l = rho / (-g_l(y)), which at the penalised
 equilibrium are the multipliers. Outside the interior phi is infinite and has no gradient: the
 kernels report that and never clip a constraint's value. A game that is tightened by t >= 0 has a
-barrier of g + t < 0 in place of g < 0. The penalty may fall in time (:class:`Schedule`).
+barrier of g + t < 0 in place of g < 0. The penalty may fall in time (:class:`Schedule`), in one of
+the ways that are registered (:class:`Fall`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.native import kernel
+from gne_mj.registry import SCHEDULES
+from gne_mj.toml_table import Fills, Table
 
-# Entries of a schedule's numbers, and its kinds
-KIND, START, FLOOR, FALL = range(4)
-CONSTANT, EXPONENTIAL, RECIPROCAL, HALVING = range(4)
-SCHEDULES = {"exponential": EXPONENTIAL, "reciprocal": RECIPROCAL, "halving": HALVING}
+# Entries of a schedule's numbers
+START, FLOOR, FALL = range(3)
+
+
+@dataclass(frozen=True)
+class Fall:
+    """A way for the penalty to fall, registered by its name.
+
+    Args:
+        name: in scenario files.
+        rho: kernel (start, elapsed) that gives the penalty, elapsed being t/T.
+    """
+
+    name: str
+    rho: Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
@@ -28,20 +44,20 @@ class Schedule:
 
     Args:
         kind: "exponential", rho(t) = start exp(-t/T); "reciprocal", start / (1 + t/T); "halving",
-            start / 2^k from k T to (k + 1) T. Never below the floor.
+            start / 2^k from k T to (k + 1) T; or another registered :class:`Fall`. Never below
+            the floor.
         start: rho(0), positive.
         floor: positive, at most ``start``.
         time_constant: T in s, positive.
     """
 
-    kind: Literal["exponential", "reciprocal", "halving"]
+    kind: str
     start: float
     floor: float
     time_constant: float
 
     def __post_init__(self) -> None:
-        if self.kind not in SCHEDULES:
-            raise InvalidInput("kind", self.kind, f"choose from {list(SCHEDULES)}")
+        _ = self.fall  # refuses a kind that there is not
         for key in ("floor", "time_constant"):
             value = getattr(self, key)
             if not (np.isfinite(value) and value > 0):
@@ -50,19 +66,46 @@ class Schedule:
             raise InvalidInput("floor", self.floor, f"it must not exceed rho(0), {self.start:g}")
 
     @property
+    def fall(self) -> Callable[[float, float], float]:
+        """The kernel (start, t/T) that says how it falls."""
+        found: Fall = SCHEDULES[self.kind]
+        return found.rho
+
+    @property
     def numbers(self) -> NDArray[np.float64]:
-        """For native code: [KIND, START, FLOOR, FALL]."""
-        return np.array([SCHEDULES[self.kind], self.start, self.floor, 1.0 / self.time_constant])
+        """For native code: [START, FLOOR, FALL]."""
+        return np.array([self.start, self.floor, 1.0 / self.time_constant])
 
     def at(self, time: ArrayLike) -> NDArray[np.float64]:
         """rho at times in s, of any shape."""
-        numbers = self.numbers
-        return np.vectorize(lambda t: rho_at(numbers, t), otypes=[np.float64])(time)
+        fall, numbers = self.fall, self.numbers
+        return np.vectorize(lambda t: scheduled(fall, numbers, t), otypes=[np.float64])(time)
 
 
-def constant(rho: float) -> NDArray[np.float64]:
-    """The numbers of a penalty that does not change."""
-    return np.array([CONSTANT, rho, rho, 0.0])
+class BarrierTable(Table):
+    """[eq:logbarrier]"""
+
+    rho: float = Field(0.1, gt=0, description="at the start, if it has a schedule")
+    schedule: Annotated[Annotated[str, SCHEDULES] | None, Fills("kind")] = Field(
+        None, description="how rho falls in time; constant if left out"
+    )
+    time_constant: float | None = Field(None, gt=0, description="s, of the schedule; 1 if left out")
+    floor: float | None = Field(
+        None,
+        gt=0,
+        description="what rho falls to; if left out 1e-9 in mode implicit, else the least that the"
+        " period allows at the equilibrium",
+    )
+
+    def build(self, floor: float) -> Schedule | None:
+        """The schedule, falling to ``floor`` unless that is given."""
+        if self.schedule is None:
+            for key in ("floor", "time_constant"):
+                if getattr(self, key) is not None:
+                    raise InvalidInput(key, getattr(self, key), "it goes with barrier.schedule")
+            return None
+        lowest = min(floor, self.rho) if self.floor is None else self.floor
+        return Schedule(self.schedule, self.rho, lowest, self.time_constant or 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,19 +165,31 @@ class LogBarrier:
 
 
 @kernel
-def rho_at(schedule, time):
-    """The penalty at a time in s, from a schedule's numbers."""
-    kind, start = schedule[KIND], schedule[START]
-    if kind == CONSTANT:
-        return start
-    elapsed = time * schedule[FALL]
-    if kind == EXPONENTIAL:
-        value = start * np.exp(-elapsed)
-    elif kind == RECIPROCAL:
-        value = start / (1.0 + elapsed)
-    else:
-        value = start * 2.0 ** -np.floor(elapsed)
-    return max(value, schedule[FLOOR])
+def scheduled(fall, numbers, time):
+    """The penalty at a time in s, by a schedule's kernel and numbers."""
+    return max(fall(numbers[START], time * numbers[FALL]), numbers[FLOOR])
+
+
+@kernel
+def exponential(start, elapsed):
+    """start exp(-t/T)."""
+    return start * np.exp(-elapsed)
+
+
+@kernel
+def reciprocal(start, elapsed):
+    """start / (1 + t/T)."""
+    return start / (1.0 + elapsed)
+
+
+@kernel
+def halving(start, elapsed):
+    """start / 2^k from k T to (k + 1) T."""
+    return start * 2.0 ** -np.floor(elapsed)
+
+
+for _fall in (exponential, reciprocal, halving):
+    SCHEDULES.register(Fall(_fall.__name__, _fall))
 
 
 @kernel

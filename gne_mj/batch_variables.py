@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from gne_mj import variables, verdicts
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
-from gne_mj.system import System
+from gne_mj.registry import MODES
+from gne_mj.system import System, mode_of
+from gne_mj.system.modes import Figure, Mode
 from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed, input_unit
 
 if TYPE_CHECKING:
@@ -132,10 +134,6 @@ def _middle(values: "pandas.Series[float]") -> float:
     return float(np.quantile(values.fillna(np.inf), 0.5, method="inverted_cdf"))
 
 
-def _divides(system: System) -> bool:
-    return system.mode == "continuous" and system.integrator != "rosenbrock"
-
-
 def _agent_out(runs: Runs) -> Array:
     agent = runs.monitors[:, watch.EXIT_AGENT]
     return _where(runs.violated & (agent >= 0), 1 + agent)
@@ -154,10 +152,6 @@ def _status(runs: Runs) -> Array:
 
 def _of_monitor(name: str, entry: int, **about: Any) -> Variable:
     return Variable(name, ("run",), lambda runs: runs.seen(entry), **about)
-
-
-def _is_implicit(system: System) -> bool:
-    return system.mode == "implicit"
 
 
 JUDGED = (
@@ -249,24 +243,15 @@ JUDGED = (
     ),
     _of_monitor("steps", watch.STEPS),
 )  # fmt: skip
-OF_MODES = (
-    _of_monitor(
-        "divided_steps", watch.DIVIDED, there=_divides,
-        long_name="integration steps divided near the boundary",
-    ),
-    Variable(
-        "smallest_step", ("run",),
-        lambda runs: _where(
-            runs.seen(watch.SMALLEST_STEP) > 0, runs.seen(watch.SMALLEST_STEP)
-        ),
-        there=_divides, unit="s", long_name="shortest piece of a divided step",
-    ),
-    _of_monitor("solutions", watch.SOLUTIONS, there=_is_implicit),
-    _of_monitor("newton_steps", watch.SOLVER_STEPS, there=_is_implicit),
-    _of_monitor("not_accurate", watch.UNSOLVED, there=_is_implicit),
-    _of_monitor("prediction_error", watch.PREDICTION, there=_is_implicit),
-    _of_monitor("periods_not_monotone", watch.NOT_MONOTONE, there=_is_implicit),
-)  # fmt: skip
+
+
+def _of_mode(mode: Mode, figure: Figure) -> Variable:
+    """What batches keep of runs in a mode."""
+    return Variable(
+        figure.name, ("run",), lambda runs: figure.of(runs.monitors),
+        there=lambda system: mode_of(system) is mode and mode.reports(system),
+        unit=figure.unit, long_name=figure.long_name,
+    )  # fmt: skip
 
 
 def figures() -> list[Variable]:
@@ -281,4 +266,8 @@ def declared_figures(system: System) -> list[Variable]:
 
 
 def _with_figures_of(signals: Iterable[Variable]) -> list[Variable]:
-    return [*JUDGED, *(figure for signal in signals for figure in signal.runs), *OF_MODES]
+    return [
+        *JUDGED,
+        *(figure for signal in signals for figure in signal.runs),
+        *(_of_mode(mode, figure) for mode in MODES for figure in mode.figures),
+    ]

@@ -14,7 +14,8 @@ from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
-from gne_mj.system import System
+from gne_mj.registry import MODES
+from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
@@ -41,13 +42,9 @@ class Certificate:
             as no input limit is met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         exit: where the run left, the law and the input that led there; None if it did not.
-        division: mode continuous with a fixed step: how many steps were divided near the boundary
-            (:mod:`gne_mj.loops.division`), and the shortest piece in s, None if none was; None in
-            other modes.
-        implicit: mode implicit: inputs solved for, Newton steps, how many are not accurate, of how
-            many periods (``covered``) the promise for control instants speaks therefore, how far
-            outputs were from their prediction at control instants, periods in which dy+/du was not
-            positive; None in other modes.
+        of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
+            other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
+            how many periods of which (``covered``) the promise for control instants speaks.
         steps, end_time, wall_time: integration steps taken, pieces of divided ones counted;
             simulated and real time.
     """
@@ -62,8 +59,7 @@ class Certificate:
     lyapunov: dict[str, Any]
     actuators: dict[str, Any]
     exit: dict[str, Any] | None
-    division: dict[str, Any] | None
-    implicit: dict[str, Any] | None
+    of_modes: dict[str, Any]
     steps: int
     end_time: float
     wall_time: float
@@ -74,8 +70,10 @@ class Certificate:
         return self.status in SUCCESSES
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, strings and lists, for JSON."""
-        return asdict(self)
+        """Plain numbers, strings and lists, for JSON; the sections of modes among the others."""
+        found = asdict(self)
+        of_modes = found.pop("of_modes")
+        return {**found, **of_modes}
 
 
 @np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
@@ -128,8 +126,7 @@ def certify_run(
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
         exit=_exit_report(system, monitor),
-        division=_division(system, monitor),
-        implicit=_implicit(system, monitor),
+        of_modes=_of_modes(system, monitor),
         steps=int(monitor[watch.STEPS]),
         end_time=float(time[-1]),
         wall_time=wall_time,
@@ -279,36 +276,13 @@ def _instead(system: System) -> str:
     return f"{', '.join(ways[:-1])} or {ways[-1]}"
 
 
-def _division(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
-    if system.mode != "continuous" or system.integrator == "rosenbrock":
-        return None
-    return {
-        "divided_steps": int(monitor[watch.DIVIDED]),
-        "smallest_step": float(monitor[watch.SMALLEST_STEP]) or None,
-    }
-
-
-def _implicit(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
-    if system.mode != "implicit":
-        return None
-    solutions = int(monitor[watch.SOLUTIONS])
-
-    def when(entry: int, time: int) -> float | None:
-        return float(monitor[time]) if monitor[entry] > 0 else None
-
-    return {
-        "decentralised": system.decentralised,
-        "solutions": solutions,
-        "mean_newton_steps": float(monitor[watch.SOLVER_STEPS]) / max(solutions, 1),
-        "most_newton_steps": int(monitor[watch.MOST_STEPS]),
-        "not_accurate": int(monitor[watch.UNSOLVED]),
-        "covered": solutions - int(monitor[watch.UNSOLVED]),
-        "first_not_accurate": when(watch.UNSOLVED, watch.UNSOLVED_TIME),
-        "largest_prediction_error": float(monitor[watch.PREDICTION]),
-        "largest_prediction_error_time": when(watch.PREDICTION, watch.PREDICTION_TIME),
-        "periods_not_monotone": int(monitor[watch.NOT_MONOTONE]),
-        "first_not_monotone": when(watch.NOT_MONOTONE, watch.NOT_MONOTONE_TIME),
-    }
+def _of_modes(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+    """What each mode's runs report, by section; None in other modes."""
+    found: dict[str, Any] = {each.section: None for each in MODES if each.section}
+    mode = mode_of(system)
+    if mode.section and mode.reports(system):
+        found[mode.section] = mode.report(system, monitor)
+    return found
 
 
 def _worst(

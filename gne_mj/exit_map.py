@@ -22,10 +22,14 @@ from gne_mj.faults import steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.plain import raise_pending
+from gne_mj.registry import MODES
 from gne_mj.system import Clock, System
 from gne_mj.theory.trials import held_for
 
-MODES = ("sampled", "implicit")
+
+def held_modes() -> list[str]:
+    """The modes that have a control period."""
+    return [mode.name for mode in MODES if mode.held]
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Grid:
     @property
     def cells(self) -> int:
         """How many cells that is."""
-        return len(MODES) * len(self.periods) * len(self.margins) * len(self.pushes)
+        return len(held_modes()) * len(self.periods) * len(self.margins) * len(self.pushes)
 
     @property
     def total(self) -> int:
@@ -124,7 +128,9 @@ def exit_map(
     plants: dict[tuple[str, bool], Any] = {}
     cells: list[Cell] = []
     done = 0
-    for mode, period, push, margin in product(MODES, grid.periods, grid.pushes, grid.margins):
+    for mode, period, push, margin in product(
+        held_modes(), grid.periods, grid.pushes, grid.margins
+    ):
         counts = dict.fromkeys(("instant", "between", "nothing", "refused"), 0)
         least = np.inf
         for ray, signs in starts:

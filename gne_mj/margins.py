@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.errors import InvalidInput, named
 from gne_mj.game import Game
-from gne_mj.plants import mixed
-from gne_mj.plants.agent_type import has_ode
+from gne_mj.plants.agent_type import by_type, has_ode
 from gne_mj.plants.agents import Agents, input_columns
 
 Array = NDArray[np.float64]
@@ -98,7 +97,8 @@ def influence(
     for r, row in enumerate(agents.parameters):
         key = row.tobytes()
         if key not in known:
-            channel = _Channel(*_kind_of(agents.kind, row), timestep, integrator)
+            ((kind, own),) = by_type(agents.kind, row[None])
+            channel = _Channel(kind, own[0], timestep, integrator)
             exact = exact and channel.linear
             # Sensors may be less late than they may be, and errors fade on their way.
             each = [channel.gains(period * (late + 1)) for late in range(delay + 1)]
@@ -201,14 +201,6 @@ def largest_push(game: Game, effect: Influence, disturbance: Disturbance, t: Arr
         else:
             high = middle
     return low
-
-
-def _kind_of(kind: ModuleType, row: Array) -> tuple[ModuleType, Array]:
-    """A channel's own type and numbers, also in a mixed fleet."""
-    if kind is not mixed:
-        return kind, row
-    own = mixed.TYPES[int(row[0])]
-    return own, row[1 : 1 + len(own.PARAMETERS)]
 
 
 class _Channel:

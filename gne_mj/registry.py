@@ -1,27 +1,39 @@
-"""What scenario files can name: games, agent types, laws and faults, each by its table.
+"""What scenario files can name: games, agent types, laws, faults, modes and schedules.
 
-A table registers beside the thing that it makes:
+Things with keys of their own are named by their tables, which register beside what they make:
 
     @GAMES.register
     class CournotTable(GameTable):
         type: Literal["cournot"]
         ...
 
-Other packages register theirs in modules that they name as entry points of the group
-``gne_mj.plugins``; :func:`load_plugins` imports these before scenarios are read.
+Modes and schedules have none, and register themselves, by their names. Other packages register
+theirs in modules that they name as entry points of the group ``gne_mj.plugins``;
+:func:`load_plugins` imports these before scenarios are read.
 """
 
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Annotated, Any, TypeVar, Union, get_args
+from typing import Annotated, Any, Generic, Protocol, TypeVar, Union, get_args
 
 from pydantic import Field
+from pydantic_core import PydanticKnownError, core_schema
 
-from gne_mj.errors import GneError, InvalidInput, PluginError, raised
+from gne_mj.errors import GneError, InvalidInput, PluginError, nearest, raised
 from gne_mj.toml_table import Table
 
+
+class Named(Protocol):
+    """What registers by its name."""
+
+    @property
+    def name(self) -> str:
+        """What scenario files call it."""
+
+
 T = TypeVar("T", bound=Table)
+N = TypeVar("N", bound=Named)
 PLUGINS = "gne_mj.plugins"  # the group of entry points
 
 
@@ -62,8 +74,56 @@ class Registry:
         )
 
 
+class Names(Generic[N]):
+    """Things of one kind that have names and no tables.
+
+    Args:
+        parameter: which names one of them, in messages.
+    """
+
+    def __init__(self, parameter: str) -> None:
+        self.parameter = parameter
+        self._things: dict[str, N] = {}
+
+    def register(self, thing: N) -> N:
+        """Let scenario files name it.
+
+        Raises:
+            InvalidInput: another one has its name.
+        """
+        if thing.name in self._things:
+            raise InvalidInput(self.parameter, thing.name, "another one has this name")
+        self._things[thing.name] = thing
+        return thing
+
+    def __getitem__(self, name: str) -> N:
+        """The one of this name.
+
+        Raises:
+            InvalidInput: there is none.
+        """
+        if name not in self._things:
+            raise InvalidInput(self.parameter, name, nearest(str(name), self._things))
+        return self._things[name]
+
+    def __iter__(self) -> Iterator[N]:
+        return iter(self._things.values())
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """As an annotation: the name of any that is registered when a file is read."""
+        return core_schema.no_info_plain_validator_function(self._known)
+
+    def _known(self, name: Any) -> Any:
+        if not isinstance(name, str) or name not in self._things:
+            expected = ", ".join(f"'{known}'" for known in self._things)
+            raise PydanticKnownError("literal_error", {"expected": expected})
+        return name
+
+
 GAMES, AGENTS, FAULTS = Registry(), Registry(), Registry()
 LAWS = Registry("information")
+MODES: Names[Any] = Names("mode")
+SCHEDULES: Names[Any] = Names("kind")
 
 
 @cache

@@ -7,34 +7,12 @@ UNKNOWN = "not known: no penalised equilibrium was found"
 
 def summary(report: dict[str, Any]) -> dict[str, str]:
     """What a person wants to know of one system's report, in the order of interest."""
-    worst, gap = report["worst_constraint"], report["worst_gap"]
-    settling, actuators = report["settling_time"], report["actuators"]
-    lyapunov, epsilon = report["lyapunov"], report["epsilon"]
-    distances = report["equilibrium"]
-    nowhere = distances["final_distance"] is None
-    unknown = distances["final_distance_to_variational"] is None
+    gap, division, implicit = report["worst_gap"], report["division"], report["implicit"]
+    actuators, epsilon = report["actuators"], report["epsilon"]
     rows = {
         "status": f"{report['status']}: {report['message']}",
-        "least margin": "nothing was observed"
-        if worst is None
-        else f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s",
-        "settling time": UNKNOWN
-        if nowhere
-        else "not settled"
-        if settling is None
-        else f"{settling:.4g} s",
-        "distance at the end": UNKNOWN
-        if nowhere
-        else f"{distances['final_distance']:.3g} to the penalised equilibrium"
-        + ("" if unknown else f", {distances['final_distance_to_variational']:.3g} to the vGNE"),
-        "Lyapunov function": UNKNOWN
-        if nowhere
-        else "not known of MJCF robots"
-        if not lyapunov["known"]
-        else ("never rose" if lyapunov["monotone"] else "rose")
-        + (f" up to the exit, last seen at {lyapunov['observed_until']:.4g} s" * lyapunov["left"])
-        + f" (largest rise {lyapunov['largest_rise']:.2g}; "
-        + ("the theory claims a decrease)" if lyapunov["claimed"] else "nothing is claimed here)"),
+        "least margin": _least_margin(report["worst_constraint"]),
+        **_convergence(report),
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
         f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
     }
@@ -43,37 +21,68 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
             f" {gap['time']:.4g} s"
         )
-    division = report["division"]
     if division is not None and division["divided_steps"]:
         rows["divided steps"] = (
             f"{division['divided_steps']}, near the boundary, down to"
             f" {division['smallest_step']:.3g} s"
         )
-    implicit = report["implicit"]
     if implicit is not None:
-        rows["held inputs"] = (
-            f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
-            f" steps each; predicted outputs off by up to"
-            f" {implicit['largest_prediction_error']:.2g}"
-        )
-        for key, first, what in (
-            (
-                "not_accurate",
-                "first_not_accurate",
-                "not accurate, at whose periods' ends nothing is promised",
-            ),
-            ("periods_not_monotone", "first_not_monotone", "periods without dy+/du > 0"),
-        ):
-            if implicit[key]:
-                rows["held inputs"] += (
-                    f"; {implicit[key]} {what} (first at {implicit[first]:.4g} s)"
-                )
+        rows["held inputs"] = _held_inputs(implicit)
     if epsilon["measured"] is not None:
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium;"
             f" {bounds_in_words(epsilon)}"
         )
     return rows
+
+
+def _least_margin(worst: dict[str, Any] | None) -> str:
+    if worst is None:
+        return "nothing was observed"
+    return f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s"
+
+
+def _convergence(report: dict[str, Any]) -> dict[str, str]:
+    """What is told of the way to the penalised equilibrium, where one was found."""
+    distances, settling = report["equilibrium"], report["settling_time"]
+    if distances["final_distance"] is None:
+        return dict.fromkeys(("settling time", "distance at the end", "Lyapunov function"), UNKNOWN)
+    away = f"{distances['final_distance']:.3g} to the penalised equilibrium"
+    if distances["final_distance_to_variational"] is not None:
+        away += f", {distances['final_distance_to_variational']:.3g} to the vGNE"
+    return {
+        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
+        "distance at the end": away,
+        "Lyapunov function": _lyapunov(report["lyapunov"]),
+    }
+
+
+def _lyapunov(seen: dict[str, Any]) -> str:
+    if not seen["known"]:
+        return "not known of MJCF robots"
+    text = "never rose" if seen["monotone"] else "rose"
+    if seen["left"]:
+        text += f" up to the exit, last seen at {seen['observed_until']:.4g} s"
+    claim = "the theory claims a decrease" if seen["claimed"] else "nothing is claimed here"
+    return f"{text} (largest rise {seen['largest_rise']:.2g}; {claim})"
+
+
+def _held_inputs(implicit: dict[str, Any]) -> str:
+    text = (
+        f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
+        f" steps each; predicted outputs off by up to {implicit['largest_prediction_error']:.2g}"
+    )
+    for key, first, what in (
+        (
+            "not_accurate",
+            "first_not_accurate",
+            "not accurate, at whose periods' ends nothing is promised",
+        ),
+        ("periods_not_monotone", "first_not_monotone", "periods without dy+/du > 0"),
+    ):
+        if implicit[key]:
+            text += f"; {implicit[key]} {what} (first at {implicit[first]:.4g} s)"
+    return text
 
 
 def bounds_in_words(bounds: dict[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """What all tables of a scenario file share: their checks, and numbers given for each agent."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -88,13 +88,11 @@ def _filled(value: Any, parts: Sequence[str]) -> list[str] | None:
     if not parts:
         return []
     if isinstance(value, Table):
-        for name, field in type(value).model_fields.items():
-            fills = [each.parameter for each in field.metadata if isinstance(each, Fills)]
-            for begin in ([name], *(each.split(".") if each else [] for each in fills)):
-                if list(parts[: len(begin)]) == begin:
-                    within = _filled(getattr(value, name), parts[len(begin) :])
-                    if within is not None:
-                        return [name, *within]
+        for name, begin in _parameters(type(value)):
+            if list(parts[: len(begin)]) == begin:
+                within = _filled(getattr(value, name), parts[len(begin) :])
+                if within is not None:
+                    return [name, *within]
         return None
     entries = dict(enumerate(value)) if isinstance(value, list) else value
     if isinstance(entries, Mapping):
@@ -103,6 +101,15 @@ def _filled(value: Any, parts: Sequence[str]) -> list[str] | None:
                 within = _filled(entry, parts[1:])
                 return None if within is None else [parts[0], *within]
     return None
+
+
+def _parameters(table: type[Table]) -> Iterator[tuple[str, list[str]]]:
+    """Each key with each parameter that it fills, as the names on the way to it."""
+    for name, field in table.model_fields.items():
+        yield name, [name]
+        for each in field.metadata:
+            if isinstance(each, Fills):
+                yield name, each.parameter.split(".") if each.parameter else []
 
 
 def all_tables() -> list[type[Table]]:

@@ -16,7 +16,7 @@ from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.loops.base import Samples
-from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.quantity import Quantity
 from gne_mj.system import System
 
@@ -362,7 +362,7 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     ),
     Variable(
         "configuration", ("time", "coordinate"), lambda rows: rows.samples.configuration,
-        there=lambda system: isinstance(system.agents, MjcfRobots),
+        there=lambda system: not has_ode(system.agents.kind),
         long_name="all joints' positions, MuJoCo's qpos", page="behind", batch=False,
     ),
     Variable(

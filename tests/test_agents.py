@@ -8,7 +8,16 @@ from hypothesis import strategies as st
 
 import reference
 from gne_mj.errors import InvalidInput
+from gne_mj.plants import (
+    agent_type,
+    flexible_robot,
+    integrator,
+    mixed,
+    mjcf_robot,
+    pi_cascade,
+)
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.ode import OdePlant
 
 KINDS = {
@@ -128,3 +137,37 @@ def test_plants_step_by_the_same_rates(kind):
     got = plant.state[:, :states].ravel()
     assert np.allclose(got, expected, rtol=1e-11, atol=1e-11)
     assert np.array_equal(plant.output, plant.state[:, agents.kind.OUTPUT])
+
+
+@pytest.mark.parametrize("kind", [flexible_robot, mjcf_robot, integrator, pi_cascade, mixed])
+def test_a_type_with_bodies_names_the_module_of_its_fleets(kind):
+    module = agent_type.fleet_module(kind)
+    assert (module is not None) == agent_type.in_mujoco(kind)
+    assert agent_type.in_mujoco(kind) == (kind in (flexible_robot, mjcf_robot))
+    if module is None:
+        agents = Agents(kind, np.zeros((2, len(kind.PARAMETERS))), np.full(2, np.inf))
+        with pytest.raises(InvalidInput, match=rf"^agents: got '{kind.NAME}'.*no model in MuJoCo"):
+            build_fleet(agents, 0.01)
+    else:
+        assert module.AGENT is kind
+        assert issubclass(module.PLANT, FleetPlant)
+    placed = agent_type.placed_state(kind)
+    assert placed is None or placed in [name for name, _ in kind.STATES]
+    assert (placed is not None) == (kind is flexible_robot)
+
+
+def test_the_types_of_a_fleet_are_told_with_their_numbers():
+    robot, point = np.arange(1.0, 6.0)[None], np.zeros((2, 0))
+    fleet = mixed.join(
+        [
+            Agents(flexible_robot, robot, np.full(1, np.inf)),
+            Agents(integrator, point, np.full(2, np.inf)),
+        ]
+    )
+    (first, own), (second, none) = agent_type.by_type(fleet.kind, fleet.parameters)
+    assert (first, second) == (flexible_robot, integrator)
+    assert np.array_equal(own, robot)
+    assert none.shape == (2, 0)
+    ((kind, same),) = agent_type.by_type(flexible_robot, robot)
+    assert kind is flexible_robot
+    assert same is robot

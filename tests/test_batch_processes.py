@@ -48,6 +48,15 @@ def command(folder, *more):
     return [sys.executable, "-c", program, "batch", *BATCH, "--out", str(folder), *more]
 
 
+def stored_chunks_are_final(found, expected):
+    """Of chunks that are stored every file is that of the whole batch."""
+    stored = {name.removeprefix("status/") for name in found if name.startswith("status/")}
+    for name in found:
+        _, _, place = name.partition("/")
+        if place.split(".")[0] in stored and not place.endswith(".partial"):
+            assert found[name] == expected[f"runs.zarr/{name}"], name
+
+
 def killed_and_resumed(tmp_path, kills, seed):
     """How many kills met a batch at work; in the end it is as if there had been none."""
     whole, broken = tmp_path / "whole", tmp_path / "broken"
@@ -67,14 +76,7 @@ def killed_and_resumed(tmp_path, kills, seed):
             done = Progress.of(Store.open(broken)).done
             assert done >= kept, "what was stored is lost"
             kept = done
-            found = contents(broken / "runs.zarr")
-            statuses = {name for name in found if name.startswith("status/")}
-            for name in statuses:  # of stored chunks every file is final
-                end = name.removeprefix("status/")
-                for other in found:
-                    _, _, place = other.partition("/")
-                    if place.split(".")[0] == end and not place.endswith(".partial"):
-                        assert found[other] == expected[f"runs.zarr/{other}"], other
+            stored_chunks_are_final(contents(broken / "runs.zarr"), expected)
         if kept == 120:  # begin again
             subprocess.run(["rm", "-r", str(broken)], check=True)
             kept = 0

@@ -70,7 +70,7 @@ NETWORKS = [
 def problem_of(game, law, limit=np.inf):
     bounds = np.full(game.actions, limit)
     settings, y = law.settings(RHO), np.zeros(game.actions)
-    addresses = link(law.kernels, game.kernels, memory=law.graph is not None, ahead=None)
+    addresses = link(law.kernels, game.kernels, memory=law.graph is not None)
     return Problem(
         game.data, law.graph_data, settings, bounds, y, no_propagator(), functions=addresses
     )

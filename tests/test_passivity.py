@@ -43,14 +43,18 @@ class Appendage(OdePlant):
         return self.state[:, 2]
 
 
+def agents_of(channels, **more):
+    """Agents without a storage function, whose states have no names."""
+    kind = SimpleNamespace(STATES=())
+    return SimpleNamespace(channels=channels, kind=kind, knows_storage=False, **more)
+
+
 class Linear(Plant):
     """Channels x' = A x + B u, y = x_0, stepped exactly; at rest at (y, ..., y) unless told."""
 
     def __init__(self, channels, timestep, a, b):
         n = len(b)
-        self.agents = SimpleNamespace(
-            channels=channels, equilibrium=lambda y: np.outer(y, np.eye(n)[0])
-        )
+        self.agents = agents_of(channels, equilibrium=lambda y: np.outer(y, np.eye(n)[0]))
         self.timestep, self.x = timestep, np.zeros((channels, n))
         block = np.zeros((n + 1, n + 1))
         block[:n, :n], block[:n, n] = a, b
@@ -76,7 +80,7 @@ class Scalar(Plant):
     """y' = f(y) + u by RK4; the input -f(y) keeps it at any y."""
 
     def __init__(self, channels, timestep, f):
-        self.agents, self.timestep, self.f = SimpleNamespace(channels=channels), timestep, f
+        self.agents, self.timestep, self.f = agents_of(channels), timestep, f
         self.y = np.zeros(channels)
 
     @property
@@ -341,12 +345,12 @@ def test_a_counterexample_repeats_in_an_independent_simulation(name):
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
 def test_the_error_estimate_holds(integrator):
     """Against the same trials at a step eight times finer, held inputs equal by construction."""
-    from gne_mj.passivity.trials import Trials
+    from gne_mj.passivity.trials import Extent, Subject, Trials
 
     def trials(timestep):
-        ends = (np.full(5, -1.0), np.full(5, 1.0))
-        return Trials(ode(robots(UNEQUAL), integrator), range(24), timestep, 5.0, 0, ends,
-                      np.arange(5), None, "agents")  # fmt: skip
+        build = ode(robots(UNEQUAL), integrator)
+        subject = Subject(build, np.full(5, -1.0), np.full(5, 1.0), np.arange(5))
+        return Trials(subject, Extent(24, timestep, 5.0, 0), range(24))
 
     coarse = trials(0.01)
     error = 2 * np.maximum.accumulate(np.abs(coarse.supplied[0] - coarse.supplied[1]))

@@ -268,8 +268,8 @@ def test_periods_that_are_not_accurate_are_excepted():
             system, np.array([0.2]), y, rows.input, monitor, tolerance=1e-3, duration=0.2,
             wall_time=0.0,
         )  # fmt: skip
-        solutions = found.implicit["solutions"]
-        assert found.implicit["covered"] == solutions - unsolved
+        solutions = found.of_modes["implicit"]["solutions"]
+        assert found.of_modes["implicit"]["covered"] == solutions - unsolved
         told.append(summary(found.to_dict())["held inputs"])
     assert "promised" not in told[0]
     assert "3 not accurate, at whose periods' ends nothing is promised (first at 0.07 s)" in told[1]

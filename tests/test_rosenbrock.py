@@ -23,6 +23,7 @@ from builders import (
 from scipy.integrate import solve_ivp
 
 import reference
+from gne_mj import banded
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InfeasibleStart
@@ -30,7 +31,6 @@ from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops import monitor as watch
 from gne_mj.loops import rodas
-from gne_mj.loops.linear import factorise, substitute
 from gne_mj.plants.agents import Agents
 from gne_mj.system import System
 
@@ -100,10 +100,20 @@ def test_small_systems():
     b = rng.normal(size=6)
     expected = np.linalg.solve(matrix, b)
     pivot = np.zeros(6, dtype=np.int64)
-    assert factorise(matrix, pivot)
-    substitute(matrix, pivot, b)
+    band = dense_band(matrix)
+    assert banded.factorise(band, 6, 5, pivot)
+    banded.solve(band, 6, 5, pivot, b)
     assert b == pytest.approx(expected, rel=1e-10)
-    assert not factorise(np.ones((3, 3)), np.zeros(3, dtype=np.int64))
+    assert not banded.factorise(dense_band(np.ones((3, 3))), 3, 2, np.zeros(3, dtype=np.int64))
+
+
+def dense_band(matrix):
+    """A dense matrix as the stages' systems keep it."""
+    n = len(matrix)
+    band = np.zeros((n, 3 * n - 2))
+    for r in range(n):
+        band[r, n - 1 - r : 2 * n - 1 - r] = matrix[r]
+    return band
 
 
 # --------------------------------------------------------------------------------- the closed loop

@@ -5,6 +5,7 @@ import pytest
 from builders import V0
 
 from gne_mj import faults
+from gne_mj.barrier import BarrierTable
 from gne_mj.errors import InvalidInput
 from gne_mj.games import velocity_consensus_game
 from gne_mj.games.cournot import CournotTable
@@ -13,7 +14,6 @@ from gne_mj.games.velocity_consensus import VelocityConsensusTable
 from gne_mj.games.velocity_synchronization import VelocityTable
 from gne_mj.scenario import load_scenario
 from gne_mj.scenario_tables import faults as tables
-from gne_mj.scenario_tables.scenario import BarrierTable
 from gne_mj.toml_table import dimension_of, per_action, per_agent
 
 # Each kind with the keys it needs, all keys, and the faults that they mean

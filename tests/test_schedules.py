@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import reference
-from gne_mj.barrier import SCHEDULES, Schedule
+from gne_mj.barrier import Schedule
 from gne_mj.equilibrium import variational_equilibrium
 from gne_mj.errors import InvalidInput
 from gne_mj.scenario import load_scenario, run
@@ -17,9 +17,10 @@ from gne_mj.theory.periods import least_rho, linear_period
 GAME = reference.VelocityGame(3.0, np.full(5, 3.0))
 
 
-@given(
-    st.sampled_from(list(SCHEDULES)), st.floats(1e-3, 10), st.floats(0.01, 100), st.floats(0, 200)
-)
+KINDS = ("exponential", "reciprocal", "halving")
+
+
+@given(st.sampled_from(KINDS), st.floats(1e-3, 10), st.floats(0.01, 100), st.floats(0, 200))
 def test_schedules_are_what_they_are_called(kind, start, constant, time):
     assume(kind != "halving" or abs(time / constant - round(time / constant)) > 1e-6 or time == 0)
     schedule = Schedule(kind, start, 1e-6 * start, constant)

@@ -73,29 +73,31 @@ def run_batch(
         StorageError: results could not be written; what was stored before is readable.
         ClusterError: the cluster's scheduler no longer answers; likewise.
     """
-    sweeps = []
-    for key, values in (sweep or {}).items():
-        with named(values=f"sweep.{key}"):
-            sweeps.append(Sweep(key, values))  # type: ignore[arg-type]
     own = named(starts="runs", sweeps="sweep", given="record", folder="out", address="cluster")
-    with own, named(plan=""):
+    with own, named(plan=""), connected(cluster) as client:
         plan = make_plan(
             source,
             changes,
             system=system,
-            sweeps=sweeps,
+            sweeps=_sweeps(sweep or {}),
             starts=runs,
             seed=seed,
             spread=spread,
             record=parse_record(record),
             chunk=chunk,
         )
-        folder = Path(out)
-        with connected(cluster) as client:
-            goes_on = resume and folder.exists()
-            store = Store.resume(folder, plan) if goes_on else Store.create(folder, plan)
-            execute(store, threads=threads, cluster=client, progress=progress)
+        begin = Store.resume if resume and Path(out).exists() else Store.create
+        store = begin(Path(out), plan)
+        execute(store, threads=threads, cluster=client, progress=progress)
         return store.dataset()
+
+
+def _sweeps(given: Mapping[str, Sequence[Any]]) -> list[Sweep]:
+    sweeps = []
+    for key, values in given.items():
+        with named(values=f"sweep.{key}"):
+            sweeps.append(Sweep(key, values))  # type: ignore[arg-type]
+    return sweeps
 
 
 def open_batch(folder: str | Path) -> "xarray.Dataset":

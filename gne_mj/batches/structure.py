@@ -15,8 +15,7 @@ from gne_mj.system import Clock, System
 from gne_mj.table import Table
 
 if TYPE_CHECKING:
-    from gne_mj.plants.mjcf_fleet import MjcfPlant
-    from gne_mj.plants.mujoco import MujocoPlant
+    from gne_mj.plants.fleet_plant import FleetPlant
 
 
 class Structure:
@@ -31,7 +30,7 @@ class Structure:
     """
 
     def __init__(self, system: System, clock: Clock, threads: int) -> None:
-        self._plant: MujocoPlant | MjcfPlant | None = None
+        self._plant: FleetPlant | None = None
         self._native = system.integrator != "rosenbrock"
         self.loop: BatchLoop
         faulty = bool(system.faults)
@@ -45,7 +44,7 @@ class Structure:
 
             self._plant = system.mujoco_plant(clock, decorated=False)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
-            alone = isinstance(system.agents, MjcfRobots) and system.mode == "implicit"
+            alone = isinstance(system.agents, MjcfRobots) and system.equation is not None
             self.loop = MujocoBatch(
                 self._plant, system.fault_kernels, faulty, 1 if alone else threads
             )

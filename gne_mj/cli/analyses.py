@@ -1,7 +1,9 @@
 """Commands that examine a scenario: equilibria, guarantees, plants, where a set is left."""
 
 import json
-from typing import Annotated, Any
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,6 +11,12 @@ from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, meaning, settings
 from gne_mj.cli.output import PREPARING, Results, emit, progress, say, working
 from gne_mj.cli.signals import stopping
+
+if TYPE_CHECKING:
+    from gne_mj.exit_map import Cell
+    from gne_mj.scenario import Scenario
+    from gne_mj.system import Clock, System
+    from gne_mj.theory.guarantees import Guarantees
 
 
 @app.command()
@@ -109,57 +117,71 @@ def certify(
     ] = False,
 ) -> None:
     """Tell what the theory guarantees for a scenario's systems, and what it does not."""
-    from dataclasses import asdict, replace
-
-    from gne_mj.errors import InvalidInput
     from gne_mj.scenario import load_scenario
     from gne_mj.theory import certify as examine
     from gne_mj.theory import search_epsilon, search_period, search_push, words
 
     loaded = load_scenario(source, settings(set_))
-    clock = loaded.clock()
     systems, moved = loaded.inside_systems()
     reports = {}
     for system in systems:
         with loaded.naming(system.name):
-            reports[system.name] = examine(system, clock)
-    if search:
-        searched = [s for s in systems if reports[s.name].epsilon is not None]
-        if not searched:
-            raise InvalidInput("search", source, "no system has the distributed law")
-        for system in searched:
-            told = working(as_json, f"searching epsilon of {system.name}")
-            with told as tell, loaded.naming(system.name):
-                found = asdict(search_epsilon(system, clock, tell))
-            epsilon = {**(reports[system.name].epsilon or {}), "search": found}
-            reports[system.name] = replace(reports[system.name], epsilon=epsilon)
-    for option, wanted, key, hunt in (
-        ("period", period, "period_search", search_period),
-        ("push", push, "push_search", search_push),
+            reports[system.name] = examine(system, loaded.clock())
+    distributed, implicit = "no system has the distributed law", "no system is in mode 'implicit'"
+    for wanted, kind in (
+        (search, _Search("search", search_epsilon, "epsilon", "search", distributed)),
+        (period, _Search("period", search_period, "held", "period_search", implicit)),
+        (push, _Search("push", search_push, "held", "push_search", implicit)),
     ):
-        searched = [s for s in systems if wanted and reports[s.name].held is not None]
-        if wanted and not searched:
-            raise InvalidInput(option, source, "no system is in mode 'implicit'")
-        for system in searched:
-            told = working(as_json, f"searching for {system.name}")
-            with told as tell, loaded.naming(system.name):
-                found = asdict(hunt(system, clock, tell))
-            held = {**(reports[system.name].held or {}), key: found}
-            reports[system.name] = replace(reports[system.name], held=held)
+        if wanted:
+            reports = kind.fill(reports, source, loaded, systems, as_json)
     if as_json:
-        found_starts = {name: {"start_found": done} for name, done in moved.items()}
-        emit(
-            json.dumps(
-                {
-                    name: {**report.to_dict(), **found_starts.get(name, {})}
-                    for name, report in reports.items()
-                },
-                indent=2,
-            )
-        )
+        starts = {name: {"start_found": done} for name, done in moved.items()}
+        every = {name: {**each.to_dict(), **starts.get(name, {})} for name, each in reports.items()}
+        emit(json.dumps(every, indent=2))
     else:
         for name, report in reports.items():
             print("\n".join([*words(report), *_moved(moved.get(name))]))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """A search by trial runs: the option that asks for it, and the entry of reports that it fills.
+
+    Systems without the `part` of a report have nothing to search for; `missing` says why.
+    """
+
+    option: str
+    seek: Callable[["System", "Clock", Callable[[str], None]], Any]
+    part: str
+    entry: str
+    missing: str
+
+    def fill(
+        self,
+        reports: "dict[str, Guarantees]",
+        source: str,
+        loaded: "Scenario",
+        systems: "list[System]",
+        as_json: bool,
+    ) -> "dict[str, Guarantees]":
+        """The reports of a scenario's systems, with what was found."""
+        from gne_mj.errors import InvalidInput
+
+        chosen = [each for each in systems if getattr(reports[each.name], self.part) is not None]
+        if not chosen:
+            raise InvalidInput(self.option, source, self.missing)
+        filled = dict(reports)
+        for system in chosen:
+            report = reports[system.name]
+            with (
+                working(as_json, f"searching for {system.name}") as tell,
+                loaded.naming(system.name),
+            ):
+                found = asdict(self.seek(system, loaded.clock(), tell))
+            part: dict[str, Any] = {self.part: {**getattr(report, self.part), self.entry: found}}
+            filled[system.name] = replace(report, **part)
+        return filled
 
 
 @app.command()
@@ -262,23 +284,16 @@ def map_(
     --out keeps the figure map.png and the table map.csv. Ctrl-C ends it early and keeps the cells
     that were done.
     """
-    from dataclasses import asdict
-
     from gne_mj import exit_map as mapping
-    from gne_mj.errors import InvalidInput
     from gne_mj.scenario import load_scenario
     from gne_mj.solve import parse_path
 
     loaded = load_scenario(source, settings(set_))
     name = loaded.name_of(system)
-    try:
-        forces = tuple(float(force) for force in pushes.split(","))
-    except ValueError:
-        raise InvalidInput("pushes", pushes, "it must be numbers, A,B,...") from None
     grid = mapping.Grid(
         periods=tuple(meaning("periods", parse_path, periods)),
         margins=tuple(meaning("margins", parse_path, margins)),
-        pushes=forces,
+        pushes=_forces(pushes),
         runs=runs,
         duration=duration,
         seed=seed,
@@ -291,12 +306,7 @@ def map_(
                 built, loaded.simulation.timestep, grid, show, stopped=stop.is_set
             )
         if cells:
-            with results.written() as folder:
-                if folder is not None:
-                    from gne_mj import plots
-
-                    mapping.write(cells, folder / "map.csv")
-                    plots.save_map(cells, folder / "map.png")
+            _keep_map(cells, results)
     if as_json:
         emit(json.dumps([asdict(cell) for cell in cells], indent=2))
     else:
@@ -306,3 +316,23 @@ def map_(
     if stop.is_set():
         say(f"gne-mj: stopped: {len(cells)} of {grid.cells} cells were done")
     raise typer.Exit(1 if stop.is_set() else 0)
+
+
+def _forces(text: str) -> tuple[float, ...]:
+    from gne_mj.errors import InvalidInput
+
+    try:
+        return tuple(float(force) for force in text.split(","))
+    except ValueError:
+        raise InvalidInput("pushes", text, "it must be numbers, A,B,...") from None
+
+
+def _keep_map(cells: "list[Cell]", results: Results) -> None:
+    from gne_mj import exit_map as mapping
+
+    with results.written() as folder:
+        if folder is not None:
+            from gne_mj import plots
+
+            mapping.write(cells, folder / "map.csv")
+            plots.save_map(cells, folder / "map.png")

@@ -24,69 +24,74 @@ from gne_mj.cli.output import by_the_minute, console, emit, folder_for, on_termi
 from gne_mj.cli.signals import stopping
 
 if TYPE_CHECKING:
-    from gne_mj.batches import Progress, Store, Sweep
+    from gne_mj.batches import Plan, Progress, Store, Sweep
     from gne_mj.batches.report import Report
+
+
+# What `batch` alone is asked for
+SOURCE = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A shipped scenario or a .toml file; with --resume it may be left out.",
+    ),
+]
+SWEEPS = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sweep",
+        metavar="KEY=VALUES",
+        help="Values A,B,... or FROM:TO:COUNT or FROM:TO:COUNTlog; may be repeated, and all"
+        " combinations are run.",
+    ),
+]
+STARTS = Annotated[
+    int,
+    typer.Option(
+        "--runs", help="Random interior starts of each combination; 0: the scenario's own."
+    ),
+]
+FOLDER = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write.")]
+RECORD = Annotated[
+    str,
+    typer.Option(
+        "--record",
+        help="What is kept: 'summaries', 'all' samples too, or every K-th one (a number).",
+    ),
+]
+SEED = Annotated[int, typer.Option("--seed", help="From which all starts' seeds follow.")]
+SPREAD = Annotated[
+    float,
+    typer.Option("--spread", help="How far towards the boundary starts lie, between 0 and 1."),
+]
+CHUNK = Annotated[int, typer.Option("--chunk", help="Runs that are stored together; 0: chosen.")]
+THREADS = Annotated[int, typer.Option("--threads", help="Native threads; 0 for one a processor.")]
+RESUME = Annotated[bool, typer.Option("--resume", help="Go on with what is in DIR already.")]
+CLUSTER = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Run on the workers of this Dask scheduler."),
+]
+FAIL_ON_EXIT = Annotated[
+    bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run ended early.")
+]
 
 
 @app.command()
 def batch(
-    source: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A shipped scenario or a .toml file; with --resume it may be left out.",
-        ),
-    ] = None,
-    sweeps: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sweep",
-            metavar="KEY=VALUES",
-            help="Values A,B,... or FROM:TO:COUNT or FROM:TO:COUNTlog; may be repeated, and all"
-            " combinations are run.",
-        ),
-    ] = None,
-    starts: Annotated[
-        int,
-        typer.Option(
-            "--runs", help="Random interior starts of each combination; 0: the scenario's own."
-        ),
-    ] = 0,
-    folder: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write.")] = Path(
-        "results/batch"
-    ),
+    source: SOURCE = None,
+    sweeps: SWEEPS = None,
+    starts: STARTS = 0,
+    folder: FOLDER = Path("results/batch"),
     set_: SET = None,
     system: SYSTEM = None,
-    record: Annotated[
-        str,
-        typer.Option(
-            "--record",
-            help="What is kept: 'summaries', 'all' samples too, or every K-th one (a number).",
-        ),
-    ] = "summaries",
-    seed: Annotated[int, typer.Option("--seed", help="From which all starts' seeds follow.")] = 0,
-    spread: Annotated[
-        float,
-        typer.Option("--spread", help="How far towards the boundary starts lie, between 0 and 1."),
-    ] = 0.9,
-    chunk: Annotated[
-        int, typer.Option("--chunk", help="Runs that are stored together; 0: chosen.")
-    ] = 0,
-    threads: Annotated[
-        int, typer.Option("--threads", help="Native threads; 0 for one a processor.")
-    ] = 0,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what is in DIR already.")
-    ] = False,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            "--cluster", metavar="ADDRESS", help="Run on the workers of this Dask scheduler."
-        ),
-    ] = None,
-    fail_on_exit: Annotated[
-        bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run ended early.")
-    ] = False,
+    record: RECORD = "summaries",
+    seed: SEED = 0,
+    spread: SPREAD = 0.9,
+    chunk: CHUNK = 0,
+    threads: THREADS = 0,
+    resume: RESUME = False,
+    cluster: CLUSTER = None,
+    fail_on_exit: FAIL_ON_EXIT = False,
     as_json: JSON = False,
 ) -> None:
     """Run all combinations of swept values from random starts, into one dataset.
@@ -94,8 +99,7 @@ def batch(
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
     that was stopped or killed goes on with --resume, and ends as if it had not been.
     """
-    from gne_mj.batches import Store, connected, execute, make_plan, parse_record
-    from gne_mj.batches.report import write_report
+    from gne_mj.batches import connected, execute, make_plan, parse_record
     from gne_mj.errors import InvalidInput, named
 
     changed = bool(sweeps or set_ or system or starts or seed or chunk)
@@ -105,11 +109,8 @@ def batch(
         )
     own = named(address="cluster", store="folder", target="folder")
     with own, connected(cluster) as client, stopping() as stop:
-        if source is None:
-            if not resume:
-                raise InvalidInput("source", None, "a scenario must be named, or `resume`")
-            store = Store.continued(folder)
-        else:
+        plan = None
+        if source is not None:
             plan = make_plan(
                 source,
                 settings(set_),
@@ -121,27 +122,45 @@ def batch(
                 record=meaning("record", parse_record, record),
                 chunk=chunk,
             )
-            if folder.exists() and not resume:
-                raise InvalidInput(
-                    "folder",
-                    str(folder),
-                    "it exists already; name a folder that does not, or add `resume` to go on with"
-                    " it",
-                )
-            with named(plan=""):
-                begin = Store.resume if folder.exists() else Store.create
-                store = begin(folder, plan)
+        store = _opened(plan, folder, resume)
         with _showing(store.plan.runs, as_json) as show:
             now = execute(
                 store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
             )
-        if now.done:
-            _print(store, now, write_report(store, store.folder, replace=True), as_json)
-        elif as_json:
-            emit(json.dumps({**_counts(now), "statuses": {}, "combinations": []}))
+        _tell(store, now, as_json)
     if not now.complete and not as_json:
         print(f"\nstopped: {_partial(store, now)}")
     raise typer.Exit(1 if not now.complete or (fail_on_exit and now.ended_early) else 0)
+
+
+def _opened(plan: "Plan | None", folder: Path, resume: bool) -> "Store":
+    """The store of a plan, or of a batch that goes on with the plan that it has."""
+    from gne_mj.batches import Store
+    from gne_mj.errors import InvalidInput, named
+
+    if plan is None:
+        if not resume:
+            raise InvalidInput("source", None, "a scenario must be named, or `resume`")
+        return Store.continued(folder)
+    if folder.exists() and not resume:
+        raise InvalidInput(
+            "folder",
+            str(folder),
+            "it exists already; name a folder that does not, or add `resume` to go on with it",
+        )
+    with named(plan=""):
+        begin = Store.resume if folder.exists() else Store.create
+        return begin(folder, plan)
+
+
+def _tell(store: "Store", now: "Progress", as_json: bool) -> None:
+    """What a batch that ended has done, with its tables and figure if there is anything."""
+    from gne_mj.batches.report import write_report
+
+    if now.done:
+        _print(store, now, write_report(store, store.folder, replace=True), as_json)
+    elif as_json:
+        emit(json.dumps({**_counts(now), "statuses": {}, "combinations": []}))
 
 
 @app.command(name="batch-report")

@@ -12,9 +12,7 @@ from gne_mj.environment.physics import FleetPhysics
 from gne_mj.environment.task import FleetEnvironment, FleetTask, Start, finite_costs
 from gne_mj.errors import InvalidInput, named, nearest, part_of
 from gne_mj.graph import NAMED, Graph
-from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mjcf_robot import MjcfRobots
-from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.plants.fleet_plant import build_fleet
 from gne_mj.scenario import load_scenario
 from gne_mj.starts import random_starts
 from gne_mj.system import Clock, System
@@ -91,22 +89,15 @@ def environment_of(
         raise InvalidInput(
             "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
         )
-    periods = clock.duration / clock.control_period
-    if round(periods) < 1 or abs(periods - round(periods)) > 1e-6:
-        raise InvalidInput(
-            "clock.duration",
-            clock.duration,
-            f"an episode is a multiple of the control period {clock.control_period:g} s",
-        )
+    periods = _episode(clock)
     if exit_cost is None:
-        exit_cost = float(
-            np.maximum(0.0, round(periods) * finite_costs(system.game, system.start).sum())
-        )
+        costs = finite_costs(system.game, system.start)
+        exit_cost = float(np.maximum(0.0, periods * costs.sum()))
     physics = _physics(system, clock.timestep)
     task = FleetTask(
         system,
         _information(system, information, graph),
-        round(periods),
+        periods,
         reward=reward,
         exit_cost=exit_cost,
         start=_start(system, start, spread),
@@ -115,10 +106,21 @@ def environment_of(
     return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
 
 
+def _episode(clock: Clock) -> int:
+    """Control periods of an episode."""
+    periods = clock.duration / clock.control_period
+    if round(periods) < 1 or abs(periods - round(periods)) > 1e-6:
+        raise InvalidInput(
+            "clock.duration",
+            clock.duration,
+            f"an episode is a multiple of the control period {clock.control_period:g} s",
+        )
+    return round(periods)
+
+
 def _physics(system: System, timestep: float) -> FleetPhysics:
-    kind = MjcfPlant if isinstance(system.agents, MjcfRobots) else MujocoPlant
     with part_of("system"):
-        plant = kind(system.agents, timestep, system.integrator)  # type: ignore[arg-type]
+        plant = build_fleet(system.agents, timestep, system.integrator)
         return FleetPhysics(plant, system.game, system.state)
 
 

@@ -15,8 +15,9 @@ from gne_mj.game import Game
 from gne_mj.native import compiled, source_key
 from gne_mj.plain import raise_pending
 from gne_mj.plants import mjcf_file
+from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mujoco import NA, NQ, NV, SIZES, MujocoPlant
+from gne_mj.plants.mujoco import NA, NQ, NV, SIZES
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     STATE,
@@ -128,9 +129,7 @@ class FleetPhysics(control.Physics):
         exit: how the set was left since the last reset; None while it was not.
     """
 
-    def __init__(
-        self, plant: MujocoPlant | MjcfPlant, game: Game, start: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, plant: FleetPlant, game: Game, start: NDArray[np.float64]) -> None:
         self.plant, self.game, self._start = plant, game, start
         self.exit: Exit | None = None
         at, kernels = offsets(), plant.kernels
@@ -233,7 +232,7 @@ class FleetPhysics(control.Physics):
             self.exit = Exit(self.time(), name, value, restored=False)
 
 
-def _joints(plant: MujocoPlant | MjcfPlant) -> list[list[slice]]:
+def _joints(plant: FleetPlant) -> list[list[slice]]:
     """Of each MJCF robot its parts of qpos, qvel and act; none of others, whose state is known.
 
     Robots are attached one behind the other, so that their numbers are too; names would not do,

@@ -5,7 +5,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.barrier import KIND, START, rho_at
 from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import NOW, PENALTY, RHO, SHELL, SHELL_VALUE
 from gne_mj.game import GameData
@@ -55,8 +54,8 @@ class Problem(NamedTuple):
     limit: Annotated[np.ndarray, "m"]  # greatest |u| that the actuators deliver
     equilibrium: Annotated[np.ndarray, "m"]  # y*, from which storage is measured
     propagator: Propagator  # exact motion of the law's memory over a control period
-    # of the penalty; all zero: settings[RHO] for all time
-    schedule: Annotated[np.ndarray, "4"] = np.zeros(4)
+    # of the penalty, where functions.PENALTY changes it in time: gne_mj.barrier.Schedule.numbers
+    schedule: Annotated[np.ndarray, "3"] = np.zeros(3)
     order: Order = NO_ORDER
     faults: Faults = NO_FAULTS
     # at y*: division.sizes_at; read in mode continuous only
@@ -117,9 +116,7 @@ def inside(problem, time, stage, y, work, monitor):
     Outputs that are inside, but closer to the boundary than the barrier's tightening, are no exit;
     the constraint is in work.now[SHELL], and its weight is of no use.
     """
-    schedule, rho = problem.schedule, problem.settings[RHO]
-    if schedule[KIND] > 0.0 or schedule[START] > 0.0:
-        rho = rho_at(schedule, time)
+    rho = functions.penalty(problem, time, problem.settings[RHO])
     work.now[PENALTY] = rho
     outside = games.evaluate(problem.data, rho, y, work.g, work.weights)
     work.now[SHELL] = outside

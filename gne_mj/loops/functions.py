@@ -7,10 +7,10 @@ One call does its work for all agents, so that calling costs next to nothing.
 
 from gne_mj.native import address_in, call_integer, call_number, kernel
 
-# Entries of ``problem.functions``, the latter for mode implicit
+# Entries of ``problem.functions``, those of the second line for mode implicit
 ACTION, RATE, PROPAGATE, STORAGE = range(4)
 PREPARE, PULLS, ADD_PULL_SLOPE, OWN_PROFILE, SETTLE, SOLVE, ACT = range(4, 11)
-COUNT = 11
+PENALTY, COUNT = 11, 12  # the first for penalties that change in time
 
 
 @kernel
@@ -23,6 +23,14 @@ def action(problem, y, weights, memory, work, u):
             address_in(work.profile), address_in(work.now), address_in(u),
         ),
     )  # fmt: skip
+
+
+@kernel
+def penalty(problem, time, rho):
+    """The penalty at a time in s: rho, or what the schedule says."""
+    if problem.functions[PENALTY] == 0:
+        return rho
+    return call_number(problem.functions[PENALTY], (problem.table, time))
 
 
 @kernel

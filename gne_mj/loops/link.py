@@ -1,13 +1,16 @@
 """Laws as C functions, compiled by themselves; :mod:`gne_mj.loops.functions` calls them."""
 
+import sys
+from collections.abc import Callable, Mapping
 from functools import cache
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from gne_mj.barrier import scheduled
 from gne_mj.controllers.settings import NOW
 from gne_mj.loops import functions, implicit
 from gne_mj.loops.layout import (
@@ -23,6 +26,7 @@ from gne_mj.native import callback, source_key
 from gne_mj.table import floats_at
 
 _whole, _real = types.int64, types.float64
+NO_OTHERS: Mapping[int, Any] = MappingProxyType({})
 
 
 class LawWork(NamedTuple):
@@ -32,41 +36,26 @@ class LawWork(NamedTuple):
     now: np.ndarray  # see gne_mj.controllers.settings
 
 
-class Implicit(NamedTuple):
-    """What mode implicit is made of.
-
-    Attributes:
-        equation: :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
-        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
-        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
-        at: where MuJoCo keeps what, for a plant that asks it.
-    """
-
-    equation: ModuleType
-    plant: ModuleType
-    faults: ModuleType
-    at: Any = ()
-
-
 def link(
-    law: ModuleType, game: ModuleType, *, memory: bool, ahead: Implicit | None
+    law: ModuleType,
+    game: ModuleType,
+    *,
+    memory: bool,
+    others: Mapping[int, Any] = NO_OTHERS,
 ) -> NDArray[np.int64]:
     """The addresses for ``problem.functions``: those that a run calls, the others 0.
 
     Args:
         law, game: modules of kernels.
         memory: whether the law has one.
-        ahead: what belongs to mode implicit; None in the others.
+        others: C functions besides the law's own, by their entry: of the mode, of the schedule.
     """
     addresses = np.zeros(functions.COUNT, dtype=np.int64)
     addresses[functions.ACTION] = action(law, game).address
     owners: dict[int, Any] = {}
     if memory:
         owners |= of_memory(law)
-    if ahead is not None:
-        owners |= of_implicit(law, game) | {functions.SOLVE: solve(ahead.equation)}
-        owners[functions.ACT] = act(ahead.plant, ahead.faults, ahead.at)
-    for entry, owner in owners.items():
+    for entry, owner in {**owners, **others}.items():
         addresses[entry] = owner.address
     return addresses
 
@@ -122,6 +111,18 @@ def of_memory(law: ModuleType) -> dict[int, Any]:
         functions.PROPAGATE: callback(_whole(*[_whole] * 5), propagate),
         functions.STORAGE: callback(_real(_whole, _whole), storage),
     }
+
+
+@cache
+def penalty(fall: Callable[[float, float], float]) -> Any:
+    """The penalty at a time, by a schedule's kernel (:class:`gne_mj.barrier.Fall`)."""
+    source = source_key(sys.modules[fall.__module__])
+
+    def penalty(table, time):
+        _ = source
+        return scheduled(fall, problem_in(table).schedule, time)
+
+    return callback(_real(_whole, _real), penalty)
 
 
 @cache
@@ -187,7 +188,11 @@ def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
 
 @cache
 def solve(equation: ModuleType) -> Any:
-    """The solver of mode implicit, for all laws and games."""
+    """The solver of mode implicit, for all laws and games.
+
+    Args:
+        equation: :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
+    """
     source = source_key()
 
     def solve(table, b, memory, profile, now, solver, length):
@@ -206,7 +211,13 @@ def solve(equation: ModuleType) -> Any:
 
 @cache
 def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
-    """What mode implicit does at a control instant, for all laws and games."""
+    """What mode implicit does at a control instant, for all laws and games.
+
+    Args:
+        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
+        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
+        at: where MuJoCo keeps what, for a plant that asks it.
+    """
     source = source_key(plant, faults)
 
     def act(table, room, time, step, state, memory, model, data):

@@ -67,8 +67,7 @@ from gne_mj.plants.native_mujoco import (
 from gne_mj.table import Table, integers
 
 if TYPE_CHECKING:
-    from gne_mj.plants.mjcf_fleet import MjcfPlant
-    from gne_mj.plants.mujoco import MujocoPlant
+    from gne_mj.plants.fleet_plant import FleetPlant
 
 
 @kernel
@@ -256,7 +255,7 @@ def room(
     Args:
         game, agents: of the loop.
         memory: length of the law's memory.
-        mode: one of MODES of :mod:`gne_mj.loops.ode`.
+        mode: CONTINUOUS, SAMPLED or IMPLICIT of :mod:`gne_mj.loops.ode`.
         sizes: of the scratch arrays that depend on the kind of loop.
     """
     needed = room_needed(game.actions, game.constraints_count, game.agents, *sizes)
@@ -264,9 +263,7 @@ def room(
     return (needed, memory) if mode == CONTINUOUS else (needed + memory, 0)
 
 
-def mujoco_table(
-    plant: "MujocoPlant | MjcfPlant", setup: Setup, agents: Agents, memory: int
-) -> Table:
+def mujoco_table(plant: "FleetPlant", setup: Setup, agents: Agents, memory: int) -> Table:
     """The table of a run: the plant's places and sizes, the robots' numbers, and the rest."""
     arrays = table_arrays(plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator])
     return Table(arrays)
@@ -284,7 +281,7 @@ class MujocoLoop(ClosedLoop):
 
     def __init__(
         self,
-        plant: "MujocoPlant | MjcfPlant",
+        plant: "FleetPlant",
         setup: Setup,
         memory: NDArray[np.float64],
         faults: ModuleType = faultless,
@@ -379,7 +376,7 @@ class MujocoLoop(ClosedLoop):
         return recorder
 
 
-def observe(plant: "MujocoPlant | MjcfPlant", control: Any, start: int) -> None:
+def observe(plant: "FleetPlant", control: Any, start: int) -> None:
     """Observe the present state without moving on, by the callback of a step's start.
 
     Args:

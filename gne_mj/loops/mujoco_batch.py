@@ -28,8 +28,7 @@ from gne_mj.plants.native_mujoco import (
 from gne_mj.table import Table
 
 if TYPE_CHECKING:
-    from gne_mj.plants.mjcf_fleet import MjcfPlant
-    from gne_mj.plants.mujoco import MujocoPlant
+    from gne_mj.plants.fleet_plant import FleetPlant
 
 # Steps of a run between looks at the user's wishes
 STRIDE = 20_000
@@ -47,7 +46,7 @@ class MujocoBatch(BatchLoop):
 
     def __init__(
         self,
-        plant: "MujocoPlant | MjcfPlant",
+        plant: "FleetPlant",
         faults: ModuleType,
         faulty: bool,
         threads: int,
@@ -95,7 +94,7 @@ class MujocoBatch(BatchLoop):
 class _Fleet:
     """A plant of one thread, and where its state is kept at a step's start."""
 
-    def __init__(self, plant: "MujocoPlant | MjcfPlant") -> None:
+    def __init__(self, plant: "FleetPlant") -> None:
         self.plant = plant
         self._saved = room_for_states(plant.model)
         self._parameters = plant.agents.parameters

@@ -44,7 +44,6 @@ LOOP = types.int64(types.int64, types.int64, types.int64)
 SCRATCH_ROWS = 7
 
 CONTINUOUS, SAMPLED, IMPLICIT = range(3)
-MODES = {"continuous": CONTINUOUS, "sampled": SAMPLED, "implicit": IMPLICIT}
 
 
 @kernel

@@ -17,10 +17,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from gne_mj import banded
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.loops.estimate_modes import add_from_modes
-from gne_mj.loops.linear import add_multiple, factorise, substitute
+from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.rodas import GAMMA
 from gne_mj.native import copy, kernel
 from gne_mj.plants import functions
@@ -35,7 +36,8 @@ class StageSystem(NamedTuple):
     # (s I - A)^-1 by columns, that is transposed
     resolvent: Annotated[np.ndarray, "m, states, states"]
     response: Annotated[np.ndarray, "m, states"]  # (s I - A)^-1 G
-    small: Annotated[np.ndarray, "states, states"]  # s I - A of one channel, factorised
+    # s I - A of one channel, factorised; as gne_mj.banded has a dense matrix
+    small: Annotated[np.ndarray, "states, 3 * states - 2"]
     small_pivot: Annotated[np.ndarray, "states", int]
     own: Annotated[np.ndarray, "m, m"]  # du/dy and, off the agents' own blocks, du/d estimate
     filtered: Annotated[np.ndarray, "m, m"]  # du/dz
@@ -44,7 +46,7 @@ class StageSystem(NamedTuple):
     spread: Annotated[np.ndarray, "N, m"]  # T: what a k_y of 1 adds to k_e
     # what k_y adds to k_u, directly and through z and the estimates
     slope: Annotated[np.ndarray, "m, m"]
-    matrix: Annotated[np.ndarray, "m, m"]  # of the system for k_u, factorised
+    matrix: Annotated[np.ndarray, "m, 3 * m - 2"]  # of the system for k_u, likewise
     pivot: Annotated[np.ndarray, "m", int]
     k_x: Annotated[np.ndarray, "states"]  # one channel's
     k_y: Annotated[np.ndarray, "m"]
@@ -137,9 +139,9 @@ def prepare(problem, channels, modes, states, h, system):
             else:
                 slope *= system.spread[i, c]
             system.slope[r, c] = slope
-            system.matrix[r, c] = -slope * system.response[c, channels.output]
-        system.matrix[r, r] += 1.0
-    return factorise(system.matrix, system.pivot)
+            system.matrix[r, c - r + m - 1] = -slope * system.response[c, channels.output]
+        system.matrix[r, m - 1] += 1.0
+    return banded.factorise(system.matrix, m, m - 1, system.pivot)
 
 
 @kernel
@@ -149,16 +151,16 @@ def respond(system, r, states, s):
     for a in range(states):
         system.response[r, a] = 0.0
         for b in range(states):
-            small[a, b] = -system.local[r, a, b]
-        small[a, a] += s
-    if not factorise(small, system.small_pivot):
+            small[a, b - a + states - 1] = -system.local[r, a, b]
+        small[a, states - 1] += s
+    if not banded.factorise(small, states, states - 1, system.small_pivot):
         return False
     for b in range(states):
         column = system.resolvent[r, b]
         for a in range(states):
             column[a] = 0.0
         column[b] = 1.0
-        substitute(small, system.small_pivot, column)
+        banded.solve(small, states, states - 1, system.small_pivot, column)
         for a in range(states):
             system.response[r, a] += system.inputs[r, b] * column[a]
     return True
@@ -232,7 +234,7 @@ def solve_stage(problem, channels, modes, method, states, h, stage, trial, u, k,
         for c in range(at[i], at[i + 1]):
             total += system.filtered[r, c] * k_z[c]
         k_u[r] = total
-    substitute(system.matrix, system.pivot, k_u)
+    banded.solve(system.matrix, m, m - 1, system.pivot, k_u)
     # what k_u and with it k_y add
     for r in range(m):
         for a in range(states):

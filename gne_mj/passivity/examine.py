@@ -20,10 +20,18 @@ from gne_mj.passivity.report import (
     Range,
     widest,
 )
-from gne_mj.passivity.trials import HOLDS, Build, Rest, Storage, Trials, least_storage
+from gne_mj.passivity.trials import (
+    HOLDS,
+    Build,
+    Extent,
+    Rest,
+    Storage,
+    Subject,
+    Trials,
+    least_storage,
+)
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
-from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.ode import OdePlant
 
 # How many times the outputs' range is gone through; beyond SIMULATED only where V is negative, by
@@ -47,13 +55,9 @@ def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
         if engine == "ode":
             return OdePlant(agents.repeated(copies), timestep, method)
         # Late: MuJoCo is slow to import, and the twins do not need it.
-        from gne_mj.plants.mjcf_fleet import MjcfPlant
-        from gne_mj.plants.mujoco import MujocoPlant
+        from gne_mj.plants.fleet_plant import build_fleet
 
-        fleet = agents.repeated(copies)
-        if isinstance(fleet, MjcfRobots):
-            return MjcfPlant(fleet, timestep, method)
-        return MujocoPlant(fleet, timestep, method, decorated=False)
+        return build_fleet(agents.repeated(copies), timestep, method, decorated=False)
 
     return build
 
@@ -96,6 +100,30 @@ def examine(
     Raises:
         InvalidInput: numbers that cannot be used, or a plant that does not rest at its equilibria.
     """
+    extent = _extent(trials, timestep, duration, seed)
+    subject = _subject(build, extent, outputs, owners, equilibrium, storage)
+    levels: list[_Level] = []
+    unresolved = None
+    for number, reach in enumerate(reaches):
+
+        def tell(share: float, number: int = number) -> None:
+            if progress is not None:
+                progress(100.0 * (number + share) / len(reaches))
+
+        if reach > SIMULATED and not least_storage(subject, reach) < -ROUNDING:
+            continue
+        level = _level(subject, extent, reach, tell)
+        sure = level.counterexample is None or level.counterexample.confirmed
+        if levels and (not sure or (level.escaped and level.counterexample is None)):
+            unresolved = reach
+            break
+        levels.append(level)
+        if level.counterexample is not None or level.escaped:
+            break
+    return _report(levels, unresolved, subject.owner, extent)
+
+
+def _extent(trials: int, timestep: float, duration: float, seed: int) -> Extent:
     for key, value, least in (("trials", trials, 1), ("seed", seed, 0)):
         if value < least:
             raise InvalidInput(key, value, f"it must be at least {least}")
@@ -105,8 +133,19 @@ def examine(
         raise InvalidInput("duration", duration, "it must be finite and at least 40 timesteps")
     check_count("duration", round(min(duration / timestep, 1e300)), MOST_TRIAL, "its timesteps")
     check_count("trials", trials, MOST_RUNS)
-    channels = build(1, timestep).agents.channels
-    held = min(duration / timestep, HOLDS)
+    return Extent(trials, timestep, duration, seed)
+
+
+def _subject(
+    build: Build,
+    extent: Extent,
+    outputs: tuple[ArrayLike, ArrayLike],
+    owners: ArrayLike | None,
+    equilibrium: Rest | None,
+    storage: Storage | Literal["agents"] | None,
+) -> Subject:
+    channels = build(1, extent.timestep).agents.channels
+    held = min(extent.duration / extent.timestep, HOLDS)
     check_room("build", channels, _KEPT * held * channels, "what a trial of them shows")
     owner = np.arange(channels) if owners is None else np.asarray(owners, dtype=np.int64)
     if owner.shape != (channels,):
@@ -114,30 +153,7 @@ def examine(
     lower, upper = (np.broadcast_to(np.asarray(b, dtype=np.float64), (channels,)) for b in outputs)
     if not (np.all(np.isfinite(upper - lower)) and np.all(lower < upper)):
         raise InvalidInput("outputs", outputs, "each lower one must be below the upper one")
-    where = (lower, upper)
-    rest = 0.5 * (lower + upper)
-    levels: list[_Level] = []
-    unresolved = None
-    for number, reach in enumerate(reaches):
-
-        def tell(share: float, number: int = number) -> None:
-            if progress is not None:
-                progress(100.0 * (number + share) / len(reaches))
-
-        if reach > SIMULATED and not (
-            least_storage(build, reach * (upper - lower), rest, equilibrium, storage) < -ROUNDING
-        ):
-            continue
-        level = _level(build, trials, timestep, duration, seed, where, owner, equilibrium, storage,
-                       reach, tell)  # fmt: skip
-        sure = level.counterexample is None or level.counterexample.confirmed
-        if levels and (not sure or (level.escaped and level.counterexample is None)):
-            unresolved = reach
-            break
-        levels.append(level)
-        if level.counterexample is not None or level.escaped:
-            break
-    return _report(levels, unresolved, owner, trials, seed, duration, timestep)
+    return Subject(build, lower, upper, owner, equilibrium, storage)
 
 
 @dataclass(frozen=True)
@@ -152,27 +168,14 @@ class _Level:
     range: Range
 
 
-def _level(
-    build: Build,
-    trials: int,
-    timestep: float,
-    duration: float,
-    seed: int,
-    outputs: tuple[NDArray[np.float64], NDArray[np.float64]],
-    owner: NDArray[np.int64],
-    equilibrium: Rest | None,
-    storage: Storage | Literal["agents"] | None,
-    reach: float,
-    tell: Callable[[float], None],
-) -> _Level:
+def _level(subject: Subject, extent: Extent, reach: float, tell: Callable[[float], None]) -> _Level:
     """All trials of one amplitude, so many channels at a time."""
     worst: dict[tuple[int, int], Finding] = {}
-    counterexample, examined, escaped, has_storage = None, duration, False, False
+    counterexample, examined, escaped, has_storage = None, extent.duration, False, False
     ranges = []
-    batch = max(1, _CHANNELS // len(owner))
+    trials, batch = extent.trials, max(1, _CHANNELS // len(subject.owner))
     for first in range(0, trials, batch):
-        part = Trials(build, range(first, min(first + batch, trials)), timestep, duration, seed,
-                      outputs, owner, equilibrium, storage, reach)  # fmt: skip
+        part = Trials(subject, extent, range(first, min(first + batch, trials)), reach)
         examined = min(examined, float(part.time[-1]))
         escaped, has_storage = escaped or part.escaped, part.has_storage
         ranges.append(part.range())
@@ -194,10 +197,7 @@ def _report(
     levels: list[_Level],
     unresolved: float | None,
     owner: NDArray[np.int64],
-    trials: int,
-    seed: int,
-    duration: float,
-    timestep: float,
+    extent: Extent,
 ) -> PassivityReport:
     """The levels together: the last one's violation, or the worst of all that held."""
     last = levels[-1]
@@ -210,7 +210,10 @@ def _report(
     findings = tuple(worst[place] for place in sorted(worst))
     agents = len(set(owner.tolist()))
     examined = min(level.examined for level in levels)
-    message = f"{trials} trials of {duration:g} s for each of {agents} agents, seed {seed}"
+    message = (
+        f"{extent.trials} trials of {extent.duration:g} s for each of {agents} agents, seed"
+        f" {extent.seed}"
+    )
     if len(levels) > 1:
         message += f", at {len(levels)} amplitudes"
     if not last.has_storage:
@@ -222,16 +225,16 @@ def _report(
             f"; at {unresolved:g} times the outputs' range an output ran away, or the step did not"
             " resolve the motion, which says nothing"
         )
-    status, message = _verdict(message, findings, last.counterexample, timestep)
+    status, message = _verdict(message, findings, last.counterexample, extent.timestep)
     return PassivityReport(
         status=status,
         message=message,
         agents=agents,
-        trials=trials,
-        seed=seed,
-        duration=duration,
+        trials=extent.trials,
+        seed=extent.seed,
+        duration=extent.duration,
         examined=examined,
-        timestep=timestep,
+        timestep=extent.timestep,
         storage=last.has_storage,
         ranges=tuple(level.range for level in levels),
         findings=findings,

@@ -1,6 +1,7 @@
 """Trials of a plant under exciting inputs, at two steps side by side, and their energy balance."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -32,45 +33,82 @@ _STATES = 200
 _ESCAPED = 1e6
 
 
+@dataclass(frozen=True)
+class Subject:
+    """What is examined: plants, and about which of their equilibria.
+
+    Args:
+        build, equilibrium, storage: as :func:`gne_mj.passivity.examine` has them.
+        lower, upper: (channels,) between which y* is drawn.
+        owner: (channels,) whose each channel is, from 0.
+    """
+
+    build: Build
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    owner: NDArray[np.int64]
+    equilibrium: Rest | None = None
+    storage: Storage | Literal["agents"] | None = "agents"
+
+    def storage_of(self, plant: Plant) -> Storage | None:
+        """The storage function to check: the one given, or that of the plant's agents, if any."""
+        if self.storage != "agents":
+            return self.storage
+        return plant.agents.storage if plant.agents.knows_storage else None
+
+    def rest(self, plant: Plant, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """State (channels, states) and input (channels,) that rest at the outputs."""
+        if self.equilibrium is None:
+            return plant.agents.equilibrium(y), np.zeros(len(y))
+        return self.equilibrium(y)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How many trials of how long.
+
+    Args:
+        trials: of every agent.
+        timestep, duration: in s.
+        seed: of the random numbers.
+    """
+
+    trials: int
+    timestep: float
+    duration: float
+    seed: int
+
+
 class Trials:
     """Some trials of all agents in one simulation, at two steps side by side.
 
     Channels are numbered trial after trial. Arrays over time have shape (holds + 1, channels),
     with a leading axis of 2 for the coarser and the finer step where both are kept.
+
+    Args:
+        subject: what is examined.
+        extent: of all trials.
+        trials: the numbers of these ones.
+        reach: how many times the outputs' range amplitudes and deviations are in proportion to.
     """
 
-    def __init__(
-        self,
-        build: Build,
-        trials: range,
-        timestep: float,
-        duration: float,
-        seed: int,
-        outputs: tuple[NDArray[np.float64], NDArray[np.float64]],
-        owner: NDArray[np.int64],
-        equilibrium: Rest | None,
-        storage: Storage | Literal["agents"] | None,
-        reach: float = 1.0,
-    ) -> None:
-        steps = round(duration / timestep)
+    def __init__(self, subject: Subject, extent: Extent, trials: range, reach: float = 1.0) -> None:
+        timestep, owner, build = extent.timestep, subject.owner, subject.build
+        steps = round(extent.duration / timestep)
         self.substeps = 2 * max(1, -(-steps // (2 * HOLDS)))
         holds = steps // self.substeps
-        self.trials, self.timestep, self.owner, self.reach = trials, timestep, owner, reach
+        self.subject, self.trials, self.owner, self.reach = subject, trials, owner, reach
+        self.timestep = timestep
         self.hold = self.substeps * timestep
         self.plants = [build(len(trials), timestep), build(len(trials), 0.5 * timestep)]
-        self.build, self.storage = build, storage
-        self.has_storage = _storage(self.plants[0], storage) is not None
+        self.has_storage = subject.storage_of(self.plants[0]) is not None
         # Numbers of a trial depend on the seed and the trial alone.
-        generators = [np.random.default_rng([seed, trial]) for trial in trials]
-        lower, upper = outputs
+        generators = [np.random.default_rng([extent.seed, trial]) for trial in trials]
+        lower, upper = subject.lower, subject.upper
         width = reach * (upper - lower)
         self.width = np.tile(width, len(trials))
         self.rest_output = np.concatenate([rng.uniform(lower, upper) for rng in generators])
-        if equilibrium is None:
-            self.rest_state = self.plants[0].agents.equilibrium(self.rest_output)
-            self.rest_input = np.zeros(len(self.rest_output))
-        else:
-            self.rest_state, self.rest_input = equilibrium(self.rest_output)
+        self.rest_state, self.rest_input = subject.rest(self.plants[0], self.rest_output)
         self._check_rest()
         self.excitation = Excitation.join(
             [
@@ -162,15 +200,14 @@ class Trials:
         return third * integral, third * size
 
     def _stored(self, plant: Plant, mine: slice) -> NDArray[np.float64]:
-        storage = _storage(plant, self.storage)
+        storage = self.subject.storage_of(plant)
         if storage is None:
             return np.zeros(plant.agents.channels)
         return storage(plant.state, self.rest_state[mine])
 
     def range(self) -> Range:
         """How far the trials went from their equilibria."""
-        kind = getattr(self.plants[0].agents, "kind", None)
-        names = [name for name, _ in getattr(kind, "STATES", ())]
+        names = [name for name, _ in self.plants[0].agents.kind.STATES]
         if len(names) != len(self.farthest):
             names = [f"state {k + 1}" for k in range(len(self.farthest))]
         done = len(self.time) - 1
@@ -255,7 +292,7 @@ class Trials:
         mine = slice(first, first + len(self.owner))
         channel = finding.channel - 1
         since, end = round(finding.since / self.hold), round(finding.time / self.hold)
-        plant = self.build(1, self.timestep / 6.0)
+        plant = self.subject.build(1, self.timestep / 6.0)
         plant.reset(self.initial_state[mine])
         supplied = before = np.zeros(len(self.owner))
         for k in range(end):
@@ -284,42 +321,23 @@ def deviations(
     return direction * width[:, None] * np.exp(rng.uniform(-7.0, 0.0, shape))
 
 
-def least_storage(
-    build: Build,
-    width: NDArray[np.float64],
-    rest_output: NDArray[np.float64],
-    equilibrium: Rest | None,
-    storage: Storage | Literal["agents"] | None,
-) -> float:
+def least_storage(subject: Subject, reach: float) -> float:
     """The least V, over the squared widths, of many states about an equilibrium; 0 without a V.
 
-    Args:
-        build, equilibrium, storage: of the plant.
-        width: (channels,) how far states are away.
-        rest_output: (channels,) y*.
+    The equilibrium is the one in the middle; states are up to ``reach`` times the outputs' range
+    away.
     """
-    plant = build(1, 1.0)
-    known = _storage(plant, storage)
+    plant = subject.build(1, 1.0)
+    known = subject.storage_of(plant)
     if known is None:
         return 0.0
-    rest = (
-        plant.agents.equilibrium(rest_output)
-        if equilibrium is None
-        else equilibrium(rest_output)[0]
-    )
+    width = reach * (subject.upper - subject.lower)
+    rest, _ = subject.rest(plant, 0.5 * (subject.lower + subject.upper))
     rng = np.random.default_rng(0)
     found = [
         known(rest + deviations(rng, width, rest.shape[1]), rest) / width**2 for _ in range(_STATES)
     ]
     return float(np.min(found))
-
-
-def _storage(plant: Plant, storage: Storage | Literal["agents"] | None) -> Storage | None:
-    """The storage function to check: the one given, or that of the plant's agents, if any."""
-    if storage != "agents":
-        return storage
-    known = getattr(plant.agents, "knows_storage", False)
-    return plant.agents.storage if known else None
 
 
 def _error(both: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 See :mod:`gne_mj.plants.integrator` for what each name means.
 """
 
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -57,6 +58,29 @@ def complete(module: ModuleType, key: str = "module", name: str = "") -> ModuleT
 def has_ode(kind: ModuleType) -> bool:
     """Whether a type is given by a differential equation; of MJCF robots only MuJoCo knows it."""
     return hasattr(kind, "rate")
+
+
+def in_mujoco(kind: ModuleType) -> bool:
+    """Whether MuJoCo has bodies of it."""
+    return hasattr(kind, "FLEET")
+
+
+def fleet_module(kind: ModuleType) -> ModuleType | None:
+    """The module of its fleets in MuJoCo, imported only now; None of a type without bodies."""
+    return import_module(kind.FLEET) if in_mujoco(kind) else None
+
+
+def placed_state(kind: ModuleType) -> str | None:
+    """Its state that is a place, at which agents start apart from each other; None without."""
+    return getattr(kind, "PLACED", None)
+
+
+def by_type(
+    kind: ModuleType, parameters: NDArray[np.float64]
+) -> list[tuple[ModuleType, NDArray[np.float64]]]:
+    """The types that channels with these numbers are of, each with those of its own channels."""
+    parts = getattr(kind, "by_type", None)
+    return [(kind, parameters)] if parts is None else parts(parameters)
 
 
 def knows_storage(kind: ModuleType) -> bool:

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named
+from gne_mj.plants import mjcf_file
 
 # By how many axes a robot moves along: where, which robot, and how its elements' names end
 MODELS = {
@@ -114,16 +115,23 @@ def _group(
 
 
 def compile_model(
-    world: mujoco.MjSpec, *, timestep: float, integrator: str, userdata: int = 0, memory: int = 0
+    world: mujoco.MjSpec,
+    *,
+    timestep: float,
+    integrator: str,
+    userdata: int = 0,
+    memory: int = 0,
+    arena: int = 0,
 ) -> mujoco.MjModel:
-    """Compile a composed fleet.
+    """Compile the world of a fleet.
 
     Args:
-        world: what :func:`compose` returned.
+        world: with the robots attached, as :func:`compose` returns it.
         timestep: in s.
         integrator: MuJoCo's name of it.
         userdata: entries of mjData's ``userdata``.
         memory: entries of ``act`` for a law's memory, see :func:`add_memory`.
+        arena: bytes of MuJoCo's own memory that it must have at least.
 
     Raises:
         InvalidInput: numbers that MuJoCo does not take, as a mass below its least.
@@ -133,11 +141,12 @@ def compile_model(
     world.option.timestep = timestep
     world.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     world.nuserdata = userdata
-    try:
-        return world.compile()
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise InvalidInput("world", "...", f"MuJoCo must compile it: {said}") from None
+    with named(path="world"):
+        model = mjcf_file.compiled(world, "...")
+        if arena > model.narena:
+            world.memory = arena
+            model = mjcf_file.compiled(world, "...")
+    return model
 
 
 def add_memory(world: mujoco.MjSpec, memory: int) -> None:

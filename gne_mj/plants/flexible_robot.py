@@ -36,6 +36,8 @@ STATES = (
 OUTPUT = 1
 POSITIONS = (0, 3)  # moved by the new velocities in an Euler step
 INPUT_UNIT = "N"
+FLEET = "gne_mj.plants.mujoco"  # the module of its fleets in MuJoCo
+PLACED = "position"  # the state at which agents start apart from each other
 
 
 def is_passive(parameters):

@@ -5,7 +5,9 @@ an action of m_i entries is m_i such channels. It defines PARAMETERS (their name
 and units; an empty unit stands for the action's), OUTPUT (which of them is y; the others are
 recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
 given parameters meet the theory's assumption), and the kernels below; x' is affine in u. It may
-define ``energy_balance``, from which the theory's rates follow.
+define ``energy_balance``, from which the theory's rates follow, FLEET (the module of its fleets in
+MuJoCo, which has a ``PLANT``: :mod:`gne_mj.plants.fleet_plant`) and PLACED (the state that is a
+place, at which agents start apart).
 """
 
 import sys

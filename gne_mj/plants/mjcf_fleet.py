@@ -1,8 +1,7 @@
 """Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
 
-import copy
 import sys
-from typing import Any, Self
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,8 +11,8 @@ from gne_mj.errors import InvalidInput, named, nearest
 from gne_mj.native import kernel
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.base import Plant
-from gne_mj.plants.fleet import add_memory, read_model
+from gne_mj.plants.fleet import compile_model, read_model
+from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_ahead import (
     ACTUATOR,
@@ -53,7 +52,7 @@ def stored(channels, state, userdata):
     return 0.0
 
 
-class MjcfPlant(Plant):
+class MjcfPlant(FleetPlant):
     """A fleet of the user's own robots in MuJoCo.
 
     Each file's bodies are attached to one world, side by side; all must have the same options
@@ -68,6 +67,7 @@ class MjcfPlant(Plant):
         integrator: "rk4" or "euler".
         userdata: room to leave in ``userdata`` behind what this plant needs itself.
         memory: room for a law's memory in ``act``, behind what the robots have there.
+        decorated: no matter here: files are kept as they are.
 
     Attributes:
         kernels: the module that says how a loop reads and drives the fleet.
@@ -89,23 +89,17 @@ class MjcfPlant(Plant):
         *,
         userdata: int = 0,
         memory: int = 0,
+        decorated: bool = True,
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
         with named(path="agents.path"):
             world, sizes_of_robots, memory_asked = _world(agents.robots)
-        world.option.timestep = timestep
-        world.option.integrator = getattr(
-            mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS[integrator].upper()}"
-        )
-        world.nuserdata = USERDATA_HEADER + userdata
-        if memory:
-            add_memory(world, memory)
-        with named(path="agents.path"):
-            self.model = mjcf_file.compiled(world, "...")
-            if memory_asked > self.model.narena:
-                world.memory = memory_asked
-                self.model = mjcf_file.compiled(world, "...")
+        with named(world="agents.path"):
+            self.model = compile_model(
+                world, timestep=timestep, integrator=INTEGRATORS[integrator],
+                userdata=USERDATA_HEADER + userdata, memory=memory, arena=memory_asked,
+            )  # fmt: skip
         self.data = mujoco.MjData(self.model)
         with quiet():
             mujoco.mj_fwdPosition(self.model, self.data)
@@ -188,19 +182,17 @@ class MjcfPlant(Plant):
                 f" most {least:g}",
             )
 
-    def twin(self) -> Self:
-        """The same fleet with a model and data of its own, for another thread."""
-        other = copy.copy(self)
-        other.model = copy.copy(self.model)
-        other.data = mujoco.MjData(other.model)
-        return other
-
     def refresh(self) -> None:
         """Bring sensors of velocities up to date, which are of the last step's start."""
         if not self.measures_every_stage:
             with quiet():
                 for name in SENSOR_FUNCTIONS:
                     getattr(mujoco, name)(self.model, self.data)
+
+    @property
+    def outputs(self) -> list[str]:
+        """See the base class."""
+        return [robot.output for robot in self.agents.robots]
 
     @property
     def output_joints(self) -> NDArray[np.int64]:
@@ -248,6 +240,9 @@ class MjcfPlant(Plant):
         with callbacks():
             run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)
+
+
+PLANT = MjcfPlant
 
 
 def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:

@@ -25,6 +25,7 @@ STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
 INPUT_UNIT = "N or N m"
 KNOWS_STORAGE = False
+FLEET = "gne_mj.plants.mjcf_fleet"
 
 
 @dataclass(frozen=True)

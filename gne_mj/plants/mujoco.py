@@ -1,9 +1,8 @@
 """Flexible robots in MuJoCo: the fleet's model and data, its atan springs as native forces."""
 
-import copy
 import sys
 from functools import cache
-from typing import Any, Self
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,8 +12,8 @@ from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.native import callback, compiled, kernel, source_key
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.base import Plant
 from gne_mj.plants.fleet import compile_model, compose, element_names
+from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.native_mujoco import (
     CALLBACK,
     PLANT_MARK,
@@ -131,7 +130,7 @@ def run_steps() -> Any:
     return run
 
 
-class MujocoPlant(Plant):
+class MujocoPlant(FleetPlant):
     """A fleet of flexible robots in the lane, or of planar ones in the plane.
 
     Args:
@@ -149,9 +148,6 @@ class MujocoPlant(Plant):
             callbacks the springs lack their atan term.
     """
 
-    measures_every_stage = True
-    configuration = 0  # joint positions to record: the state says them
-
     def __init__(
         self,
         agents: Agents,
@@ -162,8 +158,8 @@ class MujocoPlant(Plant):
         memory: int = 0,
         decorated: bool = True,
     ) -> None:
-        if agents.kind is not flexible_robot:
-            raise InvalidInput("agents", agents.kind.NAME, "only flexible robots have a model")
+        if agents.kind is not AGENT:
+            raise InvalidInput("agents", agents.kind.NAME, "this fleet is of flexible robots")
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
         self.passive = passive_callback(offsets())
@@ -226,19 +222,17 @@ class MujocoPlant(Plant):
             ("tendon_damping", tendons, parameters[:, :, 4]),
         ]
 
-    def twin(self) -> Self:
-        """The same fleet with a model and data of its own, for another thread."""
-        other = copy.copy(self)
-        other.model = copy.copy(self.model)
-        other.data = mujoco.MjData(other.model)
-        return other
-
     def refresh(self) -> None:
         """Bring the springs' arctangents up to date, which are of the last step's start.
 
         The callback must be installed.
         """
         mujoco.mj_passive(self.model, self.data)
+
+    @property
+    def outputs(self) -> list[str]:
+        """See the base class."""
+        return element_names("position", self.agents.channels, self.agents.dimension)
 
     @property
     def output_joints(self) -> NDArray[np.int64]:
@@ -271,3 +265,6 @@ class MujocoPlant(Plant):
         self.data.ctrl[self.places[:, ACTUATOR]] = u
         with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
+
+
+PLANT = MujocoPlant

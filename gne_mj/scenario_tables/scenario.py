@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 import gne_mj.user_files  # noqa: F401  registers games and laws of the user's own
-from gne_mj.barrier import Schedule
+from gne_mj.barrier import BarrierTable
 from gne_mj.controllers import Law
 from gne_mj.controllers.full_information import FullController
 from gne_mj.controllers.table import LawTable
@@ -21,45 +21,19 @@ from gne_mj.game import Game
 from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
-from gne_mj.plants import flexible_robot
+from gne_mj.plants.agent_type import placed_state
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
-from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, load_plugins
+from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, MODES, load_plugins
 from gne_mj.scenario_tables.faults import FaultTable, MarginTable
 from gne_mj.simulation import Simulation
 from gne_mj.starts import interior_profile
-from gne_mj.system import Clock, System
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.checks import check_estimates
 from gne_mj.theory.periods import least_rho
 from gne_mj.toml_table import Fills, PerAction, Sizes, Table, per_action
 
 load_plugins()  # the tables below hold any of those that are registered
-
-
-class BarrierTable(Table):
-    """[eq:logbarrier]"""
-
-    rho: float = Field(0.1, gt=0, description="at the start, if it has a schedule")
-    schedule: Annotated[Literal["exponential", "reciprocal", "halving"] | None, Fills("kind")] = (
-        Field(None, description="how rho falls in time; constant if left out")
-    )
-    time_constant: float | None = Field(None, gt=0, description="s, of the schedule; 1 if left out")
-    floor: float | None = Field(
-        None,
-        gt=0,
-        description="what rho falls to; if left out 1e-9 in mode implicit, else the least that the"
-        " period allows at the equilibrium",
-    )
-
-    def build(self, floor: float) -> Schedule | None:
-        """The schedule, falling to ``floor`` unless that is given."""
-        if self.schedule is None:
-            for key in ("floor", "time_constant"):
-                if getattr(self, key) is not None:
-                    raise InvalidInput(key, getattr(self, key), "it goes with barrier.schedule")
-            return None
-        lowest = min(floor, self.rho) if self.floor is None else self.floor
-        return Schedule(self.schedule, self.rho, lowest, self.time_constant or 1.0)
 
 
 class PlantTable(Table):
@@ -93,8 +67,9 @@ class InitialTable(Table):
         y = default() if self.action is None else per_action("action", self.action, sizes)
         state = agents.equilibrium(y)
         names = [name for name, _ in agents.kind.STATES]
-        if agents.kind is flexible_robot:
-            state[:, names.index("position")] = _places(sizes)
+        placed = placed_state(agents.kind)
+        if placed is not None:
+            state[:, names.index(placed)] = _places(sizes)
         for key in ("extension", "appendage_velocity", "position", "integral"):
             given = getattr(self, key)
             if given is None:
@@ -202,9 +177,10 @@ class SystemTable(Table):
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
         )
-        if schedule is None or self.barrier.floor is not None or system.mode == "implicit":
+        acts = mode_of(system).explicit_period(period, simulation.timestep)
+        if schedule is None or self.barrier.floor is not None or acts is None:
             return system
-        floor = least_rho(system, period if system.mode == "sampled" else simulation.timestep)
+        floor = least_rho(system, acts)
         return replace(system, rho=floor, schedule=self.barrier.build(floor))
 
     @contextmanager
@@ -268,7 +244,7 @@ class SystemTable(Table):
         disturbance = self._disturbance(game)
         if disturbance is None:
             return game, agents
-        if self.controller.mode != "implicit":
+        if not MODES[self.controller.mode].promises:
             raise InvalidInput(
                 "margin", "given", "it is for mode 'implicit', where a margin is a promise"
             )

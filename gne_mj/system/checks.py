@@ -4,30 +4,18 @@ Each function raises InvalidInput or InfeasibleStart, naming the system's parame
 what would be right.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from gne_mj.bounds import check_room
 from gne_mj.controllers import Law
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
-from gne_mj.faults import (
-    Bias,
-    Noise,
-    SensorDelay,
-    for_native,
-    message_delay,
-    sensor_delay,
-    strikes_messages,
-)
+from gne_mj.faults import for_native, message_delay, sensor_delay, strikes_messages
 from gne_mj.game import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.native import INTERPRETED
-from gne_mj.plants import flexible_robot
-from gne_mj.plants.mjcf_robot import MjcfRobots
-
-if TYPE_CHECKING:
-    from gne_mj.system.system import System
+from gne_mj.plants.agent_type import has_ode, in_mujoco
+from gne_mj.system.data import SystemData
+from gne_mj.system.modes import mode_of
 
 # The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
 ROSENBROCK_AGENTS = 200
@@ -43,7 +31,7 @@ def check_estimates(game: Game, law: Law) -> None:
         check_room("agents.count", game.agents, size, what)
 
 
-def check_parts(system: "System") -> None:
+def check_parts(system: SystemData) -> None:
     """Refuse parts whose shapes or kinds do not go together."""
     m = system.game.actions
     if system.agents.channels != m:
@@ -64,22 +52,9 @@ def check_parts(system: "System") -> None:
             system.law.graph.agents,
             f"the game has {system.game.agents} agents",
         )
-    if system.mode != "continuous" and not system.law.propagates:
-        raise InvalidInput(
-            "mode",
-            system.mode,
-            "a plain law with a memory runs in mode 'continuous'",
-        )
-    if system.mode == "implicit" and not system.law.implicit:
-        raise InvalidInput(
-            "mode",
-            system.mode,
-            "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
-            " with; use mode 'sampled'",
-        )
-    if system.decentralised and (
-        system.mode != "implicit" or system.law.theorem is None or system.law.alone
-    ):
+    mode = mode_of(system)
+    mode.check_law(system)
+    if system.decentralised and not mode.shares_slack(system):
         raise InvalidInput(
             "decentralised",
             True,
@@ -93,7 +68,7 @@ def check_parts(system: "System") -> None:
             quantity.bounds(system.game.entries(quantity))
 
 
-def check_lists(system: "System", problem: Problem) -> None:
+def check_lists(system: SystemData, problem: Problem) -> None:
     """Refuse a law whose graph or propagator native code would read beyond its end.
 
     A law of one's own gives both itself, and native code believes what it is given.
@@ -115,7 +90,7 @@ def check_lists(system: "System", problem: Problem) -> None:
             f"there must be {pointer[-1]} of them, agents 1 to {agents}",
         )
     maps, coefficients, _ = problem.propagator
-    if system.mode != "continuous" and not len(coefficients) and maps.shape != (agents,) * 3:
+    if mode_of(system).held and not len(coefficients) and maps.shape != (agents,) * 3:
         raise InvalidInput(
             key,
             f"a propagator of shape {maps.shape}",
@@ -123,7 +98,7 @@ def check_lists(system: "System", problem: Problem) -> None:
         )
 
 
-def check_start(system: "System") -> None:
+def check_start(system: SystemData) -> None:
     """Refuse a start that is not strictly inside, or within the barrier's tightening."""
     key = "state"
     with np.errstate(over="ignore"):  # a constraint that overflows is not kept either
@@ -140,7 +115,7 @@ def check_start(system: "System") -> None:
         raise InfeasibleStart(key, what, name, float(tight[worst]))
 
 
-def check_memory(system: "System") -> None:
+def check_memory(system: SystemData) -> None:
     """Refuse estimates at which an agent would evaluate the barrier outside."""
     if not np.all(np.isfinite(system.memory)):
         raise InvalidInput("memory", "nan or inf", "every entry must be finite")
@@ -158,7 +133,7 @@ def check_memory(system: "System") -> None:
             )
 
 
-def check_engine(system: "System") -> None:
+def check_engine(system: SystemData) -> None:
     """Refuse agents, laws and modes that the engine or integrator does not run."""
     if system.schedule is not None and system.integrator == "rosenbrock":
         raise InvalidInput(
@@ -166,22 +141,22 @@ def check_engine(system: "System") -> None:
             system.integrator,
             "it is for a penalty that does not change in time; use 'rk4'",
         )
-    own_model = isinstance(system.agents, MjcfRobots)
+    kind = system.agents.kind
     if system.engine == "mujoco" and INTERPRETED:
         raise InvalidInput(
             "engine",
             system.engine,
             "MuJoCo calls machine code only: unset NUMBA_DISABLE_JIT, or use engine 'ode'",
         )
-    if system.engine == "mujoco" and not own_model and system.agents.kind is not flexible_robot:
+    if system.engine == "mujoco" and not in_mujoco(kind):
         raise InvalidInput(
             "engine",
             system.engine,
             f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
-            f" {system.agents.kind.NAME}s on 'ode'",
+            f" {kind.NAME}s on 'ode'",
         )
-    if system.engine == "ode" and own_model:
-        raise InvalidInput("engine", system.engine, "MJCF robots run on 'mujoco'")
+    if system.engine == "ode" and not has_ode(kind):
+        raise InvalidInput("engine", system.engine, f"{kind.NAME}s run on 'mujoco'")
     if system.integrator == "rosenbrock" and system.game.agents > ROSENBROCK_AGENTS:
         raise InvalidInput(
             "integrator",
@@ -190,7 +165,7 @@ def check_engine(system: "System") -> None:
             f" {system.game.agents}; use mode 'sampled'",
         )
     if system.integrator == "rosenbrock" and (
-        not system.law.rosenbrock or system.mode != "continuous" or system.engine != "ode"
+        not system.law.rosenbrock or mode_of(system).held or system.engine != "ode"
     ):
         raise InvalidInput(
             "integrator",
@@ -200,7 +175,7 @@ def check_engine(system: "System") -> None:
         )
 
 
-def check_faults(system: "System") -> None:
+def check_faults(system: SystemData) -> None:
     """Refuse faults that the integrator, mode or agents do not know."""
     key = "faults"
     if system.faults and system.integrator == "rosenbrock":
@@ -216,28 +191,4 @@ def check_faults(system: "System") -> None:
     if strikes_messages(system.faults) and graph is not None:
         kept += (2 * len(graph.edges) + (message_delay(system.faults) + 1) * graph.agents) * m
     check_room(key, "late", ESTIMATES * kept, "what was sent or measured before")
-    late = sensor_delay(system.faults) > 0
-    if late and system.decentralised:
-        raise InvalidInput(
-            key,
-            "late sensors",
-            "looking ahead over a sensor's delay needs the inputs that all others had meanwhile,"
-            " which an agent of the decentralised law does not have: use mode 'sampled', or leave"
-            " decentralised out",
-        )
-    held = strikes_messages(system.faults) or late
-    if held and system.mode == "continuous":
-        raise InvalidInput(
-            key,
-            "messages or late sensors",
-            "they go by control periods: use mode 'sampled' or 'implicit'",
-        )
-    if system.mode == "implicit" and isinstance(system.agents, MjcfRobots):
-        for fault in system.faults:
-            if isinstance(fault, Noise | Bias | SensorDelay):
-                raise InvalidInput(
-                    key,
-                    type(fault).__name__.lower(),
-                    "mode 'implicit' predicts MJCF robots from their whole true state, which"
-                    " such sensors would not tell; use mode 'sampled'",
-                )
+    mode_of(system).check_faults(system)

@@ -3,12 +3,12 @@
 import numpy as np
 
 from gne_mj.margins import is_affine
-from gne_mj.plants.agent_type import energy_balance, is_passive
+from gne_mj.plants.agent_type import by_type, energy_balance, is_passive
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
 from gne_mj.theory.convexity import convex_constraints, own_convexity, strictly_convex_barrier
-from gne_mj.theory.gain import Gain, types
+from gne_mj.theory.gain import Gain
 
 
 def costs(system: System, slopes: Slopes) -> Assumption:
@@ -69,7 +69,7 @@ def pseudo_gradient(system: System, slopes: Slopes, strong: bool) -> Assumption:
 def plants(system: System) -> Assumption:
     """[asmp:nonlinearPlant]: equilibrium-independent passive agents."""
     label = "asmp:nonlinearPlant"
-    kinds = types(system.agents)
+    kinds = by_type(system.agents.kind, system.agents.parameters)
     names = ", ".join(f"{kind.NAME}s" for kind, _ in kinds)
     if all(is_passive(kind, rows) for kind, rows in kinds):
         return Assumption(label, MET, f"{names} with these parameters are passive")
@@ -101,7 +101,10 @@ def output_to_state(gain: Gain) -> Assumption:
 def smooth(system: System) -> Assumption:
     """[asmp:C2]: f and F twice, V three times continuously differentiable."""
     game = system.game
-    known = all(energy_balance(*each) is not None for each in types(system.agents))
+    known = all(
+        energy_balance(*each) is not None
+        for each in by_type(system.agents.kind, system.agents.parameters)
+    )
     if known and (game.affine or (game.smooth and game.tested)):
         return Assumption("asmp:C2", MET, "agents and game are smooth")
     return Assumption("asmp:C2", ASSUMED, "smoothness is the author's duty")

@@ -68,27 +68,7 @@ def search_epsilon(
         trials.append((epsilon, stayed))
         return stayed
 
-    note = None
-    factor = 2.0 if stays(law.epsilon) else 0.5
-    good = bad = epsilon = law.epsilon
-    while True:
-        following = factor * epsilon
-        too_long = factor > 1.0 and following > MOST * clock.duration
-        if following < LEAST * law.epsilon or too_long:
-            note = f"{following:.4g} s was not tried"
-            break
-        try:
-            stayed = stays(following)
-        except InvalidInput as error:  # a step too long for a smaller epsilon
-            note = f"{following:.4g} s cannot be tried: {error.expected}"
-            break
-        epsilon *= factor
-        if stayed:
-            good = epsilon
-        else:
-            bad = epsilon
-        if stayed != (factor > 1.0):
-            break
+    good, bad, note = _bracket(stays, law.epsilon, MOST * clock.duration)
     while note is None and bad / good > PRECISION:
         middle = float(np.sqrt(good * bad))
         if stays(middle):
@@ -101,3 +81,29 @@ def search_epsilon(
         default=None,
     )
     return EpsilonSearch(inside, outside, tuple(trials), note)
+
+
+def _bracket(
+    stays: Callable[[float], bool], epsilon: float, most: float
+) -> tuple[float, float, str | None]:
+    """(good, bad, note): one that stays inside and one that does not, twice or half of it.
+
+    The note says what ended the search before there was such a pair.
+    """
+    first, good, bad = epsilon, epsilon, epsilon
+    growing = stays(epsilon)
+    while True:
+        following = (2.0 if growing else 0.5) * epsilon
+        if following < LEAST * first or (growing and following > most):
+            return good, bad, f"{following:.4g} s was not tried"
+        try:
+            stayed = stays(following)
+        except InvalidInput as error:  # a step too long for a smaller epsilon
+            return good, bad, f"{following:.4g} s cannot be tried: {error.expected}"
+        epsilon = following
+        if stayed:
+            good = epsilon
+        else:
+            bad = epsilon
+        if stayed != growing:
+            return good, bad, None

@@ -8,14 +8,12 @@ definite, and alpha is that matrix's least eigenvalue. The theorem's reduced sys
 """
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from gne_mj.plants import mixed
-from gne_mj.plants.agent_type import energy_balance
+from gne_mj.plants.agent_type import by_type, energy_balance
 from gne_mj.plants.agents import Agents
 
 Array = NDArray[np.float64]
@@ -56,7 +54,7 @@ def required_gain(agents: Agents, mu: float | None, gain: float) -> Gain:
         gain: the k in use.
     """
     balances, fails, unknown, beta = [], [], [], 0.0
-    for kind, parameters in types(agents):
+    for kind, parameters in by_type(agents.kind, agents.parameters):
         balance = energy_balance(kind, parameters)
         if balance is None:
             unknown.append(kind.NAME)
@@ -94,13 +92,6 @@ def required_gain(agents: Agents, mu: float | None, gain: float) -> Gain:
 def k_mu_suffices(gain: float, mu: float, beta: float) -> bool:
     """Whether the assumption holds with a beta below k mu."""
     return gain * mu > beta
-
-
-def types(agents: Agents) -> list[tuple[ModuleType, Array]]:
-    """The agent types of a fleet, each with the parameters of its channels."""
-    if agents.kind is mixed:
-        return mixed.by_type(agents.parameters)
-    return [(agents.kind, agents.parameters)]
 
 
 def least_beta(dissipation: Array, output: int) -> Array:

@@ -8,7 +8,8 @@ import numpy as np
 from gne_mj.bounds import MOST_EXAMINED, check_count
 from gne_mj.errors import part_of
 from gne_mj.game import Box
-from gne_mj.system import Clock, System
+from gne_mj.graph import Graph
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
 from gne_mj.theory.constants import SAMPLED, told
@@ -65,21 +66,11 @@ def certify(system: System, clock: Clock) -> Guarantees:
     """
     check_count("agents.count", system.game.actions, MOST_EXAMINED, "the actions of all")
     theorem = Theorem(system)
-    held = Held(system, clock) if system.mode == "implicit" else None
-    law, game, pieces = system.law, system.game, forecast(system, clock)
+    held = Held(system, clock) if mode_of(system).promises else None
+    law, pieces = system.law, forecast(system, clock)
     known = system.known_equilibrium
     return Guarantees(
-        system={
-            "name": system.name,
-            "game": game.name,
-            "agents": game.agents,
-            "agent_type": system.agents.kind.NAME,
-            "information": law.information,
-            "mode": system.mode,
-            "integrator": system.integrator,
-            "engine": system.engine,
-            "limited_inputs": limited(system),
-        },
+        system=_system(system),
         status=HELD if held is not None and held.promised else theorem.status,
         theorem={
             "name": theorem.name,
@@ -88,13 +79,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "continuous": theorem.continuous,
         },
         constants=_constants(theorem),
-        graph=None
-        if law.graph is None
-        else {
-            "edges": len(law.graph.edges),
-            "lambda_2": law.graph.algebraic_connectivity,
-            "lambda_max": law.graph.largest_eigenvalue,
-        },
+        graph=None if law.graph is None else _graph(law.graph),
         coupling=_coupling(theorem),
         gain=None if theorem.gain is None else asdict(theorem.gain),
         epsilon=None
@@ -109,7 +94,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         periods={
             "push": _at_both(system, push_period),
             "linear": _at_both(system, linear_period),
-            "control_period": None if system.mode == "continuous" else clock.control_period,
+            "control_period": clock.control_period if mode_of(system).held else None,
             "timestep": clock.timestep,
             "largest_timestep_for_estimates": largest_step(system),
         },
@@ -122,6 +107,28 @@ def certify(system: System, clock: Clock) -> Guarantees:
         measured=verdict.measured(theorem, pieces),
         not_certified=verdict.not_certified(theorem, held, pieces),
     )
+
+
+def _system(system: System) -> dict[str, Any]:
+    return {
+        "name": system.name,
+        "game": system.game.name,
+        "agents": system.game.agents,
+        "agent_type": system.agents.kind.NAME,
+        "information": system.law.information,
+        "mode": system.mode,
+        "integrator": system.integrator,
+        "engine": system.engine,
+        "limited_inputs": limited(system),
+    }
+
+
+def _graph(graph: Graph) -> dict[str, Any]:
+    return {
+        "edges": len(graph.edges),
+        "lambda_2": graph.algebraic_connectivity,
+        "lambda_max": graph.largest_eigenvalue,
+    }
 
 
 def _constants(theorem: Theorem) -> dict[str, Any]:

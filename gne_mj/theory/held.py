@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.margins import Disturbance, Influence, influence, largest_push
-from gne_mj.plants.mjcf_robot import MjcfRobots
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import Clock, System
 from gne_mj.system.first_input import first_input, law_at_start
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
@@ -26,7 +26,7 @@ class Held:
     """The conditions of the promise for one system on one clock.
 
     Args:
-        system: in mode implicit.
+        system: in a mode that promises, as implicit does.
         clock: its period and step.
     """
 
@@ -41,7 +41,7 @@ class Held:
 
     def _influence(self, delay: int) -> Influence | None:
         system, clock = self.system, self.clock
-        if isinstance(system.agents, MjcfRobots):
+        if not has_ode(system.agents.kind):
             return None
         steps = clock.steps(clock.control_period)
         return influence(system.agents, clock.timestep, system.integrator, steps, delay)

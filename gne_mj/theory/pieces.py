@@ -7,7 +7,7 @@ import numpy as np
 from gne_mj.loops import division
 from gne_mj.loops import monitor as watch
 from gne_mj.plain import raise_pending
-from gne_mj.system import Clock, System
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import STABLE
 from gne_mj.theory.periods import linear_period
 from gne_mj.verdicts import EXITS
@@ -36,7 +36,7 @@ def forecast(system: System, clock: Clock) -> Pieces | None:
     None of others, of MJCF robots, and where y* is not known.
     """
     known = system.known_equilibrium
-    if system.mode != "continuous" or system.integrator not in STABLE or known is None:
+    if not mode_of(system).divides(system) or known is None:
         return None
     longest = linear_period(system, known.action)
     if longest is None:

@@ -11,7 +11,7 @@ from gne_mj.epsilon import epsilon_bounds
 from gne_mj.game import Box
 from gne_mj.graph import complete
 from gne_mj.loops.feedback import LARGEST_INPUT
-from gne_mj.system import System
+from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
 from gne_mj.theory.assumption import FAILS, Assumption
@@ -156,9 +156,10 @@ class Theorem:
             found.append("the penalty changes in time, and the theorems have a constant one")
         if self.system.faults:
             found.append("the scenario has faults, and the theorems have none")
-        if self.system.mode != "implicit" and limited(self.system) and self.demand.exceeded:
+        mode = mode_of(self.system)
+        if not mode.promises and limited(self.system) and self.demand.exceeded:
             found.append(f"{self.demand.exceeded}, and the theorems have inputs without limits")
-        if self.system.mode == "continuous" and np.any(self.demand.asked >= LARGEST_INPUT):
+        if not mode.held and np.any(self.demand.asked >= LARGEST_INPUT):
             found.append(
                 f"the law at the start asks for {np.max(self.demand.asked):.3g}, and a run ends as"
                 f" diverged from {LARGEST_INPUT:g} on"
@@ -168,7 +169,7 @@ class Theorem:
     @property
     def continuous(self) -> bool:
         """Whether a run follows the law in continuous time up to the integrator's error."""
-        return self.system.mode == "continuous" and self.system.integrator != "euler"
+        return not mode_of(self.system).departure(self.system)
 
     @property
     def status(self) -> str:

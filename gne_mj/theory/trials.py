@@ -14,7 +14,7 @@ from gne_mj.faults import Fault, Push, steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import with_margin
 from gne_mj.plain import raise_pending
-from gne_mj.system import Clock, System
+from gne_mj.system import Clock, System, mode_of
 
 # How the ends of a bracket may differ, as a factor
 PRECISION = 1.02
@@ -87,7 +87,7 @@ def search_period(
     Raises:
         InvalidInput: mode continuous, which has no period.
     """
-    if system.mode == "continuous":
+    if not mode_of(system).held:
         raise InvalidInput("mode", system.mode, "it holds no input")
     trials: list[tuple[float, bool]] = []
 

@@ -1,5 +1,6 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
+from gne_mj.system import mode_of
 from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.demand import limited
 from gne_mj.theory.held import Held
@@ -27,7 +28,7 @@ def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
             f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}"
             f"{provided}",
         ]
-    if system.mode == "implicit" and held is not None and held.promised:
+    if held is not None and held.promised:
         terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
         return [
             "at every control instant every shared constraint holds, from every interior start,"
@@ -88,8 +89,7 @@ def not_certified(
         if pieces is not None and count is None and not (other and place == "start")
     ]
     if not theorem.continuous:
-        mode = theorem.system.mode
-        what = f"mode '{mode}'" if mode != "continuous" else "Euler's method"
+        what = mode_of(theorem.system).departure(theorem.system)
         found.append(f"{what}: every theorem of the paper is in continuous time, none covers this")
     if held is not None:
         found += [f"[{c.label}] {c.status}: {c.why}" for c in held.conditions if not c.granted]

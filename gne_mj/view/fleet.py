@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.plants import flexible_robot
+from gne_mj.plants.agent_type import has_ode, in_mujoco
+from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.mujoco import APPENDAGE_Q, MAIN_Q, MujocoPlant
 from gne_mj.system import Clock, System
 from gne_mj.view.mirror import Mirror
@@ -29,7 +29,7 @@ class Fleet:
         mirror: draws them below the name.
     """
 
-    def __init__(self, plant: MujocoPlant | MjcfPlant, name: str, agents: int) -> None:
+    def __init__(self, plant: FleetPlant, name: str, agents: int) -> None:
         self.plant, self.agents = plant, agents
         self.mirror = Mirror(
             plant.model,
@@ -115,9 +115,7 @@ class Fleet:
         return None
 
 
-def fleet_of(
-    system: System, clock: Clock, plant: MujocoPlant | MjcfPlant | None = None
-) -> Fleet | None:
+def fleet_of(system: System, clock: Clock, plant: FleetPlant | None = None) -> Fleet | None:
     """The fleet of a system, or None if its agents have no bodies.
 
     Args:
@@ -134,15 +132,15 @@ def fleet_of(
         return None
 
 
-def _plant(system: System, clock: Clock) -> MujocoPlant | MjcfPlant | None:
-    if isinstance(system.agents, MjcfRobots):
-        return MjcfPlant(system.agents, clock.timestep)
-    if system.agents.kind is not flexible_robot:
+def _plant(system: System, clock: Clock) -> FleetPlant | None:
+    if not in_mujoco(system.agents.kind):
         return None
     try:
-        return MujocoPlant(system.agents, clock.timestep)
-    except InvalidInput:  # an ODE's robot whose axes have different masses is no body
-        return None
+        return build_fleet(system.agents, clock.timestep)
+    except InvalidInput:
+        if has_ode(system.agents.kind):  # a robot whose axes have different masses is no body
+            return None
+        raise
 
 
 def _first_body(model: mujoco.MjModel, prefix: str) -> int:

@@ -16,7 +16,7 @@ from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, part_of
 from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
-from gne_mj.system import System
+from gne_mj.system import System, mode_of
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.controls import Control, controls_of, pushes_of
 from gne_mj.view.pacer import Pacer
@@ -216,7 +216,7 @@ class Session:
     def _step_length(self) -> int:
         """Integration steps in one step of the page: to the next control instant, or sample."""
         clock = self.simulation.clock
-        held = any(system.mode != "continuous" for system in self.simulation.systems)
+        held = any(mode_of(system).held for system in self.simulation.systems)
         return clock.steps(clock.control_period if held else clock.sample_period)
 
     def _restart(self) -> None:

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from gne_mj.faults import for_native
 from gne_mj.game import Game
 from gne_mj.loops.faults import count_messages
-from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.quantity import Quantity
-from gne_mj.system import Clock, System
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.variables import Variable, declared
 from gne_mj.view.fleet import fleet_of
 
@@ -33,9 +32,7 @@ class Stage:
         fleet: its robots; None for agents without bodies.
     """
 
-    def __init__(
-        self, system: System, clock: Clock, plant: MujocoPlant | MjcfPlant | None = None
-    ) -> None:
+    def __init__(self, system: System, clock: Clock, plant: FleetPlant | None = None) -> None:
         self.system, self.clock = system, clock
         self.fleet = fleet_of(system, clock, plant)
 
@@ -117,7 +114,7 @@ class Stage:
     def _message_period(self) -> float | None:
         """s between messages; None if they flow all the time."""
         system = self.system
-        held = system.law.graph is not None and system.mode != "continuous"
+        held = system.law.graph is not None and mode_of(system).held
         return self.clock.control_period if held else None
 
     @cached_property

@@ -55,7 +55,7 @@ class Twin:
         self.problem = Problem(
             self.game.data, self.graph.data, self.law.settings(RHO), np.full(N, np.inf),
             np.zeros(N), no_propagator(),
-            functions=link(self.law.kernels, self.game.kernels, memory=True, ahead=None),
+            functions=link(self.law.kernels, self.game.kernels, memory=True),
         )  # fmt: skip
         self.memory = self.law.initial_memory(np.full(N, START))
         flat = np.concatenate([self.start.ravel(), self.memory])
@@ -113,14 +113,43 @@ class Twin:
         return np.ascontiguousarray(matrix[np.ix_(self.kept, self.kept)])
 
     def _compile(self) -> None:
-        states, size, gain, epsilon = self.states, N * self.states, self.gain, self.epsilon
-        q, laplacian = self.game.parameters, np.array(self.graph.laplacian)
-        a, b, c, n0 = (q[2 + N * k : 2 + N * (k + 1)].copy() for k in range(4))
-        crosstalk, limit = q[2 + 4 * N :].reshape(N, N) + np.diag(c), q[1]
-        linear, others = self.linear, ~np.eye(N, dtype=bool)
-        cascade = self.kind is pi_cascade
-        off = np.array([[size + i * (N - 1) + j - (j > i) for j in range(N)] for i in range(N)])
-        at_z = size + N * (N - 1)
+        numbers = Numbers(self)
+        rate, jacobian, with_numpy = numbers.rate(), numbers.jacobian(), numbers.with_numpy()
+        self.rate, self.jacobian, self.with_numpy = rate, jacobian, with_numpy
+        nudged = self.first * (1.0 + 1e-3 * np.sin(np.arange(len(self.first))))
+        if not np.allclose(rate(0.0, nudged), with_numpy(0.0, nudged), rtol=1e-10, atol=1e-10):
+            raise ArithmeticError("the compiled and the NumPy rate differ")
+        step = 1e-6 * np.eye(len(nudged))  # a peer with a wrong Jacobian would be slow
+        slopes = [(rate(0.0, nudged + e) - rate(0.0, nudged - e)) / 2e-6 for e in step]
+        if not np.allclose(jacobian(0.0, nudged), np.transpose(slopes), rtol=1e-5, atol=1e-4):
+            raise ArithmeticError("the Jacobian is not the rate's")
+
+
+class Numbers:
+    """The numbers of a case, and SciPy's functions (time, states) of them.
+
+    States are the agents', then the estimates, row by row without the agents' own, then z.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self.states, self.gain, self.epsilon = twin.states, twin.gain, twin.epsilon
+        q = twin.game.parameters
+        self.limit = q[1]
+        self.a, self.b, self.c, self.n0 = (q[2 + N * k : 2 + N * (k + 1)].copy() for k in range(4))
+        self.crosstalk = q[2 + 4 * N :].reshape(N, N) + np.diag(self.c)
+        self.laplacian, self.linear = np.array(twin.graph.laplacian), twin.linear
+        self.cascade = twin.kind is pi_cascade
+        size = N * self.states
+        self.at_z = size + N * (N - 1)
+        self.off = np.array(
+            [[size + i * (N - 1) + j - (j > i) for j in range(N)] for i in range(N)]
+        )
+
+    def rate(self) -> Any:
+        """The rate, compiled."""
+        states, gain, epsilon, cascade = self.states, self.gain, self.epsilon, self.cascade
+        a, b, c, n0, crosstalk, limit = self.a, self.b, self.c, self.n0, self.crosstalk, self.limit
+        laplacian, off, at_z = self.laplacian, self.off, self.at_z
 
         @njit(error_model="numpy")
         def rate(_time, v):
@@ -152,6 +181,13 @@ class Twin:
                         out[off[i, j]] = -flow / epsilon
             return out
 
+        return rate
+
+    def jacobian(self) -> Any:
+        """Its derivatives by the states, compiled."""
+        states, gain, linear, off, at_z = self.states, self.gain, self.linear, self.off, self.at_z
+        b, c, n0, crosstalk, limit = self.b, self.c, self.n0, self.crosstalk, self.limit
+
         @njit(error_model="numpy")
         def jacobian(_time, v):
             out = linear.copy()
@@ -174,6 +210,19 @@ class Twin:
                     out[row, at_z + i] -= gain * (bound + RHO / z**2)
             return out
 
+        return jacobian
+
+    def with_numpy(self) -> Any:
+        """The rate as a script would have it."""
+        states, gain, epsilon, cascade = self.states, self.gain, self.epsilon, self.cascade
+        a, b, c, n0, crosstalk, limit = self.a, self.b, self.c, self.n0, self.crosstalk, self.limit
+        laplacian, others, size, at_z = (
+            self.laplacian,
+            ~np.eye(N, dtype=bool),
+            N * states,
+            self.at_z,
+        )
+
         def with_numpy(_time, v):
             x, z = v[:size].reshape(N, states), v[at_z:]
             y, e = x[:, 0], np.empty((N, N))
@@ -192,14 +241,7 @@ class Twin:
             out[at_z:] = (y - z) / epsilon
             return out
 
-        self.rate, self.jacobian, self.with_numpy = rate, jacobian, with_numpy
-        nudged = self.first * (1.0 + 1e-3 * np.sin(np.arange(len(self.first))))
-        if not np.allclose(rate(0.0, nudged), with_numpy(0.0, nudged), rtol=1e-10, atol=1e-10):
-            raise ArithmeticError("the compiled and the NumPy rate differ")
-        step = 1e-6 * np.eye(len(nudged))  # a peer with a wrong Jacobian would be slow
-        slopes = [(rate(0.0, nudged + e) - rate(0.0, nudged - e)) / 2e-6 for e in step]
-        if not np.allclose(jacobian(0.0, nudged), np.transpose(slopes), rtol=1e-5, atol=1e-4):
-            raise ArithmeticError("the Jacobian is not the rate's")
+        return with_numpy
 
 
 def loosest(

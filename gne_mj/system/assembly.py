@@ -1,0 +1,180 @@
+"""What is built of a system: its native loop, and all that the loop is given."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.controllers.propagation import no_propagator
+from gne_mj.controllers.settings import LINKS
+from gne_mj.errors import InvalidInput, named
+from gne_mj.faults import for_native, sensor_delay, strikes_messages
+from gne_mj.loops import functions
+from gne_mj.loops.base import ClosedLoop
+from gne_mj.loops.division import sizes_at
+from gne_mj.loops.feedback import Order, Problem, Sizes
+from gne_mj.loops.layout import Clock as LoopClock
+from gne_mj.loops.layout import Setup
+from gne_mj.loops.link import link, penalty
+from gne_mj.loops.ode import OdeLoop
+from gne_mj.plants.functions import METHODS
+from gne_mj.system import checks, steps
+from gne_mj.system.clock import Clock
+from gne_mj.system.data import SystemData
+from gne_mj.system.modes import mode_of
+
+if TYPE_CHECKING:
+    from gne_mj.plants.fleet_plant import FleetPlant
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly(SystemData):
+    """A system's data, and how its loop is built of them."""
+
+    @property
+    def equation(self) -> ModuleType | None:
+        """The module that says who solves together, where inputs are solved for."""
+        return mode_of(self).equation(self)
+
+    @cached_property
+    def rows(self) -> Order:
+        """Rows of the matrices of what is solved."""
+        return mode_of(self).rows(self)
+
+    def closed_loop(self, clock: Clock, plant: "FleetPlant | None" = None) -> ClosedLoop:
+        """The native loop, at its start.
+
+        Args:
+            clock: how to step.
+            plant: engine "mujoco": a fleet of the same robots with the same room, such as an
+                earlier loop's, to use once more in place of a new one. Its step becomes the
+                clock's.
+
+        Raises:
+            InvalidInput: a step that the estimates' dynamics do not allow, or a control period
+                over which an agent's output does not rise with its input, mode implicit.
+        """
+        loop = self._closed_loop(clock, plant)
+        loop.keeps = self
+        return loop
+
+    def _closed_loop(self, clock: Clock, plant: "FleetPlant | None") -> ClosedLoop:
+        setup = self.setup(clock)
+        memory = self.loop_memory
+        if self.engine == "mujoco":
+            # Late: MuJoCo is slow to import, and the twins do not need it.
+            from gne_mj.loops.mujoco import MujocoLoop
+            from gne_mj.plants.fleet import MANY
+
+            if plant is None:
+                plant = self.mujoco_plant(clock, decorated=self.agents.count <= MANY)
+                mode_of(self).try_plant(self, plant, clock)
+            else:
+                plant.model.opt.timestep = plant.timestep = clock.timestep
+                plant.reset(self.state)
+            return MujocoLoop(plant, setup, memory, self.fault_kernels)
+        if self.integrator == "rosenbrock" and self.law.graph is not None:
+            from gne_mj.loops.rosenbrock import RosenbrockLoop
+
+            return RosenbrockLoop(self.agents, setup, self.law.graph, self.state, self.memory)
+        return OdeLoop(self.agents, setup, self.state, memory, self.fault_kernels)
+
+    @property
+    def _others(self) -> dict[int, Any]:
+        of_mode = mode_of(self).ahead(self)
+        if self.schedule is None:
+            return dict(of_mode)
+        return {**of_mode, functions.PENALTY: penalty(self.schedule.fall)}
+
+    @property
+    def functions(self) -> NDArray[np.int64]:
+        """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
+        return link(
+            self.law.kernels, self.game.kernels,
+            memory=bool(len(self.loop_memory)), others=self._others,
+        )  # fmt: skip
+
+    def setup(self, clock: Clock) -> Setup:
+        """What a loop of this system is made of, besides its plant, its start and its kernels.
+
+        Raises:
+            InvalidInput: see :meth:`closed_loop`; and a law's graph or propagator that does not
+                fit the game.
+        """
+        steps.check_step(self, clock)
+        mode = mode_of(self)
+        mode.check_period(self, clock)
+        settings = self.law.settings(self.rho)
+        if strikes_messages(self.faults):
+            settings[LINKS] = len(self.memory)
+        with named(period="clock.control_period"):
+            propagator = self.law.propagator(clock.control_period) if mode.held else no_propagator()
+        problem = Problem(
+            data=self.game.data,
+            graph=self.law.graph_data,
+            settings=settings,
+            limit=self.agents.input_limit,
+            equilibrium=self.centre,
+            size=self.typical_sizes,
+            propagator=propagator,
+            schedule=np.zeros(3) if self.schedule is None else self.schedule.numbers,
+            order=self.rows,
+            functions=self.functions,
+            faults=for_native(self.faults, self.game, self.law.graph, self.seed),
+        )
+        checks.check_lists(self, problem)
+        return Setup(
+            problem,
+            self.agents.equilibrium(self.centre),
+            LoopClock(
+                clock.timestep,
+                clock.steps(clock.control_period),
+                mode.native,
+                METHODS.get(self.integrator, -1),  # the Rosenbrock loop has no use for it
+            ),
+            *self._sizes,
+        )
+
+    @property
+    def typical_sizes(self) -> NDArray[np.float64]:
+        """Of outputs and slacks (1 + p,), at the equilibrium."""
+        return sizes_at(self.centre, -self.game.constraints(self.centre) - self.game.margins)
+
+    @property
+    def _sizes(self) -> Sizes:
+        m, late = self.game.actions, sensor_delay(self.faults)
+        return Sizes(
+            history=(late + 1) * m * (self.agents.states + 1) if late else 0,
+            solver=mode_of(self).solver_length(self, self.rows),
+        )
+
+    def mujoco_plant(self, clock: Clock, *, decorated: bool = True) -> "FleetPlant":
+        """The fleet, reset to the start, with room for this system's loop.
+
+        Args:
+            clock: how to step.
+            decorated: keep what is for the eye only; MJCF robots keep all in any case.
+        """
+        from gne_mj.loops.mujoco import room
+        from gne_mj.plants.fleet_plant import build_fleet
+
+        mode = mode_of(self)
+        userdata, memory = room(
+            self.game, self.agents, len(self.loop_memory), mode.native, self._sizes
+        )
+        plant = build_fleet(
+            self.agents, clock.timestep, self.integrator, userdata=userdata, memory=memory,
+            decorated=decorated,
+        )  # fmt: skip
+        plant.reset(self.state)
+        if mode.measures_stages(self) and not plant.measures_every_stage:
+            raise InvalidInput(
+                "agents.output",
+                plant.outputs,
+                "a tendon's or actuator's sensor is read once a step: use mode 'sampled', or"
+                " integrator 'euler', or name a joint",
+            )
+        return plant

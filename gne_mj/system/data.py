@@ -1,0 +1,102 @@
+"""What a system is: one game with its agents, law, engine and start, as data."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.barrier import LogBarrier, Schedule
+from gne_mj.controllers import Law
+from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
+from gne_mj.errors import SolverError
+from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
+from gne_mj.game import Game
+from gne_mj.loops import faultless
+from gne_mj.loops import faults as native_faults
+from gne_mj.margins import Disturbance
+from gne_mj.plants.agents import Agents
+
+
+@dataclass(frozen=True, eq=False)
+class SystemData:
+    """A game that agents play under a law; :class:`gne_mj.system.System` says what each part is."""
+
+    name: str
+    game: Game
+    agents: Agents
+    law: Law
+    rho: float
+    state: NDArray[np.float64]
+    mode: str = "continuous"
+    engine: str = "ode"
+    integrator: str = "rk4"
+    memory: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    schedule: Schedule | None = None
+    decentralised: bool = False
+    faults: tuple[Fault, ...] = ()
+    seed: int = 0
+    disturbance: Disturbance | None = None
+    barrier: LogBarrier = field(init=False)
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """y(0), shape (m,)."""
+        return self.state[:, self.agents.kind.OUTPUT]
+
+    @property
+    def equilibrium(self) -> Equilibrium:
+        """The penalised equilibrium, from y(0); where that is too near a bound, from the middle.
+
+        Raises:
+            SolverError: none was found.
+        """
+        if isinstance(self._solved, SolverError):
+            raise self._solved
+        return self._solved
+
+    @property
+    def known_equilibrium(self) -> Equilibrium | None:
+        """The same; None where none was found, and a run is still possible."""
+        return None if isinstance(self._solved, SolverError) else self._solved
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """A profile strictly inside, about which V is taken: y*, or y(0) if y* is not known."""
+        known = self.known_equilibrium
+        return self.start if known is None else known.action
+
+    @cached_property
+    def _solved(self) -> Equilibrium | SolverError:
+        try:
+            return penalised_equilibrium(self.game, self.rho, self.start)
+        except SolverError:
+            try:
+                return penalised_equilibrium(self.game, self.rho, middle(self.game, self.start))
+            except SolverError as error:
+                return error
+
+    @property
+    def fault_kernels(self) -> ModuleType:
+        """The module of what goes wrong in this system's loops."""
+        return native_faults if self.faults else faultless
+
+    @property
+    def recorded(self) -> int:
+        """Numbers that are kept of one sample."""
+        return self.agents.channels * (self.agents.states + 3) + len(self.loop_memory)
+
+    @property
+    def loop_memory(self) -> NDArray[np.float64]:
+        """What a loop's memory begins with, see :meth:`with_links`."""
+        return self.with_links(self.memory)
+
+    def with_links(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A law's memory, and where messages can fail behind it what was heard over each link."""
+        if not strikes_messages(self.faults):
+            return memory
+        assert self.law.graph is not None
+        m = self.game.actions
+        heard = links_memory(self.law.graph, m, memory, message_delay(self.faults))
+        return np.concatenate([memory, heard])

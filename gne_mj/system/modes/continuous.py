@@ -1,0 +1,62 @@
+"""Mode ``continuous``: the law is evaluated at every stage of the integrator.
+
+With fixed steps these are divided near the boundary (:mod:`gne_mj.loops.division`), which the
+report tells. The theorems speak of this mode, up to the integrator's error.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from gne_mj.loops import monitor as watch
+from gne_mj.loops.ode import CONTINUOUS
+from gne_mj.system.data import SystemData
+from gne_mj.system.modes.mode import Array, Figure, Mode, entry
+
+
+def _smallest(monitors: Array) -> Array:
+    shortest = monitors[:, watch.SMALLEST_STEP]
+    return np.where(shortest > 0, shortest, np.nan)
+
+
+class Continuous(Mode):
+    """See the module."""
+
+    name = "continuous"
+    native = CONTINUOUS
+    held = False
+    section = "division"
+    figures = (
+        Figure(
+            "divided_steps", entry(watch.DIVIDED),
+            long_name="integration steps divided near the boundary",
+        ),
+        Figure("smallest_step", _smallest, "s", "shortest piece of a divided step"),
+    )  # fmt: skip
+
+    def measures_stages(self, system: SystemData) -> bool:
+        """Of methods that have some."""
+        return system.integrator != "euler"
+
+    def departure(self, system: SystemData) -> str:
+        """Euler's method keeps an input for a step."""
+        return "Euler's method" if system.integrator == "euler" else ""
+
+    def explicit_period(self, control_period: float, timestep: float) -> float | None:
+        """A step."""
+        return timestep
+
+    def divides(self, system: SystemData) -> bool:
+        """With fixed steps."""
+        return system.integrator != "rosenbrock"
+
+    def reports(self, system: SystemData) -> bool:
+        """With fixed steps."""
+        return self.divides(system)
+
+    def report(self, system: SystemData, monitor: Array) -> dict[str, Any]:
+        """How many steps were divided, and the shortest piece in s, None if none was."""
+        return {
+            "divided_steps": int(monitor[watch.DIVIDED]),
+            "smallest_step": float(monitor[watch.SMALLEST_STEP]) or None,
+        }

@@ -1,0 +1,96 @@
+"""How long, deep and wide functions may be, in the whole repository."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("gne_mj", "controllers", "models", "examples", "scripts", "tests")
+# Lines of a function; blocks within each other; parameters of a kernel
+MOST_LINES, MOST_DEEP, MOST_PARAMETERS = 60, 4, 8
+BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.If, ast.With, ast.AsyncWith, ast.Try, ast.TryStar,
+          ast.Match)  # fmt: skip
+
+# Files that are being rewritten: to be emptied.
+NOT_YET = {
+    "controllers/estimates.py",
+    "controllers/propagation.py",
+    "gne_mj/banded.py",
+    "gne_mj/game.py",
+    "gne_mj/game_functions.py",
+    "gne_mj/games/osnr.py",
+    "gne_mj/games/velocity_consensus.py",
+    "gne_mj/games/velocity_synchronization.py",
+    "gne_mj/interior_point.py",
+    "gne_mj/loops/faultless.py",
+    "gne_mj/loops/faults.py",
+    "gne_mj/loops/implicit.py",
+    "gne_mj/loops/mujoco.py",
+    "gne_mj/loops/newton.py",
+    "gne_mj/loops/ode.py",
+    "gne_mj/loops/recorder.py",
+    "gne_mj/loops/rosenbrock.py",
+    "gne_mj/loops/stage_system.py",
+    "gne_mj/scales.py",
+}
+
+
+def depth(node, around=0):
+    """Blocks within each other; `elif` is no deeper than its `if`."""
+    deepest = around
+    for child in ast.iter_child_nodes(node):
+        chained = isinstance(node, ast.If) and node.orelse == [child]
+        inner = around + isinstance(child, BLOCKS)
+        if chained and isinstance(child, ast.If):
+            inner = around
+        deepest = max(deepest, depth(child, inner))
+    return deepest
+
+
+def complaints(source):
+    """What is too large in a file, each as a line."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        decorators = {ast.unparse(each).partition("(")[0] for each in node.decorator_list}
+        given = node.args
+        parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
+        for what, found, most in (
+            ("lines", node.end_lineno - node.lineno + 1, MOST_LINES),
+            ("blocks deep", depth(node), MOST_DEEP),
+            ("parameters of a kernel", parameters * ("kernel" in decorators), MOST_PARAMETERS),
+        ):
+            if found > most:
+                yield f"{node.name}: {found} {what}, more than {most}"
+
+
+def test_functions_are_short_shallow_and_narrow():
+    found, clean = [], []
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            name = path.relative_to(ROOT).as_posix()
+            told = list(complaints(path.read_text(encoding="utf-8")))
+            if name not in NOT_YET:
+                found += [f"{name}: {each}" for each in told]
+            elif not told:
+                clean.append(name)
+    assert not found, "\n".join(found)
+    assert not clean, f"these may leave NOT_YET: {clean}"
+
+
+def nested(blocks):
+    lines = [f"{4 * k * ' '}if {k}:" for k in range(1, blocks + 1)]
+    return "\n".join(["def f():", *lines, 4 * (blocks + 1) * " " + "x"])
+
+
+def test_what_is_too_large_is_seen():
+    wide = "@kernel\ndef f(a, b, c, d, e, f, g, h, i): pass"
+    for source, told in (
+        ("def f():\n" + 60 * " x\n", "61 lines"),
+        (nested(5), "5 blocks deep"),
+        (wide, "9 parameters"),
+    ):
+        assert [told in each for each in complaints(source)] == [True]
+    chain = "def f():\n if a: x\n" + 6 * " elif b: x\n"
+    for source in ("def f():\n" + 59 * " x\n", nested(4), wide.replace(", i", ""), chain,
+                   wide.replace("@kernel\n", "")):  # fmt: skip
+        assert not list(complaints(source))
