@@ -16,6 +16,7 @@ import sys
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
@@ -38,7 +39,7 @@ POSITIONS = (0, 3)  # moved by the new velocities in an Euler step
 INPUT_UNIT = "N"
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Whether every robot meets Assumption [asmp:nonlinearPlant]; parameters (m, 5).
 
     psi is strongly monotone, since its slope lies between stiffness and stiffness +
@@ -50,7 +51,7 @@ def is_passive(parameters):
     )
 
 
-def energy_balance(parameters):
+def energy_balance(parameters: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """As :func:`gne_mj.plants.integrator.energy_balance`, over extension and both velocities.
 
     Only the damper dissipates, gamma (x2 - x3)^2: nothing in the extension.
