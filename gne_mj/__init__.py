@@ -40,7 +40,7 @@ __all__ = [
 
 
 def _show_in_notebooks() -> None:
-    """Where IPython runs, a trajectory is shown with its replay (see gne_mj.view.notebook)."""
+    """Where IPython runs, a trajectory is shown with its replay (see gne_mj.notebook)."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if shell is not None:
         html = shell.display_formatter.formatters["text/html"]
@@ -48,7 +48,7 @@ def _show_in_notebooks() -> None:
 
 
 def _notebook_html(trajectory: "Trajectory") -> str:
-    from gne_mj.view.notebook import notebook_html
+    from gne_mj.notebook import notebook_html
 
     return notebook_html(trajectory)
 

@@ -331,8 +331,9 @@ class Solver:
     def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
         raise_pending()
         if ended == method.OUTSIDE:
-            module, q = self._game.written  # as Python can call it
-            g = np.array([module.constraint(q, k, y) for k in range(len(self._point.slack))])
+            own = self._game.written  # as Python can call it
+            constraint, q = own.functions["constraint"], own.parameters
+            g = np.array([constraint(q, k, y) for k in range(len(self._point.slack))])
             g += self._data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(

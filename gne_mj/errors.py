@@ -177,6 +177,10 @@ class PluginError(GneError, RuntimeError):
     """Another package's plug-in cannot be loaded; the cause is chained."""
 
 
+class MissingExtra(GneError, ImportError):
+    """A part of the package is asked for whose extra is not installed."""
+
+
 class SolverError(GneError, RuntimeError):
     """An iteration ended without reaching its tolerance; the numbers are attributes."""
 

@@ -33,7 +33,7 @@ from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game_fields import check_kinds, checked_bounds
 from gne_mj.native import compiled, source_key
-from gne_mj.plain import check_numbers, is_plain, plain_kernels, raise_pending
+from gne_mj.plain import Written, as_written, check_numbers, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
 # Lower and upper bounds of the entries of an array
@@ -108,7 +108,7 @@ class Game:
             declare is "assumed" in certificates, where it is "met" of tested ones.
 
     Attributes:
-        written: kernels and parameters as they were given, before plain functions got addresses.
+        written: the functions as they were given, before plain ones got addresses.
 
     Raises:
         InvalidInput: what does not fit together, before native code would read beyond an array.
@@ -137,7 +137,7 @@ class Game:
     constraint_class: ConstraintClass | None = None
     smooth: bool = False
     tested: bool = False
-    written: tuple[ModuleType, NDArray[np.float64]] = field(init=False, repr=False)
+    written: Written = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_kinds(self)
@@ -146,15 +146,13 @@ class Game:
         if self.jacobian_bounds is not None and not self.tested:
             checked = checked_bounds(self.jacobian_bounds, sum(self.sizes))
             object.__setattr__(self, "jacobian_bounds", checked)
-        object.__setattr__(self, "written", (self.kernels, self.parameters))
-        if is_plain(self.kernels):
+        object.__setattr__(self, "written", as_written(self.kernels, self.parameters))
+        if not self.native:
             own = [
                 [k for k, members in enumerate(self.in_constraint) if i in members]
                 for i in self.agent_of_action.tolist()
             ]
-            kernels, addresses, kept = plain_kernels(
-                self.kernels, np.asarray(self.parameters, dtype=np.float64), own
-            )
+            kernels, addresses, kept = plain_kernels(self.written, own)
             object.__setattr__(self, "kernels", kernels)
             object.__setattr__(self, "parameters", addresses)
             object.__setattr__(self, "_kept", kept)
@@ -219,6 +217,26 @@ class Game:
                 f"it goes with gap_bounds, where {p} bounds on gaps of one entry are {2 * p} affine"
                 " constraints",
             )
+
+    @property
+    def native(self) -> bool:
+        """Whether its functions are kernels, not plain Python ones."""
+        return self.written.native
+
+    @property
+    def has_cost_hessian(self) -> bool:
+        """Whether its author gave costs' second derivatives, or differences stand for them."""
+        return "add_cost_hessian" in self.written.functions
+
+    @property
+    def has_constraint_hessian(self) -> bool:
+        """Whether its author gave the constraints' second derivatives."""
+        return "constraint_hessian" in self.written.functions
+
+    @property
+    def convexity(self) -> str | None:
+        """Why its constraints are convex, as its author says; None says nothing."""
+        return "bounds on gaps" if self.gap_bounds is not None else self.constraint_class
 
     def tightened(self, tightening: ArrayLike) -> Self:
         """The same game with a barrier of g + t < 0; t >= 0, one number or (p,)."""
@@ -358,7 +376,7 @@ class Game:
             InvalidInput: one of a tested game does, for which its parameters are too large.
         """
         try:
-            check_numbers(*self.written, self.data, self._profile(y).copy())
+            check_numbers(self.written, self.data, self._profile(y).copy())
         except UserCodeError as error:
             if not self.tested:
                 raise

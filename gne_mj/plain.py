@@ -15,7 +15,8 @@ plain function only reads are handed to it read-only, and are valid during the c
 import ctypes
 import inspect
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -52,6 +53,23 @@ _SIGNATURE = ctypes.CFUNCTYPE(
 )
 _VIEWS = 1000  # arrays whose views are kept for the next call
 _pending: list[tuple[Callable[..., Any], BaseException, str]] = []
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A game's functions as its author wrote them.
+
+    Attributes:
+        module: that defines them.
+        parameters: q, which each of them takes first.
+        native: whether they are kernels.
+        functions: those of FUNCTIONS that there are.
+    """
+
+    module: ModuleType
+    parameters: Array
+    native: bool
+    functions: Mapping[str, Callable[..., Any]]
 
 
 def raise_pending() -> None:
@@ -97,12 +115,11 @@ def not_a_number(function: Callable[..., Any], call: Callable[[], Any], at: str)
     return UserCodeError(function, "what it returns is not a number", at)
 
 
-def check_numbers(module: ModuleType, q: Array, data: Any, y: Array) -> None:
+def check_numbers(game: Written, data: Any, y: Array) -> None:
     """Call a game's functions at a profile, each as it was written.
 
     Args:
-        module: with the functions.
-        q: the game's own numbers.
+        game: whose functions.
         data: its :class:`gne_mj.game.GameData`.
         y: (m,), a copy.
 
@@ -111,21 +128,21 @@ def check_numbers(module: ModuleType, q: Array, data: Any, y: Array) -> None:
     """
     at, row = data.offsets.tolist(), np.zeros(len(y))
     for k in range(len(data.member_pointer) - 1):
-        _check(module, "constraint", q, k, y)
+        _check(game, "constraint", k, y)
         for i in data.member_index[data.member_pointer[k] : data.member_pointer[k + 1]].tolist():
             for a in range(at[i], at[i + 1]):
-                _check(module, "constraint_gradient", q, k, a, y)
+                _check(game, "constraint_gradient", k, a, y)
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
-            _check(module, "cost_gradient", q, i, a, y)
-            if hasattr(module, "add_cost_hessian"):
+            _check(game, "cost_gradient", i, a, y)
+            if "add_cost_hessian" in game.functions:
                 row[:] = 0.0
-                _check(module, "add_cost_hessian", q, i, a, y, 1.0, row)
-        _check(module, "cost", q, i, y)
+                _check(game, "add_cost_hessian", i, a, y, 1.0, row)
+        _check(game, "cost", i, y)
 
 
-def _check(module: ModuleType, name: str, q: Array, number: int, *rest: Any) -> None:
-    function = getattr(module, name)
+def _check(game: Written, name: str, number: int, *rest: Any) -> None:
+    function, q = game.functions[name], game.parameters
     at = place_of(name)(number, next(each for each in rest if isinstance(each, np.ndarray)))
     try:
         with np.errstate(all="ignore"):
@@ -209,8 +226,8 @@ def call_out(
     return real(whole, whole, whole, whole, real, x, y, z), codegen
 
 
-def is_plain(module: ModuleType) -> bool:
-    """Whether a game's functions are plain Python ones.
+def as_written(module: ModuleType, parameters: Array) -> Written:
+    """The functions of a game's module.
 
     Raises:
         InvalidInput: some are kernels and some are not, one is missing or takes other arguments.
@@ -231,7 +248,7 @@ def is_plain(module: ModuleType) -> bool:
                 " with @kernel, or none",
             )
         check_arguments("kernels", file, found[name], name, arguments)
-    return not natives
+    return Written(module, np.asarray(parameters, dtype=np.float64), bool(natives), found)
 
 
 def check_arguments(
@@ -256,21 +273,18 @@ def _call(name: str, arguments: tuple[str, ...]) -> str:
 
 
 def plain_kernels(
-    module: ModuleType, parameters: Array, own: Sequence[Sequence[int]]
+    game: Written, own: Sequence[Sequence[int]]
 ) -> tuple[ModuleType, Array, list[Any]]:
     """This module, the parameters it needs, and what must be kept alive meanwhile.
 
     Args:
-        module: with a game's functions as :mod:`gne_mj.game` describes them.
-        parameters: the game's own q.
+        game: its functions, plain ones.
         own: for each entry of a profile the constraints that contain it.
     """
-    q = parameters
-    cost, gradient = module.cost, module.cost_gradient
-    constraint, slope = module.constraint, module.constraint_gradient
-
-    second = getattr(module, "add_cost_hessian", None)
-    bend = getattr(module, "constraint_hessian", None)
+    q, given = game.parameters, game.functions
+    cost, gradient = given["cost"], given["cost_gradient"]
+    constraint, slope = given["constraint"], given["constraint_gradient"]
+    second, bend = given.get("add_cost_hessian"), given.get("constraint_hessian")
     stencils = Stencils(
         lambda k, y: _number(constraint, q, k, y), lambda k, a, y: _number(slope, q, k, a, y), own
     )

@@ -110,14 +110,12 @@ def load_agent_type(path: str | Path) -> ModuleType:
 
 
 def _check_law(law: Law, file: str) -> None:
-    if type(law).__module__.startswith("gne_mj."):
-        return
-    if law.information != "custom":
+    if law.theorem is None and law.information != Law.information:
         raise InvalidInput(
             "path",
             file,
-            f"its law has information = {law.information!r}, for which the theory makes claims; a"
-            " law of one's own has 'custom'",
+            f"its law has information = {law.information!r}, but nothing is proven of it; a law of"
+            f" one's own has {Law.information!r}",
         )
     for name, arguments in _LAW_KERNELS.items():
         function = getattr(law.kernels, name, None)

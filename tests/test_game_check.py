@@ -204,7 +204,7 @@ def replace_plain(game, **fields):
     """The same functions with other declarations."""
     kept = ("name", "sizes", "in_cost", "in_constraint", "constraint_names", "gap_bounds")
     given = {name: getattr(game, name) for name in kept}
-    return Game(kernels=game.written[0], parameters=game.written[1], **given, **fields)
+    return Game(kernels=game.written.module, parameters=game.written.parameters, **given, **fields)
 
 
 @pytest.mark.parametrize(
@@ -342,7 +342,7 @@ def test_what_is_no_number_at_the_start_is_the_users_mistake():
 def test_kernels_are_called_as_the_python_that_they_are():
     game, y = replace(cournot_game(3), tested=False), np.full(3, 20.0)
     assert examine(game, y).holds
-    shorter = replace(game, parameters=game.written[1][:-1])  # reads beyond its end
+    shorter = replace(game, parameters=game.written.parameters[:-1])  # reads beyond its end
     with pytest.raises(UserCodeError, match="IndexError"):
         examine(shorter, y)
 

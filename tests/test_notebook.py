@@ -4,9 +4,9 @@ import subprocess
 import sys
 
 import gne_mj
+from gne_mj.notebook import notebook_html
 from gne_mj.simulation import Simulation
 from gne_mj.summary import summary
-from gne_mj.view.notebook import notebook_html
 
 SHORT = {"simulation.duration": 0.5, "plant.engine": "ode"}
 

@@ -180,9 +180,9 @@ def test_numbers():
 )  # fmt: skip
 def test_fields_of_a_game_that_are_of_another_kind(field, value):
     """Each ended in a traceback, or was dropped in silence."""
-    module, parameters = own_games.quadratic(np.eye(2)).written
+    written = own_games.quadratic(np.eye(2)).written
     given = {
-        "name": "own", "kernels": module, "parameters": parameters, "sizes": (1, 1),
+        "name": "own", "kernels": written.module, "parameters": written.parameters, "sizes": (1, 1),
         "in_cost": [(0, 1)] * 2, "in_constraint": [(0,), (1,)], "constraint_names": ("a", "b"),
     }  # fmt: skip
     Game(**given)

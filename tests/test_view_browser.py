@@ -12,9 +12,9 @@ import pytest
 from browser import Recorded
 
 import gne_mj
+from gne_mj.notebook import notebook_html
 from gne_mj.scenario import load_scenario
 from gne_mj.view import Session, serve, write_html
-from gne_mj.view.notebook import notebook_html
 
 READY = "window.gne && window.gne.ready"
 CLOSE = 1e-6  # m

@@ -19,13 +19,13 @@ from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.faults import MessageLoss, Silence, for_native
 from gne_mj.games import velocity_game
 from gne_mj.loops import faults as native
+from gne_mj.notebook import notebook_html
 from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
 from gne_mj.view import html_page, replay_pack, write_html
 from gne_mj.view.html import page_file
-from gne_mj.view.notebook import notebook_html
 from gne_mj.view.pack import MAGIC, pack, packed_small, unpack
 from gne_mj.view.stage import Stage, shares
 

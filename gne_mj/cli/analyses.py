@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,6 +16,7 @@ from gne_mj.cli.signals import stopping
 if TYPE_CHECKING:
     from gne_mj.exit_map import Cell
     from gne_mj.scenario import Scenario
+    from gne_mj.solve import Solution
     from gne_mj.system import Clock, System
     from gne_mj.theory.guarantees import Guarantees
 
@@ -44,8 +46,11 @@ def solve(
     --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
     """
     from gne_mj import solve as solving
+    from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
 
+    if path is not None and out is not None:
+        need("plots", "the figure of a path")
     path_rhos = [] if path is None else meaning("path", solving.parse_path, path)
     results = Results(out)
     with working(as_json, PREPARING):
@@ -65,11 +70,7 @@ def solve(
         if folder is not None:
             (folder / "report.json").write_text(report + "\n", encoding="utf-8")
             if path is not None:
-                from gne_mj import plots
-
-                for each in solutions:
-                    solving.write_path(each, folder / f"{each.name}-path.csv")
-                    plots.save_path(each, folder / f"{each.name}-path.png")
+                _keep_paths(solutions, folder)
     if as_json:
         emit(report)
     else:
@@ -78,6 +79,15 @@ def solve(
         ]
         print("\n\n".join(texts))
     raise typer.Exit(0 if all(each.holds for each in solutions) else 1)
+
+
+def _keep_paths(solutions: "list[Solution]", folder: Path) -> None:
+    from gne_mj import plots
+    from gne_mj import solve as solving
+
+    for each in solutions:
+        solving.write_path(each, folder / f"{each.name}-path.csv")
+        plots.save_path(each, folder / f"{each.name}-path.png")
 
 
 def _moved(done: dict[str, Any] | None) -> list[str]:
@@ -285,9 +295,12 @@ def map_(
     that were done.
     """
     from gne_mj import exit_map as mapping
+    from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
     from gne_mj.solve import parse_path
 
+    if out is not None:
+        need("plots", "the figure of a map")
     loaded = load_scenario(source, settings(set_))
     name = loaded.name_of(system)
     grid = mapping.Grid(
@@ -310,9 +323,7 @@ def map_(
     if as_json:
         emit(json.dumps([asdict(cell) for cell in cells], indent=2))
     else:
-        print("\n".join(mapping.summary(cells)))
-        if cells and results.out is not None:
-            print(f"\nfigure      {results.out / 'map.png'}\ntable       {results.out / 'map.csv'}")
+        _print_map(cells, results.out)
     if stop.is_set():
         say(f"gne-mj: stopped: {len(cells)} of {grid.cells} cells were done")
     raise typer.Exit(1 if stop.is_set() else 0)
@@ -325,6 +336,14 @@ def _forces(text: str) -> tuple[float, ...]:
         return tuple(float(force) for force in text.split(","))
     except ValueError:
         raise InvalidInput("pushes", text, "it must be numbers, A,B,...") from None
+
+
+def _print_map(cells: "list[Cell]", out: Path | None) -> None:
+    from gne_mj.exit_map import summary
+
+    print("\n".join(summary(cells)))
+    if cells and out is not None:
+        print(f"\nfigure      {out / 'map.png'}\ntable       {out / 'map.csv'}")
 
 
 def _keep_map(cells: "list[Cell]", results: Results) -> None:

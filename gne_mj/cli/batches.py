@@ -101,7 +101,9 @@ def batch(
     """
     from gne_mj.batches import connected, execute, make_plan, parse_record
     from gne_mj.errors import InvalidInput, named
+    from gne_mj.extras import need
 
+    need("plots", "a batch's figure")
     changed = bool(sweeps or set_ or system or starts or seed or chunk)
     if source is None and (changed or record != "summaries" or spread != 0.9):
         raise InvalidInput(
@@ -178,7 +180,9 @@ def batch_report(
     from gne_mj.batches import Progress, Store
     from gne_mj.batches.report import write_report
     from gne_mj.errors import named
+    from gne_mj.extras import need
 
+    need("plots", "a batch's figure")
     kinds = formats(format_)
     store = Store.open(folder)
     now, target = Progress.of(store), folder_for(out, folder)

@@ -75,6 +75,10 @@ def paper(
 
     Results of an earlier `paper` in the same folder are replaced; other files there stay.
     """
+    from gne_mj.extras import need
+
+    need("plots", "drawing figures")
+    need("view", "a replay")
     results = Results(out, replace=True)
     trajectory = simulate("paper", set_, results, quiet=as_json, illustrate=_illustrate)
     out = results.out or out
@@ -109,7 +113,9 @@ def plot(
     """
     from gne_mj import plots
     from gne_mj.errors import named
+    from gne_mj.extras import need
 
+    need("plots", "drawing figures")
     kinds = formats(format_)
     trajectory = stored(folder)
     target = folder_for(out, folder)

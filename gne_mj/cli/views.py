@@ -40,8 +40,10 @@ def view(
 ) -> None:
     """Show a stored run in a browser, with a time slider; a batch's run is run again for it."""
     from gne_mj.errors import InvalidInput
+    from gne_mj.extras import need
     from gne_mj.files import refuse_existing, written
 
+    need("view", "a replay")
     if html is not None and port is not None:
         raise InvalidInput("port", port, "it is of no use with `html`")
     if html is not None and (html.is_dir() or not html.parent.is_dir()):
@@ -90,8 +92,10 @@ def watch(
         speed: as --speed gives it.
         port: as --port gives it.
     """
+    from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
 
+    need("view", "a live page")
     factor = _speed(speed)
     with stopping() as stop, ExitStack() as page:
         with working(as_json, PREPARING):

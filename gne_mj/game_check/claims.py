@@ -260,14 +260,14 @@ def _chords(f: Functions, points: Points, inside: bool = True) -> list[tuple[Arr
 
 def _cost_row(f: Functions, i: int, a: int, y: Array) -> Array | None:
     """d2J_i/dy_a dy, the author's or by differences; None where there is no room for them."""
-    if f.has_cost_hessian:
+    if f.game.has_cost_hessian:
         return f.row(i, a, y)
     return _differences(f, partial(f.slope, i, a), y, range(len(y)))
 
 
 def _curvature_row(f: Functions, k: int, a: int, own: NDArray[np.int64], y: Array) -> Array | None:
     """d2g_k/dy_a dy_b for the constraint's own actions b, likewise."""
-    if f.has_constraint_hessian:
+    if f.game.has_constraint_hessian:
         return np.array([f.constraint_curvature(k, a, int(b), y) for b in own])
     return _differences(f, partial(f.constraint_slope, k, a), y, own)
 

@@ -55,11 +55,11 @@ def second_derivatives(
     stencil = f.stencil(y, _random(rng, y))
     if stencil is None:
         return
-    if f.has_cost_hessian:
+    if f.game.has_cost_hessian:
         _cost_hessians(f, y, stencil, chosen(rng, f.game.actions, most), costs)
     for k in chosen(rng, f.game.constraints_count, most):
         _constraint_gradient(f, y, stencil, k, gradients)
-        if f.has_constraint_hessian:
+        if f.game.has_constraint_hessian:
             _constraint_hessian(f, y, stencil, k, rng, hessians)
 
 

@@ -1,7 +1,7 @@
 """All comparisons of one game, at the same profiles every time."""
 
 from types import ModuleType
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ _HALVINGS = 60
 
 # What was compared at load of each module of functions: keys of games
 _compared: WeakKeyDictionary[ModuleType, set[int]] = WeakKeyDictionary()
+_compared_games: WeakSet[Game] = WeakSet()
 
 
 def examine(game: Game, start: Array, points: int = _ASKED[0], most: int = _ASKED[1]) -> Report:
@@ -50,16 +51,16 @@ def refuse(game: Game, start: Array) -> None:
         InvalidInput: the first thing that differs.
         UserCodeError: as :func:`examine`.
     """
-    if game.tested or game.__dict__.get("_compared"):
+    if game.tested or game in _compared_games:
         return
-    done = _compared.setdefault(game.written[0], set())
+    done = _compared.setdefault(game.written.module, set())
     if _key(game) not in done:
         report = examine(game, start, *_AT_LOAD)
         for comparison in report.comparisons:
             if comparison.difference is not None:
                 raise InvalidInput(*comparison.difference)
         done.add(_key(game))
-    object.__setattr__(game, "_compared", True)
+    _compared_games.add(game)
 
 
 def _key(game: Game) -> int:
@@ -70,7 +71,7 @@ def _key(game: Game) -> int:
     gaps = None if game.gap_bounds is None else np.asarray(game.gap_bounds).tobytes()
     return hash(
         (
-            np.asarray(game.written[1], float).tobytes(), game.sizes,
+            game.written.parameters.tobytes(), game.sizes,
             tuple(map(tuple, game.in_cost)), tuple(map(tuple, game.in_constraint)),
             game.affine, tuple(box), game.jacobian_bounds is None, game.row_scaled, gaps,
             tuple(slopes),
@@ -85,7 +86,7 @@ class _Examination:
         self.rng = np.random.default_rng(0)
         self.failures: list[str] = []
         absent = "there is none, and central differences stand for it"
-        second, bend = self.f.has_cost_hessian, self.f.has_constraint_hessian
+        second, bend = game.has_cost_hessian, game.has_constraint_hessian
         self.in_cost = Comparison("in_cost", "what functions read")
         self.in_constraint = Comparison("in_constraint", "what functions read")
         self.gradient = Comparison("cost_gradient", "differences of cost")

@@ -31,14 +31,11 @@ class Functions:
 
     def __init__(self, game: Game) -> None:
         self.game = game
-        self._module, parameters = game.written
-        self._q = np.array(parameters, dtype=np.float64)
+        self._functions = game.written.functions
+        self._q = game.written.parameters.copy()
         self._q.flags.writeable = False
-        self._native = game.kernels is self._module
         self._margins, self._violated = game.margins, 0
         self._all = range(game.constraints_count)
-        self.has_cost_hessian = hasattr(self._module, "add_cost_hessian")
-        self.has_constraint_hessian = hasattr(self._module, "constraint_hessian")
 
     def cost(self, i: int, y: Array) -> float:
         """J_i."""
@@ -83,7 +80,7 @@ class Functions:
         Where a constraint fails or is no number, a profile is not.
         """
         t = self._margins
-        if constraints is None and self._native:  # compiled anyway, to look at the start
+        if constraints is None and self.game.native:  # compiled anyway, to look at the start
             return bool(np.all(self.game.constraints(np.array(list(profiles))) + t < 0.0))
         which = self._all if constraints is None else constraints
         try:
@@ -143,7 +140,7 @@ class Functions:
         return Stencil(stencil.middle, stencil.direction, h, ahead, behind)
 
     def _call(self, name: str, y: Array, *arguments: Any) -> Any:
-        function = getattr(self._module, name)
+        function = self._functions[name]
         try:
             return function(self._q, *arguments)
         except KeyboardInterrupt:
@@ -153,13 +150,13 @@ class Functions:
 
     def _number(self, name: str, y: Array, *numbers: int) -> float:
         value = self._call(name, y, *numbers, _readonly(y))
-        number = number_of(getattr(self._module, name), value)
+        number = number_of(self._functions[name], value)
         if not math.isfinite(number):
             raise self._no_number(name, y, *numbers, _readonly(y))
         return number
 
     def _no_number(self, name: str, y: Array, *arguments: Any) -> UserCodeError:
-        function = getattr(self._module, name)
+        function = self._functions[name]
 
         def again() -> None:
             with np.errstate(over="raise"):

@@ -27,7 +27,7 @@ def costs(f: Functions, y: Array, rng: np.random.Generator, most: int,
     for i in chosen(rng, game.agents, most):
         others = f.actions_of(set(range(game.agents)) - {i, *game.in_cost[i]})
         own = [int(a) for a in f.actions_of([i])]
-        if f.has_cost_hessian:
+        if game.has_cost_hessian:
             _adding(f, i, own, others, y, rng, into)
         ways = _moved(f, y, others, rng)
         for function, value in [

@@ -16,6 +16,7 @@ import sys
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
@@ -40,7 +41,7 @@ FLEET = "gne_mj.plants.mujoco"  # the module of its fleets in MuJoCo
 PLACED = "position"  # the state at which agents start apart from each other
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Whether every robot meets Assumption [asmp:nonlinearPlant]; parameters (m, 5).
 
     psi is strongly monotone, since its slope lies between stiffness and stiffness +
@@ -52,7 +53,7 @@ def is_passive(parameters):
     )
 
 
-def energy_balance(parameters):
+def energy_balance(parameters: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """As :func:`gne_mj.plants.integrator.energy_balance`, over extension and both velocities.
 
     Only the damper dissipates, gamma (x2 - x3)^2: nothing in the extension.

@@ -14,6 +14,7 @@ import sys
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
@@ -28,12 +29,12 @@ OUTPUT = 0
 INPUT_UNIT = ""
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Always: y' = u meets Assumption [asmp:nonlinearPlant]."""
     return True
 
 
-def energy_balance(parameters):
+def energy_balance(parameters: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """P and D, each (m, s, s), over the first s states, those that V depends on.
 
     With e the deviation from the equilibrium x* = pi(y*), V^{x*} <= e'Pe/2 (here equal) and along

@@ -59,7 +59,7 @@ def by_type(
     return found
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Whether every channel's type meets the assumption; parameters (m, 6)."""
     return all(kind.is_passive(own) for kind, own in by_type(parameters))
 

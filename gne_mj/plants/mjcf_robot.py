@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
@@ -66,7 +67,7 @@ def mjcf_robots(robots: tuple[RobotFile, ...], input_limit: np.ndarray) -> MjcfR
     return MjcfRobots(module, np.zeros((len(robots), 0)), input_limit, robots=robots)
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Not known."""
     return False
 

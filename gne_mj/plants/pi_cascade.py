@@ -11,6 +11,7 @@ import sys
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
@@ -27,12 +28,12 @@ OUTPUT = 0
 INPUT_UNIT = ""
 
 
-def is_passive(parameters):
+def is_passive(parameters: NDArray[np.float64]) -> bool:
     """Whether 0 < k < v for every channel; parameters (m, 2)."""
     return bool(np.all((parameters[:, 1] > 0) & (parameters[:, 1] < parameters[:, 0])))
 
 
-def energy_balance(parameters):
+def energy_balance(parameters: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """As :func:`gne_mj.plants.integrator.energy_balance`: e'De = (v e_y - k e_s)^2 / (v - k)."""
     v, k = parameters.T
     r = k / (v - k)

@@ -7,17 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from gne_mj.exit_map import Cell
-from gne_mj.plots.style import STYLE, line_style
+from gne_mj.plots.style import STYLE, line_style, pyplot
 from gne_mj.solve import Solution, bounds_of
 
 
 def save_path(solution: Solution, file: Path) -> None:
     """Draw how a path of equilibria nears the variational GNE as rho falls, in log scales."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    plt = pyplot()
     rho = np.array([point.equilibrium.rho for point in solution.path])
     lines = {
         "distance to the vGNE": [point.distance for point in solution.path],
@@ -45,11 +41,7 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
     at a control instant, a ring those that were left between instants only, a bar those that were
     refused.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    plt = pyplot()
     modes = list(dict.fromkeys(cell.mode for cell in cells))
     pushes = sorted({cell.push for cell in cells})
     periods = sorted({cell.period for cell in cells})

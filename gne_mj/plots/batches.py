@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batch_variables import figures
-from gne_mj.plots.style import STYLE, line_style
+from gne_mj.plots.style import STYLE, line_style, pyplot
 from gne_mj.variables import Panel
 from gne_mj.verdicts import SUCCESSES
 
@@ -33,11 +33,7 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
         file: to write.
         kind: of file: png, pdf or svg.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    plt = pyplot()
     key = _horizontal(runs)
     lines = _groups(runs, key)
     early = ~np.isin(runs["status"].to_numpy(), SUCCESSES)

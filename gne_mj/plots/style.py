@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from gne_mj.extras import need
+
 FORMATS = ("png", "pdf", "svg")
 
 # Readable in grey: lines differ in dash as well as in colour (Okabe and Ito's palette).
@@ -23,6 +25,21 @@ STYLE: Any = {
     "legend.fontsize": 7.5,
     "svg.hashsalt": "gne-mj",
 }
+
+
+def pyplot() -> Any:
+    """``matplotlib.pyplot``, slow to import, for files alone.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    need("plots", "drawing figures")
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    return plt
 
 
 def axis_label(words: str, symbol: str, unit: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.files import refuse_existing, written
-from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style
+from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style, pyplot
 from gne_mj.trajectory import Trajectory
 from gne_mj.verdicts import SUCCESSES
 
@@ -28,11 +28,8 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     each other variable that figures draw (:class:`gne_mj.variables.Variable`), with its bounds, as
     ``robots-gaps`` or, where it is one number, ``channels-total-power``.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
     figures = {}
-    with matplotlib.rc_context(STYLE):
+    with pyplot().rc_context(STYLE):
         for name in trajectory.tree.children:
             data = trajectory[name]
             titles = {"action": data["action"].attrs["long_name"]}
@@ -63,8 +60,6 @@ def save(
         InvalidInput: files exist and may not be replaced, or the folder cannot be written to.
         StorageError: the disk is full, or fails.
     """
-    import matplotlib.pyplot as plt
-
     figures = draw(trajectory)
     paths = {name: [Path(folder) / f"{name}.{kind}" for kind in formats] for name in figures}
     try:
@@ -76,7 +71,7 @@ def save(
                     figure.savefig(new, dpi=200)
     finally:
         for figure in figures.values():
-            plt.close(figure)
+            pyplot().close(figure)
     return [path for each in paths.values() for path in each]
 
 
@@ -87,9 +82,7 @@ def _plural(noun: str) -> str:
 
 def _figure(data: "xarray.Dataset", panels: int, width: float) -> tuple["Figure", list["Axes"]]:
     """Empty panels above each other, over time."""
-    import matplotlib.pyplot as plt
-
-    figure, grid = plt.subplots(
+    figure, grid = pyplot().subplots(
         panels, 1, figsize=(width, 1.0 + 1.9 * panels), layout="constrained", sharex=True,
         squeeze=False,
     )  # fmt: skip

@@ -72,7 +72,7 @@ def _constraints_of(game: Game, start: bytes) -> Assumption:
                 f" {found.above:.3g} above their mean"
             )
         return Assumption(label, FAILS, f"constraint '{name}' is not convex: {how}")
-    kind = "bounds on gaps" if game.gap_bounds is not None else game.constraint_class
+    kind = game.convexity
     if game.tested and kind is not None:
         return Assumption(label, MET, f"the constraints are {_SAID.get(kind, kind)}")
     said = f"declared to be {_SAID.get(kind, kind)}, and" if kind is not None else "convex, as"
@@ -94,7 +94,7 @@ def counterexample(game: Game, points: Array) -> Counterexample | None:
         points: (count, m) profiles strictly inside; second derivatives are looked at there, and
             values half way between them, which tell of what lies outside the set too.
     """
-    tolerance = _tolerance(game, "constraint_hessian")
+    tolerance = _tolerance(game.has_constraint_hessian)
     worst, found = 0.0, None
     for y in points:
         slope = np.max(np.abs(game.constraint_jacobian(y)), axis=1)
@@ -182,7 +182,7 @@ def strictly_convex_barrier(system: System) -> bool:
         curved = game.weighted_constraint_hessian(y, np.ones(game.constraints_count))
         size = float(np.max(np.abs(curved)))
         span += (unit.T @ unit).toarray() + (curved / size if size > 0.0 else 0.0)
-    floor = (1e-12 if _given(game, "constraint_hessian") else 1e-7) * np.max(np.abs(span))
+    floor = (1e-12 if game.has_constraint_hessian else 1e-7) * np.max(np.abs(span))
     span[np.diag_indices(game.actions)] -= floor
     return positive_definite(span)
 
@@ -192,13 +192,9 @@ def shown(y: Array) -> str:
     return "[" + ", ".join([f"{v:.4g}" for v in y[:6]] + ["..."] * (len(y) > 6)) + "]"
 
 
-def _given(game: Game, name: str) -> bool:
-    """Whether the author gave a second derivative, or differences stand for it."""
-    return hasattr(game.written[0], name)
-
-
-def _tolerance(game: Game, name: str) -> float:
-    return _ROUNDING if _given(game, name) else _DIFFERENCED
+def _tolerance(given: bool) -> float:
+    """Of second derivatives that the author gave, or that are differences."""
+    return _ROUNDING if given else _DIFFERENCED
 
 
 def _samples(
@@ -211,7 +207,7 @@ def _samples(
     """Profiles to look at: random ones, near the boundary and towards the corners of the box."""
     members = np.diff(game.actions_in_constraints[0])
     each = float(np.sum(members**2)) + game.actions**2
-    entries = _ENTRIES if game.kernels is game.written[0] else _PLAIN_ENTRIES
+    entries = _ENTRIES if game.native else _PLAIN_ENTRIES
     count = int(np.clip(entries / each, _FEW, most))
     points = profiles(game, start, game.box if box is None else box, count, feasible)
     # Functions need not be numbers on the boundary itself, and differences need room: a little
@@ -286,4 +282,4 @@ def _own_eigenvalue(game: Game, i: int, y: Array) -> float:
     block = rows[:, own]
     least = float(np.linalg.eigvalsh(0.5 * (block + block.T))[0])
     scale = float(np.max(np.abs(rows))) + size / max(1.0, float(np.max(np.abs(y))))
-    return least if least < -_tolerance(game, "add_cost_hessian") * scale else 0.0
+    return least if least < -_tolerance(game.has_cost_hessian) * scale else 0.0

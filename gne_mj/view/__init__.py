@@ -8,6 +8,10 @@ a session in the simulation's own thread through a server on the loopback interf
 around it or beside it (`html.py`, `page/`).
 """
 
+from gne_mj.extras import need
+
+need("view", "a page in the browser")
+
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.html import html_page, write_html
 from gne_mj.view.mirror import Mirror

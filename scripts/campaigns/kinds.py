@@ -355,7 +355,7 @@ def _try(rng: np.random.Generator, name: str) -> Draw | None:
         return None
     samples = int(rng.integers(15, 40))
     every = max(1, round(float(log_uniform(rng, 0.05, 0.5)) / (samples * step)))
-    if both.game.kernels is not both.game.written[0]:
+    if not both.game.native:
         every = 1  # plain functions, hundreds of times slower: a few steps
     clock = Clock(samples * every * step, step, step, every * step)
     loop, x = as_stiff(system, both.oracle)

@@ -1,4 +1,4 @@
-"""How long, deep and wide functions may be, in the whole repository."""
+"""How long, deep and wide functions may be, and which of them have no annotations."""
 
 import ast
 from pathlib import Path
@@ -94,3 +94,36 @@ def test_what_is_too_large_is_seen():
     for source in ("def f():\n" + 59 * " x\n", nested(4), wide.replace(", i", ""), chain,
                    wide.replace("@kernel\n", "")):  # fmt: skip
         assert not list(complaints(source))
+
+
+# The machinery of kernels, which has stand-ins of what only native code can do
+UNTYPED = {"gne_mj/native.py"}
+
+
+def untyped(source):
+    """Functions outside of others that lack an annotation and are no kernels."""
+    for owner in ast.walk(ast.parse(source)):
+        if isinstance(owner, ast.Module | ast.ClassDef):
+            for node in owner.body:
+                if not isinstance(node, ast.FunctionDef):
+                    continue
+                decorators = {ast.unparse(each).partition("(")[0] for each in node.decorator_list}
+                given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                if isinstance(owner, ast.ClassDef) and "staticmethod" not in decorators:
+                    given = given[1:]
+                missing = node.returns is None or any(each.annotation is None for each in given)
+                if missing and not decorators & {"kernel", "compiled", "intrinsic"}:
+                    yield node.name
+
+
+def test_only_kernels_have_no_annotations():
+    """As mypy's settings suppose; within functions there are those that become native code."""
+    found = []
+    for folder in ("gne_mj", "controllers"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            name = path.relative_to(ROOT).as_posix()
+            if name not in UNTYPED:
+                found += [f"{name}: {each}" for each in untyped(path.read_text(encoding="utf-8"))]
+    assert not found, "\n".join(found)
+    assert list(untyped("def f(a: int): pass\n@kernel\ndef g(a): pass")) == ["f"]
+    assert not list(untyped("class A:\n def f(self) -> None:\n  def g(a): pass"))

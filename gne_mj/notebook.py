@@ -5,7 +5,6 @@ from html import escape
 from gne_mj.errors import GneError
 from gne_mj.summary import summary
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.html import html_page
 
 HEIGHT = 560  # pixels of the replay
 
@@ -14,11 +13,14 @@ def notebook_html(trajectory: Trajectory) -> str:
     """What IPython shows of a trajectory: a table for each system and, below, the replay.
 
     All of it is in the notebook: it needs no server, and still works in one that was sent on. Where
-    there is no scenario to draw robots from, or their files are gone, a sentence says so.
+    there is no scenario to draw robots from, their files are gone, or the extra "view" is not
+    installed, a sentence says so.
     """
     tables = "".join(_table(name, report) for name, report in trajectory.reports.items())
     found = f'<div style="display:flex;flex-wrap:wrap;gap:2em">{tables}</div>'
     try:
+        from gne_mj.view import html_page
+
         page = escape(html_page(trajectory), quote=True)
     except GneError as error:
         found += f"<p>There is no replay: {escape(str(error))}</p>"
