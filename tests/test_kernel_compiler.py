@@ -15,7 +15,7 @@ class Elsewhere(NamedTuple):
     """A record that is none of the package's."""
 
     values: np.ndarray
-    count: int
+    entry: int
     flag: bool
 
 
@@ -40,7 +40,7 @@ def told(path, point, free, other):
     value = path.rho + 10.0 * path.spread + (100.0 if path.to_zero else 0.0)
     for k in range(len(point.y)):
         value += point.y[k] - 3.0 * point.slack[k] + 7.0 * point.multipliers[free.position[k]]
-    return value + other.values[other.count] * (1.0 if other.flag else -1.0)
+    return value + other.values[other.entry] * (1.0 if other.flag else -1.0)
 
 
 @native.compiled
@@ -57,7 +57,8 @@ def test_records_come_through_kernels_as_they_are():
     point = Iterate(np.array([1.0, 2.0]), np.array([3.0, 5.0]), np.array([7.0, 11.0]))
     free = Free(np.array([0, 1]), np.array([0]), np.array([0, 1]))
     other = Elsewhere(np.array([0.0, 1000.0]), 1, True)
-    expected = told(*turned(path, point), free, other)
+    path_then, point_then = turned(path, point)
+    expected = told(path_then, point_then, free, other)  # in plain Python
     out = np.empty(1)
     tell(path, point, free, other, out)
     assert out[0] == expected
