@@ -28,6 +28,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np.arrayobj import make_array, populate_array
 
+from gne_mj.kernel_compiler import KernelCompiler, LoopCompiler
 from gne_mj.machine_code import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -40,8 +41,15 @@ _KERNEL: dict[str, Any] = {
     "_nrt": False,
     "forceinline": True,
     "no_cfunc_wrapper": True,
+    "no_cpython_wrapper": True,
+    "pipeline_class": KernelCompiler,
 }
-_LOOP: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
+_CALLBACK: dict[str, Any] = {
+    "error_model": "numpy",
+    "_nrt": False,
+    "pipeline_class": LoopCompiler,
+}
+_LOOP: dict[str, Any] = {**_CALLBACK, "nogil": True, "no_cfunc_wrapper": True}
 
 INTERPRETED = bool(numba.config.DISABLE_JIT)  # numba is switched off
 
@@ -71,8 +79,7 @@ def callback(signature: types.Type, function: Callable[..., Any]) -> Any:
     """Compile a C callback (numba's ``cfunc``), kept on disk as :func:`compiled` does."""
     if INTERPRETED:
         return _Interpreted(function)
-    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-    return kept(lambda cache: numba.cfunc(signature, cache=cache, **options)(function))
+    return kept(lambda cache: numba.cfunc(signature, cache=cache, **_CALLBACK)(function))
 
 
 class _Interpreted:
@@ -104,7 +111,7 @@ def _package_digest() -> str:
     native = [path for path in root.glob("*.py") if b"gne_mj.native" in path.read_bytes()]
     for folder in ("controllers", "games", "plants", "loops"):
         native.extend((root / folder).glob("*.py"))
-    for path in sorted([*native, Path(__file__)]):
+    for path in sorted([*native, Path(__file__), root / "kernel_compiler.py"]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
