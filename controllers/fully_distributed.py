@@ -30,7 +30,7 @@ from gne_mj.controllers.law import (
     check_positive,
     initial_estimates,
 )
-from gne_mj.controllers.settings import EPSILON, GAIN, PENALTY
+from gne_mj.controllers.settings import EPSILON, GAIN
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
@@ -152,7 +152,7 @@ def agent_action(game, data, settings, i, own_filter, own_row, work, u):
         room = -game.constraint(q, k, profile) - data.tightening[k]
         if not room > 0.0:
             return k
-        weight = work.now[PENALTY] / room
+        weight = work.now.penalty / room
         for r in range(len(u)):
             u[r] += weight * game.constraint_gradient(q, k, first + r, profile)
     for r in range(len(u)):

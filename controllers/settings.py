@@ -1,5 +1,7 @@
 """The numbers that every law is given, in one array for native code; these are its entries."""
 
+from gne_mj.numbers import Numbers, names_of
+
 RHO = 0  # barrier's penalty parameter rho
 GAIN = 1  # k of [eq:CenterFeedback]
 EPSILON = 2  # time constant of z in [eq:CenterFeedback], in s
@@ -10,7 +12,15 @@ LINKS = 6  # where in the memory what was last heard over each link begins; 0: r
 GUARDED = 7  # 1: the whole barrier is at measured outputs, which hence stay inside
 COUNT = 8
 
-# Entries of a loop's ``work.now``: the penalty at this time; the first constraint whose g + t is
-# not negative at what the law sees (-1 for none), with that value; the step up to which faults
-# were dealt with
-PENALTY, SHELL, SHELL_VALUE, DEALT, NOW = range(5)
+
+class Now(Numbers):
+    """What holds at an instant: a loop's ``work.now``."""
+
+    penalty: float  # rho at this time
+    shell: float  # the first constraint whose g + t is not negative at what the law sees, or -1
+    shell_value: float  # that value
+    dealt: float  # the step up to which faults were dealt with
+    stands: float  # the step that the law's memory belongs to, held modes
+
+
+LENGTH_OF_NOW = len(names_of(Now))

@@ -44,7 +44,7 @@ class Runs:
     tolerance: float
     time: NDArray[np.float64]
     samples: Samples
-    monitors: NDArray[np.float64]
+    monitors: Any
 
     def of(self, source: Callable[[Rows], Array]) -> Array:
         """(runs, rows, ...) the values of a signal's source."""
@@ -87,7 +87,7 @@ class Runs:
     @cached_property
     def worst(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(runs, p) each constraint's greatest g, and when in s."""
-        return verdicts.worst_constraints(self.monitors, self.system.game.constraints_count)
+        return verdicts.worst_constraints(self.monitors)
 
     @cached_property
     def tightest(self) -> NDArray[np.int64]:
@@ -97,27 +97,27 @@ class Runs:
     @cached_property
     def inputs(self) -> verdicts.Inputs:
         """What actuators had to deliver."""
-        game = self.system.game
-        return verdicts.inputs(self.monitors, game.constraints_count, game.actions)
+        return verdicts.inputs(self.monitors)
 
-    def seen(self, entry: int) -> NDArray[np.float64]:
-        """(runs,) an entry of the monitors."""
-        return self.monitors[:, entry].copy()
+    def seen(self, name: str) -> NDArray[np.float64]:
+        """(runs,) a number of the monitors."""
+        found: NDArray[np.float64] = self.monitors[name].copy()
+        return found
 
     @property
     def observed(self) -> NDArray[np.bool_]:
         """(runs,) whether anything was seen at all."""
-        return self.monitors[:, watch.STARTED] > 0
+        return self.monitors.started > 0
 
     @property
     def left(self) -> NDArray[np.bool_]:
         """(runs,) whether a run ended early."""
-        return self.monitors[:, watch.EXIT] != watch.INSIDE
+        return self.monitors.exit != watch.INSIDE
 
     @property
     def violated(self) -> NDArray[np.bool_]:
         """(runs,) whether a run ended early at a constraint that is known."""
-        return self.left & (self.monitors[:, watch.EXIT] != watch.DIVERGED)
+        return self.left & (self.monitors.exit != watch.DIVERGED)
 
 
 def _where(condition: NDArray[np.bool_], values: Array) -> Array:
@@ -135,13 +135,13 @@ def _middle(values: "pandas.Series[float]") -> float:
 
 
 def _agent_out(runs: Runs) -> Array:
-    agent = runs.monitors[:, watch.EXIT_AGENT]
+    agent = runs.monitors.exit_agent
     return _where(runs.violated & (agent >= 0), 1 + agent)
 
 
 def _rise(runs: Runs) -> Array:
     """Not a number without a y*, which V is about."""
-    rise = runs.seen(watch.STORAGE_RISE)
+    rise = runs.seen("storage_rise")
     return rise if runs.system.known_equilibrium is not None else np.full_like(rise, np.nan)
 
 
@@ -198,24 +198,24 @@ JUDGED = (
         ),
     ),
     Variable(
-        "end_time", ("run",), lambda runs: _where(~runs.left, runs.seen(watch.TIME)), unit="s"
+        "end_time", ("run",), lambda runs: _where(~runs.left, runs.seen("time")), unit="s"
     ),
     Variable(
-        "exit_time", ("run",), lambda runs: _where(runs.left, runs.seen(watch.EXIT_TIME)),
+        "exit_time", ("run",), lambda runs: _where(runs.left, runs.seen("exit_time")),
         unit="s",
     ),
     Variable(
         "exit_constraint", ("run",),
-        lambda runs: _where(runs.violated, 1.0 + runs.seen(watch.EXIT_CONSTRAINT)),
+        lambda runs: _where(runs.violated, 1.0 + runs.seen("exit_constraint")),
         long_name="which was violated, numbered from 1",
     ),
     Variable("exit_agent", ("run",), _agent_out, long_name="whose estimates left"),
     Variable(
-        "exit_value", ("run",), lambda runs: _where(runs.left, runs.seen(watch.EXIT_VALUE))
+        "exit_value", ("run",), lambda runs: _where(runs.left, runs.seen("exit_value"))
     ),
     Variable(
         "exit_at_instant", ("run",),
-        lambda runs: _where(runs.left, 1.0 - runs.seen(watch.EXIT_BETWEEN)),
+        lambda runs: _where(runs.left, 1.0 - runs.seen("exit_between")),
         long_name="1: seen at a control instant, 0: between two",
     ),
     Variable(
@@ -234,14 +234,14 @@ JUDGED = (
     Variable(
         "saturated_time", ("run",),
         lambda runs: _where(
-            runs.seen(watch.SATURATED) > 0, runs.seen(watch.SATURATED_TIME)
+            runs.seen("saturated") > 0, runs.seen("saturated_time")
         ),
         unit="s", long_name="when an input limit was first met",
     ),
     Variable(
         "lyapunov_rise", ("run",), _rise, long_name="largest rise of V from one step to the next"
     ),
-    _of_monitor("steps", watch.STEPS),
+    _of_monitor("steps", "steps"),
 )  # fmt: skip
 
 

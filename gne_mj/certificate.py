@@ -82,7 +82,7 @@ def certify_run(
     time: NDArray[np.float64],
     action: NDArray[np.float64],
     inputs: NDArray[np.float64],
-    monitor: NDArray[np.float64],
+    monitor: Any,
     *,
     tolerance: float,
     duration: float,
@@ -110,7 +110,7 @@ def certify_run(
     (settled,) = verdicts.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
-    if between and monitor[watch.EXIT] == watch.INSIDE:
+    if between and monitor.exit == watch.INSIDE:
         message += (
             f"; at {between} sample times the state interpolated between two integration steps is"
             " outside, though both steps are inside"
@@ -127,13 +127,13 @@ def certify_run(
         actuators=_actuators(system, monitor),
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
-        steps=int(monitor[watch.STEPS]),
+        steps=int(monitor.steps),
         end_time=float(time[-1]),
         wall_time=wall_time,
     )
 
 
-def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+def status_now(system: System, monitor: Any) -> dict[str, Any]:
     """How a run that goes on stands: status, sentence, least margin so far, when it left.
 
     Args:
@@ -150,9 +150,9 @@ def status_now(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "exit_time": None,
         "exit_agents": [],
     }
-    if monitor[watch.EXIT] != watch.INSIDE:
+    if monitor.exit != watch.INSIDE:
         now["status"], now["message"] = _exit(system, monitor)
-        now["exit_time"] = float(monitor[watch.EXIT_TIME])
+        now["exit_time"] = float(monitor.exit_time)
         now["exit_agents"] = _concerned(system, monitor)
     return now
 
@@ -161,18 +161,18 @@ def _status(
     system: System,
     time: NDArray[np.float64],
     distance: NDArray[np.float64],
-    monitor: NDArray[np.float64],
+    monitor: Any,
     tolerance: float,
     duration: float,
     interrupted: bool,
 ) -> tuple[str, str]:
-    if monitor[watch.EXIT] != watch.INSIDE:
+    if monitor.exit != watch.INSIDE:
         return _exit(system, monitor)
     end = float(time[-1])
     if interrupted:
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
     (tail,) = verdicts.tail_distance(time, distance[None], duration)
-    (word,) = verdicts.status(monitor[None], np.array([tail]), tolerance)
+    (word,) = verdicts.status(watch.together([monitor]), np.array([tail]), tolerance)
     if word == "converged":
         return (
             "converged",
@@ -192,34 +192,34 @@ def _status(
     )
 
 
-def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
+def _exit(system: System, monitor: Any) -> tuple[str, str]:
     game = system.game
-    at = f"at {monitor[watch.EXIT_TIME]:.6g} s"
-    if monitor[watch.EXIT_STAGE] > 0:
-        at += f" (stage {int(monitor[watch.EXIT_STAGE]) + 1} of the integration step)"
-    value = float(monitor[watch.EXIT_VALUE])
-    code = int(monitor[watch.EXIT])
+    at = f"at {monitor.exit_time:.6g} s"
+    if monitor.exit_stage > 0:
+        at += f" (stage {int(monitor.exit_stage) + 1} of the integration step)"
+    value = float(monitor.exit_value)
+    code = int(monitor.exit)
     if code == watch.DIVERGED:
         return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
     if code == watch.FORCES_LOST:
         from gne_mj.plants.native_mujoco import lost_words  # late: MuJoCo is slow to import
 
         return EXITS[code], f"{at} {lost_words(int(value))}"
-    constraint = game.constraint_names[int(monitor[watch.EXIT_CONSTRAINT])]
+    constraint = game.constraint_names[int(monitor.exit_constraint)]
     if code == watch.STEP_TOO_SMALL:
         return (
             EXITS[code],
             f"1/{PIECES} of the timestep is still too long next to constraint '{constraint}' {at}"
             f" (g = {value:.6g}): {_instead(system)} can go on there",
         )
-    if monitor[watch.EXIT_BETWEEN] > 0:
+    if monitor.exit_between > 0:
         at += ", between two control instants"
     if code == watch.LEFT_SET:
         return (
             EXITS[code],
             f"constraint '{constraint}' was violated {at}: g = {value:.6g}, not negative",
         )
-    agent = int(monitor[watch.EXIT_AGENT]) + 1
+    agent = int(monitor.exit_agent) + 1
     if agent == 0:
         tightened = np.any(game.margins)
         return (
@@ -236,35 +236,33 @@ def _exit(system: System, monitor: NDArray[np.float64]) -> tuple[str, str]:
     )
 
 
-def _exit_report(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+def _exit_report(system: System, monitor: Any) -> dict[str, Any] | None:
     """What led to an exit: the last input that was held, and under which law."""
-    if monitor[watch.EXIT] == watch.INSIDE:
+    if monitor.exit == watch.INSIDE:
         return None
-    m, p = system.game.actions, system.game.constraints_count
-    at = int(watch.inputs_at(p)) + 5 * m
-    constraint = int(monitor[watch.EXIT_CONSTRAINT])
-    known = monitor[watch.EXIT] != watch.DIVERGED
-    agent = int(monitor[watch.EXIT_AGENT]) + 1
+    constraint = int(monitor.exit_constraint)
+    known = monitor.exit != watch.DIVERGED
+    agent = int(monitor.exit_agent) + 1
     return {
-        "time": float(monitor[watch.EXIT_TIME]),
-        "stage": int(monitor[watch.EXIT_STAGE]) + 1,
-        "at_control_instant": not monitor[watch.EXIT_BETWEEN] > 0,
+        "time": float(monitor.exit_time),
+        "stage": int(monitor.exit_stage) + 1,
+        "at_control_instant": not monitor.exit_between > 0,
         "constraint": system.game.constraint_names[constraint] if known else None,
-        "value": float(monitor[watch.EXIT_VALUE]),
+        "value": float(monitor.exit_value),
         "estimates_of_agent": agent or None,
         "agents": _concerned(system, monitor),
         "information": system.law.information,
         "mode": system.mode,
-        "last_input": monitor[at : at + m].tolist(),
+        "last_input": monitor.last_u.tolist(),
     }
 
 
-def _concerned(system: System, monitor: NDArray[np.float64]) -> list[int]:
+def _concerned(system: System, monitor: Any) -> list[int]:
     """The agents, from 1, that an exit is of: in the constraint, or the one with the estimates."""
-    if monitor[watch.EXIT] == watch.DIVERGED:
+    if monitor.exit == watch.DIVERGED:
         return []
-    agent = int(monitor[watch.EXIT_AGENT])
-    members = system.game.in_constraint[int(monitor[watch.EXIT_CONSTRAINT])]
+    agent = int(monitor.exit_agent)
+    members = system.game.in_constraint[int(monitor.exit_constraint)]
     return [agent + 1] if agent >= 0 else sorted(i + 1 for i in members)
 
 
@@ -276,7 +274,7 @@ def _instead(system: System) -> str:
     return f"{', '.join(ways[:-1])} or {ways[-1]}"
 
 
-def _of_modes(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
+def _of_modes(system: System, monitor: Any) -> dict[str, Any]:
     """What each mode's runs report, by section; None in other modes."""
     found: dict[str, Any] = {each.section: None for each in MODES if each.section}
     mode = mode_of(system)
@@ -285,15 +283,13 @@ def _of_modes(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
     return found
 
 
-def _worst(
-    system: System, monitor: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _worst(system: System, monitor: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each constraint's greatest value and when, that at an exit included."""
-    worst, when = verdicts.worst_constraints(monitor[None], system.game.constraints_count)
+    worst, when = verdicts.worst_constraints(watch.together([monitor]))
     return worst[0], when[0]
 
 
-def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+def _worst_constraint(system: System, monitor: Any) -> dict[str, Any] | None:
     worst, when = _worst(system, monitor)
     index = int(np.argmax(worst))
     if not np.isfinite(worst[index]):
@@ -306,7 +302,7 @@ def _worst_constraint(system: System, monitor: NDArray[np.float64]) -> dict[str,
     }
 
 
-def _worst_gap(system: System, monitor: NDArray[np.float64]) -> dict[str, Any] | None:
+def _worst_gap(system: System, monitor: Any) -> dict[str, Any] | None:
     worst, when = _worst(system, monitor)
     bounds = system.game.gap_bounds
     if bounds is None or not np.any(np.isfinite(worst)):
@@ -359,30 +355,27 @@ def _epsilon(system: System) -> dict[str, Any]:
     }
 
 
-def _lyapunov(system: System, monitor: NDArray[np.float64], intervened: bool) -> dict[str, Any]:
-    start, rise = float(monitor[watch.STORAGE_START]), float(monitor[watch.STORAGE_RISE])
+def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:
+    start, rise = float(monitor.storage_start), float(monitor.storage_rise)
     about = system.known_equilibrium is not None  # V is about y*
     known = about and system.agents.knows_storage
-    unhindered = bool(monitor[watch.STARTED]) and not monitor[watch.SATURATED]
+    unhindered = bool(monitor.started) and not monitor.saturated
     claimed = known and unhindered and not intervened and Theorem(system).lyapunov
     return {
         "claimed": claimed,
         "known": known,
         "start": start if about else None,
-        "final": float(monitor[watch.STORAGE]) if about else None,
+        "final": float(monitor.storage) if about else None,
         "largest_rise": rise if about else None,
-        "largest_rise_time": float(monitor[watch.STORAGE_RISE_TIME])
-        if about and rise > 0
-        else None,
+        "largest_rise_time": float(monitor.storage_rise_time) if about and rise > 0 else None,
         "monotone": rise <= ROUNDING * max(start, 1.0) if about else None,
-        "observed_until": float(monitor[watch.TIME]),
-        "left": bool(monitor[watch.EXIT] != watch.INSIDE),
+        "observed_until": float(monitor.time),
+        "left": bool(monitor.exit != watch.INSIDE),
     }
 
 
-def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
-    m, p = system.game.actions, system.game.constraints_count
-    peak, when, rms, energy = (each[0] for each in verdicts.inputs(monitor[None], p, m))
+def _actuators(system: System, monitor: Any) -> dict[str, Any]:
+    peak, when, rms, energy = (each[0] for each in verdicts.inputs(watch.together([monitor])))
     agent = system.game.agent_of_action
     largest = int(np.argmax(peak))
     limits = system.agents.input_limit
@@ -396,12 +389,12 @@ def _actuators(system: System, monitor: NDArray[np.float64]) -> dict[str, Any]:
         "limits": None if np.all(np.isinf(limits)) else limits.tolist(),
         "saturated": None,
     }
-    if monitor[watch.SATURATED] > 0:
-        index = int(monitor[watch.SATURATED_ACTION])
+    if monitor.saturated > 0:
+        index = int(monitor.saturated_action)
         result["saturated"] = {
             "agent": int(agent[index]) + 1,
-            "time": float(monitor[watch.SATURATED_TIME]),
-            "demand": float(monitor[watch.SATURATED_DEMAND]),
-            "limit": float(limits_at(system, float(monitor[watch.SATURATED_TIME]))[index]),
+            "time": float(monitor.saturated_time),
+            "demand": float(monitor.saturated_demand),
+            "limit": float(limits_at(system, float(monitor.saturated_time))[index]),
         }
     return result

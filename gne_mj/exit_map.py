@@ -241,10 +241,9 @@ def _run(
     loop.pass_over(clock.steps(duration))
     loop.finish()
     raise_pending()
-    monitor, p = loop.monitor, system.game.constraints_count
-    if monitor[watch.EXIT] == watch.LEFT_SET:
-        return ("between" if monitor[watch.EXIT_BETWEEN] > 0 else "instant"), np.nan
-    if monitor[watch.EXIT] != watch.INSIDE:
+    monitor = loop.monitor
+    if monitor.exit == watch.LEFT_SET:
+        return ("between" if monitor.exit_between > 0 else "instant"), np.nan
+    if monitor.exit != watch.INSIDE:
         return "nothing", np.nan
-    at = int(watch.worst_at(p))
-    return "inside", float(-np.max(monitor[at : at + p]))
+    return "inside", float(-np.max(monitor.worst))

@@ -16,7 +16,8 @@ from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.graph import Graph
 from gne_mj.loops import faults as native
-from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Faults
+from gne_mj.loops.feedback import FAULT_KINDS, FaultNumbers, Faults
+from gne_mj.numbers import numbers
 
 LARGEST = 1e9  # what a fault may have in any unit
 
@@ -303,9 +304,11 @@ def for_native(faults: Sequence[Fault], game: Game, graph: Graph | None, seed: i
                 rows.append([target, fault.start, fault.end, fault.size, *fault.shape, stream])
                 counts[kind] += 1
     pointer = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    table = np.array(rows, dtype=np.float64).reshape(-1, FAULT_COLUMNS)
-    numbers = np.array([seed, sensor_delay(faults), message_delay(faults)], dtype=np.float64)
-    return Faults(table, pointer, numbers)
+    about = numbers(
+        FaultNumbers, seed=seed, sensor_delay=sensor_delay(faults),
+        message_delay=message_delay(faults),
+    )  # fmt: skip
+    return Faults(np.array(rows, dtype=np.float64).ravel(), pointer, about)
 
 
 def links_memory(

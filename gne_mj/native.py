@@ -36,7 +36,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 # Compiled division must give inf or nan, as NumPy does: numba's default raises, and a callback
 # that raises can only print. Without numba's run time ("_nrt") nothing can be allocated, which
 # the compiler then checks, and array views cost no reference counting (a factor of 20 here).
-_KERNEL: dict[str, Any] = {
+KERNEL: dict[str, Any] = {
     "error_model": "numpy",
     "_nrt": False,
     "forceinline": True,
@@ -56,7 +56,7 @@ INTERPRETED = bool(numba.config.DISABLE_JIT)  # numba is switched off
 
 def kernel(function: F) -> F:
     """Mark ``function`` as usable from native code (it stays an ordinary Python function)."""
-    marked: F = register_jitable(**_KERNEL)(function)
+    marked: F = register_jitable(**KERNEL)(function)
     marked.is_kernel = True  # type: ignore[attr-defined]
     return marked
 
@@ -164,13 +164,13 @@ def _address(typingctx: Any, array: Any) -> Any:
 
 
 def address_in(array):
-    """The address of an array's first entry."""
-    return array.ctypes.data
+    """The address of an array's first entry, or of numbers (:mod:`gne_mj.numbers`)."""
+    return np.asarray(array).ctypes.data
 
 
-@overload(address_in, jit_options=_KERNEL)
+@overload(address_in, jit_options=KERNEL)
 def _address_in(array):
-    return lambda array: _address(array)
+    return (lambda array: _address(array)) if isinstance(array, types.Array) else None
 
 
 @intrinsic_or(lambda array, shape: array[: math.prod(shape)].reshape(shape))
@@ -239,11 +239,11 @@ def call_number(function, arguments):
     return call(ctypes.c_double, function, arguments)
 
 
-@overload(call_integer, jit_options=_KERNEL)
+@overload(call_integer, jit_options=KERNEL)
 def _call_integer(function, arguments):
     return lambda function, arguments: _integer(function, arguments)
 
 
-@overload(call_number, jit_options=_KERNEL)
+@overload(call_number, jit_options=KERNEL)
 def _call_number(function, arguments):
     return lambda function, arguments: _number(function, arguments)

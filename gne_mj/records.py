@@ -1,8 +1,14 @@
-"""Records of arrays for native code: where each array lies follows from one declaration.
+"""Records for native code: where each array and each number lies follows from one declaration.
 
-A record is a NamedTuple whose fields say their shape, and that they hold whole numbers if so:
+A record is a NamedTuple whose fields say their shape, and that they hold whole numbers if so;
+single numbers that change are declared together (:mod:`gne_mj.numbers`):
+
+    class Clock(Numbers):
+        step: float
+        time: float
 
     class Work(NamedTuple):
+        now: Clock
         g: Annotated[np.ndarray, "p"]
         band: Annotated[np.ndarray, "m, 2 * b + 1"]
         index: Annotated[np.ndarray, "m", int]
@@ -10,7 +16,8 @@ A record is a NamedTuple whose fields say their shape, and that they hold whole 
 A field that is a record itself stands for its arrays; one that is a plain number is given by
 whoever reads. :func:`in_array` lays a record of floats out in one flat array, :func:`in_table`
 finds one in a table (:mod:`gne_mj.table`). Both write the kernels that a hand would write, so that
-neither compiling nor running costs more.
+neither compiling nor running costs more. For Python :func:`dtype_of` is the same layout as NumPy
+knows it, and :func:`by_name` the view of flat arrays by it.
 """
 
 import ast
@@ -21,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.native import kernel, shaped
+from gne_mj.numbers import Numbers, are_whole, flat, names_of, numbers, numbers_in
 from gne_mj.table import floats, integers
 
 
@@ -43,17 +51,54 @@ class Field(NamedTuple):
         assert isinstance(written, ast.Tuple)
         return [ast.unparse(extent) for extent in written.elts]
 
+    def evaluated(self, names: dict[str, Any]) -> tuple[int, ...]:
+        """Its shape, the names in it standing for this."""
+        found: tuple[int, ...] = eval(f"({self.shape},)", dict(names))  # of our own declarations
+        return found
+
 
 def fields(record: Any) -> dict[str, Any]:
-    """By name: a :class:`Field`, another record, or None for a plain number."""
+    """By name: a :class:`Field`, another record or class of numbers, None for a plain number."""
     found: dict[str, Any] = {}
     for name, kind in get_type_hints(record, include_extras=True).items():
         if get_origin(kind) is Annotated:
             _, shape, *more = get_args(kind)
             found[name] = Field(name, shape, int in more)
         else:
-            found[name] = kind if hasattr(kind, "_fields") else None
+            found[name] = kind if hasattr(kind, "_fields") or _are_numbers(kind) else None
     return found
+
+
+def _are_numbers(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Numbers)
+
+
+def dtype_of(record: Any, **known: Any) -> np.dtype[Any]:
+    """The layout of a record that lies in one flat array, for NumPy.
+
+    Numbers in it are among its own fields; ``known`` is what shapes use.
+    """
+    return np.dtype((np.record, _parts(record, known)))
+
+
+def _parts(record: Any, known: dict[str, Any]) -> list[tuple[Any, ...]]:
+    parts: list[tuple[Any, ...]] = []
+    for name, field in fields(record).items():
+        if isinstance(field, Field):
+            item = np.int64 if field.whole else np.float64
+            parts.append((name, item, field.evaluated(known)))
+        elif _are_numbers(field):
+            item = np.int64 if are_whole(field) else np.float64
+            parts += [(each, item) for each in names_of(field)]
+        else:
+            parts.append((name, dtype_of(field, **known)))
+    return parts
+
+
+def by_name(flat: NDArray[Any], dtype: np.dtype[Any]) -> Any:
+    """The record that flat arrays (..., length) begin with: of one array itself, else (...)."""
+    found = flat[..., : dtype.itemsize // 8].view(dtype)
+    return found[0] if found.ndim == 1 else found[..., 0].view(np.recarray)
 
 
 def arrays(values: Any) -> list[NDArray[Any]]:
@@ -63,6 +108,8 @@ def arrays(values: Any) -> list[NDArray[Any]]:
         value = getattr(values, name)
         if isinstance(field, Field):
             found.append(value)
+        elif _are_numbers(field):
+            found.append(flat(value))
         elif field is not None:
             found += arrays(value)
     return found
@@ -70,8 +117,13 @@ def arrays(values: Any) -> list[NDArray[Any]]:
 
 def count(record: Any) -> int:
     """How many arrays it has."""
-    nested = fields(record).values()
-    return sum(1 if isinstance(f, Field) else 0 if f is None else count(f) for f in nested)
+    return sum(map(_arrays_of, fields(record).values()))
+
+
+def _arrays_of(field: Any) -> int:
+    if field is None:
+        return 0
+    return 1 if isinstance(field, Field) or _are_numbers(field) else count(field)
 
 
 def place(record: Any, name: str) -> int:
@@ -84,7 +136,7 @@ def place(record: Any, name: str) -> int:
     for other, field in fields(record).items():
         if other == name:
             return at
-        at += 1 if isinstance(field, Field) else 0 if field is None else count(field)
+        at += _arrays_of(field)
     raise KeyError(name)
 
 
@@ -92,9 +144,17 @@ def fresh(record: Any, **names: Any) -> Any:
     """A record of zeros, ``names`` being what the names in its shapes stand for."""
     made = []
     for field in fields(record).values():
-        shape = eval(f"({field.shape},)", names)  # of our own declarations
-        made.append(np.zeros(shape, dtype=np.int64 if field.whole else np.float64))
+        if _are_numbers(field):
+            made.append(numbers(field))
+        else:
+            item = np.int64 if field.whole else np.float64
+            made.append(np.zeros(field.evaluated(names), dtype=item))
     return record(*made)
+
+
+def shapes(record: Any, **names: Any) -> list[tuple[int, ...]]:
+    """The shapes of a record's arrays, ``names`` being what the names in them stand for."""
+    return [field.evaluated(names) for field in fields(record).values()]
 
 
 def in_array(
@@ -111,19 +171,50 @@ def in_array(
         ``length(*sizes)``: its number of entries; and ``views(flat, at, *sizes)``: the record, of
         views into an array from entry ``at`` on.
     """
-    parts, names = list(fields(record).values()), ", ".join(sizes.split())
-    lines = [f"def length({names}):", f"    return {' + '.join(part.size for part in parts)}"]
-    lines += [f"def views(flat, at, {names}):", "    end = at"]
-    for part in parts:
-        view = "flat[begin:end]"
-        lines += ["    begin = end", f"    end = begin + {part.size}"]
-        if len(part.extents) > 1:
-            view += f".reshape(({part.shape}))"
-        lines.append(f"    {part.name}_ = {view}")
-    given = ", ".join(f"{part.name}_" for part in parts)
-    lines.append(f"    return record({given})")
-    made = _define(record, lines, known)
+    lines: list[str] = []
+    lengths: list[str] = []
+    used: dict[str, Any] = {}
+    result = _laid(record, "", lines, lengths, used)
+    names = ", ".join(sizes.split())
+    text = [f"def length({names}):", f"    return {' + '.join(lengths)}"]
+    text += [f"def views(flat, at, {names}):", "    end = at", *lines, f"    return {result}"]
+    made = _define(record, text, {**used, **known})
     return made["length"], made["views"]
+
+
+def _laid(
+    record: Any, prefix: str, lines: list[str], lengths: list[str], used: dict[str, Any]
+) -> str:
+    """Add the lines that view a record's parts; the expression that makes the record."""
+    given = []
+    kind = f"{prefix}record"
+    used[kind] = record
+    for name, field in fields(record).items():
+        variable = f"{prefix}{name}_"
+        if isinstance(field, Field):
+            lengths.append(field.size)
+            view = "flat[begin:end]"
+            if len(field.extents) > 1:
+                view += f".reshape(({field.shape}))"
+        elif _are_numbers(field):
+            lengths.append(str(len(names_of(field))))
+            view = f"{variable}numbers(flat, begin)"
+            used[f"{variable}numbers"] = numbers_in(field)
+        else:
+            given.append(_laid(field, variable, lines, lengths, used))
+            continue
+        lines += ["    begin = end", f"    end = begin + {lengths[-1]}", f"    {variable} = {view}"]
+        given.append(variable)
+    return f"{kind}({', '.join(given)})"
+
+
+def columns_in(record: Any, first: int) -> Callable[..., Any]:
+    """The kernel ``read(table)`` of a record's arrays, flat whatever their shapes."""
+    given = ", ".join(f"floats(table, {first + at})" for at in range(count(record)))
+    read: Callable[..., Any] = _define(
+        record, ["def read(table):", f"    return record({given})"], {}
+    )["read"]
+    return read
 
 
 def in_table(record: Any, first: int = 0, **known: Any) -> Callable[..., Any]:
@@ -139,27 +230,31 @@ def in_table(record: Any, first: int = 0, **known: Any) -> Callable[..., Any]:
         those that its shapes depend on, by name in alphabetical order.
     """
     lines: list[str] = []
-    numbers: set[str] = set()
+    asked: set[str] = set()
     names = dict(known)
-    result = _read(record, first, lines, numbers, names)
-    given = "".join(f", {name}" for name in sorted(numbers - set(known)))
+    result = _read(record, first, lines, asked, names)
+    given = "".join(f", {name}" for name in sorted(asked - set(known)))
     head = f"def read(table{given}):"
     made = _define(record, [head, *lines, f"    return {result}"], names)
     read: Callable[..., Any] = made["read"]
     return read
 
 
-def in_numbers(record: Any, at: int) -> Callable[..., Any]:
-    """The kernel ``read(table)`` of a record of whole numbers, which are one array of a table."""
-    given = ", ".join(f"n[{entry}]" for entry in range(len(record._fields)))
+def in_numbers(record: Any, at: int, first: int = 0) -> Callable[..., Any]:
+    """The kernel ``read(table)`` of a record of whole numbers, in one array of a table.
+
+    Args:
+        record: which.
+        at: the array's place in the table.
+        first: the entry that it begins with.
+    """
+    given = ", ".join(f"n[{first + entry}]" for entry in range(len(record._fields)))
     lines = ["def read(table):", f"    n = integers(table, {at})", f"    return record({given})"]
     read: Callable[..., Any] = _define(record, lines, {})["read"]
     return read
 
 
-def _read(
-    record: Any, first: int, lines: list[str], numbers: set[str], names: dict[str, Any]
-) -> str:
+def _read(record: Any, first: int, lines: list[str], asked: set[str], names: dict[str, Any]) -> str:
     """Add the lines that read a record's arrays; the expression that makes the record."""
     kind = f"record_{len(names)}"
     names[kind] = record
@@ -171,17 +266,22 @@ def _read(
             if len(field.extents) > 1:
                 lines.append(f"    n = len({variable})")
                 lines.append(f"    {variable}_ = shaped({variable}, ({field.shape}))")
-                numbers |= _names_in(field.shape) - {"n"}
+                asked |= _names_in(field.shape) - {"n"}
                 variable += "_"
             given.append(variable)
             at += 1
+        elif _are_numbers(field):
+            names[f"numbers_{at}"] = numbers_in(field)
+            item = "integers" if are_whole(field) else "floats"
+            given.append(f"numbers_{at}({item}(table, {at}), 0)")
+            at += 1
         elif field is None:
-            numbers.add(name)
+            asked.add(name)
             given.append(name)
         else:
-            given.append(_read(field, at, lines, numbers, names))
+            given.append(_read(field, at, lines, asked, names))
             at += count(field)
-    numbers.discard("table")
+    asked.discard("table")
     return f"{kind}({', '.join(given)})"
 
 

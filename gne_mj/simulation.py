@@ -241,7 +241,7 @@ class SystemRun:
     @property
     def inside(self) -> bool:
         """Whether the run has not left its set."""
-        return bool(self.loop.monitor[watch.EXIT] == watch.INSIDE)
+        return bool(self.loop.monitor.exit == watch.INSIDE)
 
     def step(self) -> Snapshot:
         """One integration step; what is returned is its beginning."""

@@ -5,7 +5,7 @@ Trajectories, rows and summaries of batches, the live page, replays and figures 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -124,7 +124,7 @@ class Rows:
 
 def changed(samples: Samples, change: Callable[[Array], Array]) -> Samples:
     """The same of every column."""
-    return Samples(*(change(getattr(samples, each.name)) for each in fields(Samples)))
+    return Samples(*(change(column) for column in samples))
 
 
 def axis_of(system: System) -> str:

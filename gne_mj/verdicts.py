@@ -4,7 +4,7 @@ Arrays have a row for each run. A single run's certificate is made by the same r
 figures.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,19 +34,17 @@ class Inputs(NamedTuple):
     energy: NDArray[np.float64]  # integral of u y
 
 
-def status(
-    monitors: NDArray[np.float64], tail: NDArray[np.float64], tolerance: float
-) -> NDArray[np.str_]:
+def status(monitors: Any, tail: NDArray[np.float64], tolerance: float) -> NDArray[np.str_]:
     """(runs,) how each run ended, having run its time or left.
 
     Args:
-        monitors: (runs, :func:`gne_mj.loops.monitor.length`).
+        monitors: (runs,), see :func:`gne_mj.loops.monitor.fresh`.
         tail: (runs,) greatest distance over the last part, see :func:`tail_distance`.
         tolerance: of ``converged``.
     """
     found = np.where(tail <= tolerance, "converged", "completed").astype(STATUS)
     for code, name in EXITS.items():
-        found[monitors[:, watch.EXIT] == code] = name
+        found[monitors.exit == code] = name
     return found
 
 
@@ -75,9 +73,7 @@ def settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> N
     return np.append(time, np.nan)[last + 1]
 
 
-def check_numbers(
-    game: Game, monitor: NDArray[np.float64], y: NDArray[np.float64], reach: float
-) -> None:
+def check_numbers(game: Game, monitor: Any, y: NDArray[np.float64], reach: float) -> None:
     """Where a run ended since something is no longer a number, see whether the game is why.
 
     Args:
@@ -90,36 +86,29 @@ def check_numbers(
     Raises:
         UserCodeError: a function of the game raises there, or returns what is not a number.
     """
-    if monitor[watch.EXIT] != watch.DIVERGED or not np.all(np.isfinite(y)):
+    if monitor.exit != watch.DIVERGED or not np.all(np.isfinite(y)):
         return
-    at = int(watch.inputs_at(game.constraints_count)) + 5 * game.actions
-    push = np.nan_to_num(monitor[at : at + game.actions], posinf=0.0, neginf=0.0)
+    push = np.nan_to_num(monitor.last_u, posinf=0.0, neginf=0.0)
     for share in (0.0, 0.5, 1.0):
         game.check_numbers(y + share * reach * push)
 
 
-def worst_constraints(
-    monitors: NDArray[np.float64], p: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def worst_constraints(monitors: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each constraint's greatest g and when in s, both (runs, p), that at an exit included.
 
     Of a run in which nothing was observed it is minus infinity.
     """
-    at = int(watch.worst_at(p))
-    worst, when = monitors[:, at : at + p].copy(), monitors[:, at + p : at + 2 * p].copy()
-    worst[monitors[:, watch.STARTED] == 0.0] = -np.inf
-    for run in np.flatnonzero(monitors[:, watch.EXIT] == watch.LEFT_SET).tolist():
-        index, value = int(monitors[run, watch.EXIT_CONSTRAINT]), monitors[run, watch.EXIT_VALUE]
+    worst, when = monitors.worst.copy(), monitors.worst_time.copy()
+    worst[monitors.started == 0.0] = -np.inf
+    for run in np.flatnonzero(monitors.exit == watch.LEFT_SET).tolist():
+        index, value = int(monitors.exit_constraint[run]), monitors.exit_value[run]
         if value > worst[run, index]:
-            worst[run, index], when[run, index] = value, monitors[run, watch.EXIT_TIME]
+            worst[run, index], when[run, index] = value, monitors.exit_time[run]
     return worst, when
 
 
-def inputs(monitors: NDArray[np.float64], p: int, m: int) -> Inputs:
-    """What actuators had to deliver, of runs with p constraints and m actions."""
-    at = int(watch.inputs_at(p))
-    parts = monitors[:, at : at + 4 * m].reshape(len(monitors), 4, m)
-    peak, peak_time, square, energy = np.moveaxis(parts, 1, 0)
-    elapsed = monitors[:, watch.TIME, None]
+def inputs(monitors: Any) -> Inputs:
+    """What actuators had to deliver in each run."""
+    square, elapsed = monitors.square, monitors.time[:, None]
     rms = np.sqrt(np.divide(square, elapsed, out=np.zeros_like(square), where=elapsed > 0))
-    return Inputs(peak, peak_time, rms, energy)
+    return Inputs(monitors.peak, monitors.peak_time, rms, monitors.energy)

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gne_mj.loops import functions, implicit
+from gne_mj.loops import functions, implicit, layout
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import inside, work
-from gne_mj.loops.layout import problem_and_table
 from gne_mj.loops.newton import solver_in
 from gne_mj.plants import held_map
 from gne_mj.plants.functions import compiled_functions
@@ -28,6 +27,7 @@ class Parts(NamedTuple):
     work: Any
     monitor: Any
     solver: Any
+    loop: layout.Parts  # of the above, as a loop has them
 
 
 class Instants(NamedTuple):
@@ -48,16 +48,16 @@ def parts_of(system, timing):
     solver = solver_in(scratch.solver, setup.problem.order, p, states)
     kind = system.agents.kind
     channels = Channels(system.agents.parameters, setup.rest, compiled_functions(kind), kind.OUTPUT)
-    problem, table = problem_and_table(setup, system.agents, len(system.loop_memory))
-    return Parts(
-        problem, table, channels, setup.clock, scratch, np.zeros(watch.length(m, p)), solver
-    )
+    problem, table = layout.problem_and_table(setup, system.agents, len(system.loop_memory))
+    monitor, clock = watch.fresh(m, p), setup.clock
+    loop = layout.Parts(problem, channels, clock, monitor, monitor, np.zeros(m), scratch)
+    return Parts(problem, table, channels, clock, scratch, monitor, solver, loop)
 
 
 def run_plain(system, timing, periods, plant=held_map):
     """So many control periods in mode implicit, from the start on, ``plant`` predicting."""
     parts, faults = parts_of(system, timing), system.fault_kernels
-    problem, _table, channels, clock, scratch, monitor, _ = parts
+    problem, _table, channels, clock, scratch, monitor, _solver, loop = parts
     state, memory = system.state.ravel().copy(), system.loop_memory.copy()
     rows = []
     for k in range(periods):
@@ -67,13 +67,11 @@ def run_plain(system, timing, periods, plant=held_map):
         assert inside(problem, time, 0, scratch.y, scratch, monitor)
         if k:
             functions.propagate(problem, scratch.held, memory, scratch.scratch)
-        faults.begin(channels, problem, clock, step, 0, state, memory, scratch)
+        at = layout.Instant(time, step, 0)
+        faults.begin(loop, at, state, memory)
         before = memory.copy()
-        assert implicit.act(
-            faults, plant, (), problem, channels, clock, time, step, state, memory, scratch,
-            monitor,
-        )  # fmt: skip
-        faults.deliver(problem, clock, step, 0, scratch)
+        assert implicit.act(faults, plant, (), loop, at, state, memory)
+        faults.deliver(problem, clock, step, scratch)
         row = (scratch.y, scratch.u, before, scratch.seen)
         rows.append([array.copy() for array in row])
         plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))

@@ -97,15 +97,15 @@ def test_partial_information_with_enough_coupling(count, above, log_tau, seed):
             system, h / refine, steps * refine, every=stride * refine
         )
         monitor = loop.monitor
-        assert monitor[watch.EXIT] == watch.INSIDE
-        assert np.all(monitor[watch.worst_at(count) :][:count] < 0)  # at every step
+        assert monitor.exit == watch.INSIDE
+        assert np.all(monitor.worst < 0)  # at every step
         values = storages(
             states[:, :, 0], memory, equilibrium, tau,
             lambda x: 0.5 * (x - equilibrium) @ (x - equilibrium),
         )  # fmt: skip
-        assert monitor[watch.STORAGE_START] == pytest.approx(values[0], rel=1e-12)
-        assert monitor[watch.STORAGE] == pytest.approx(values[-1], rel=1e-9, abs=1e-12)
-        found.append((values, monitor[watch.STORAGE_RISE]))
+        assert monitor.storage_start == pytest.approx(values[0], rel=1e-12)
+        assert monitor.storage == pytest.approx(values[-1], rel=1e-9, abs=1e-12)
+        found.append((values, monitor.storage_rise))
     coarse, fine = found[0][0], found[1][0]
     error = np.max(np.abs(coarse - fine)) + 1e-13 * coarse[0]
     assert rises(coarse) <= error
@@ -124,7 +124,7 @@ def test_full_information_of_drawn_games(count, seed):
     values = []
     for refine in (1, 2):
         states, _, _, loop = run_loop(system, h / refine, steps * refine, every=refine)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         assert np.all(game.constraints(states[:, :, 0]) < 0)
         values.append(0.5 * np.sum((states[:, :, 0] - oracle.v0) ** 2, axis=1))
     error = np.max(np.abs(values[0] - values[1])) + 1e-13 * values[0][0]
@@ -150,7 +150,7 @@ def test_all_laws_of_drawn_games_end_at_one_equilibrium(count, seed):
         h = min(0.01, 0.5 * largest_step(system))
         steps = round(400.0 / h)
         states, _, _, loop = run_loop(system, h, steps, every=steps)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         ends.append(states[-1, :, 0])
     assert np.max(np.abs(np.array(ends) - system.equilibrium.action)) < 1e-6
 
@@ -170,7 +170,7 @@ def test_robots_in_mujoco_end_at_the_equilibrium_under_partial_information():
     rest = robot.equilibrium(equilibrium)
     for refine in (1, 2):
         states, _, memory, loop = run_loop(system, h / refine, 4000 * refine, every=refine)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         values = storages(
             states[::10], memory[::10], equilibrium, 0.05, lambda x: robot.storage(x[:, :3], rest)
         )
@@ -178,9 +178,9 @@ def test_robots_in_mujoco_end_at_the_equilibrium_under_partial_information():
     coarse, monitor = found[0]
     error = np.max(np.abs(coarse - found[1][0])) + 1e-13 * coarse[0]
     assert rises(coarse) <= error
-    assert monitor[watch.STORAGE_RISE] <= error
-    assert monitor[watch.STORAGE_START] == pytest.approx(coarse[0], rel=1e-12)
-    assert monitor[watch.STORAGE] == pytest.approx(coarse[-1], rel=1e-9)
+    assert monitor.storage_rise <= error
+    assert monitor.storage_start == pytest.approx(coarse[0], rel=1e-12)
+    assert monitor.storage == pytest.approx(coarse[-1], rel=1e-9)
 
 
 @pytest.mark.slow
@@ -196,7 +196,7 @@ def test_robots_under_all_laws_end_at_the_same_equilibrium():
         h = min(0.005, 0.5 * largest_step(system))
         steps = round(duration / h)
         states, _, _, loop = run_loop(system, h, steps, every=steps)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         assert np.max(np.abs(states[-1, :, 1] - V0)) < 1e-6
 
 
@@ -214,7 +214,7 @@ def test_channels_under_all_laws_end_at_the_same_equilibrium(agents):
         h = 0.001
         steps = round(duration / h)
         states, _, _, loop = run_loop(system, h, steps, every=steps)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         assert np.max(np.abs(states[-1, :, 0] - expected)) < 1e-6
 
 
@@ -247,4 +247,4 @@ def test_v_rises_where_the_coupling_is_too_weak(count, seed):
         memory=law.initial_memory(y, oracle.v0 + errors),
     )  # fmt: skip
     monitor = run_loop(system, 0.001, 10)[3].monitor
-    assert monitor[watch.STORAGE_RISE] > 1e-6 * monitor[watch.STORAGE_START]
+    assert monitor.storage_rise > 1e-6 * monitor.storage_start

@@ -15,7 +15,6 @@ from gne_mj.controllers import FullInformation
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium, variational_equilibrium
 from gne_mj.errors import InvalidInput
 from gne_mj.games import cournot_game
-from gne_mj.loops import monitor as watch
 from gne_mj.scenario import load_scenario
 from gne_mj.system import System
 
@@ -131,7 +130,7 @@ def test_the_closed_loop_equals_an_independent_one():
         "firms", cournot_game(10), integrators(10), FullInformation(), 0.1, y[:, None].copy()
     )
     states, *_, loop = run_loop(system, 0.001, 200)
-    assert loop.monitor[watch.DIVIDED] == 0
+    assert loop.monitor.divided == 0
     rate = reference.closed_loop_rate(reference.Integrator(), "full_information", oracle, 0.1)
     assert np.allclose(
         states[:, :, 0], reference.rk4_fixed(rate, y, 0.001, 200), rtol=1e-12, atol=1e-11

@@ -31,6 +31,8 @@ from gne_mj.faults import Bias
 from gne_mj.games import ten_channels
 from gne_mj.loops import division, faultless
 from gne_mj.loops import monitor as watch
+from gne_mj.numbers import numbers
+from gne_mj.records import fresh
 from gne_mj.simulation import Simulation
 from gne_mj.theory import certify
 
@@ -93,9 +95,9 @@ def test_robots_near_their_bounds_follow_continuous_time(name, engine):
     system = robot_system(state, numbers, engine=engine)
     h, steps = 0.002, 100
     states, u, _, loop = run_loop(system, h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.DIVIDED] > 0
-    assert 0.0 < loop.monitor[watch.SMALLEST_STEP] < h
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.divided > 0
+    assert 0.0 < loop.monitor.smallest_step < h
     assert np.all(np.isfinite(u))
     expected = robots_outputs(state, numbers, h * np.arange(steps + 1))
     assert relative_error(states[:, :, 1], expected) < 1e-6
@@ -106,8 +108,8 @@ def test_channels_with_a_small_penalty_follow_continuous_time():
     system = osnr_system(integrators(10), FullInformation(), 0.2, rho=1e-4)
     h, steps = 0.002, 150
     states, _, _, loop = run_loop(system, h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.DIVIDED] > 0
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.divided > 0
     p = ten_channels()
     weight, gain = np.array(p["utility_weight"]), np.array(p["gain"])
     interference = np.array(p["system_matrix"]) * (1.0 - np.eye(10))
@@ -130,7 +132,7 @@ def test_a_divided_run_is_the_same_however_it_is_cut(engine):
     at_once, in_parts = (system.closed_loop(clock(0.01, 1.0)) for _ in range(2))
     whole = at_once.advance(20, 1)
     rows = [in_parts.advance(n, 1) for n in (1, 1, 3, 10, 5)]
-    assert at_once.monitor[watch.DIVIDED] > 3
+    assert at_once.monitor.divided > 3
     assert np.array_equal(whole.state, np.concatenate([part.state for part in rows]))
     assert np.array_equal(whole.input, np.concatenate([part.input for part in rows]))
     assert np.array_equal(at_once.monitor, in_parts.monitor)
@@ -142,11 +144,11 @@ def test_whole_steps_come_back_behind_the_boundary(engine):
     system = robot_system(robot_state(NEAR), engine=engine)
     loop = system.closed_loop(clock(0.002, 10.0))
     loop.advance(1, 100)
-    divided, steps = loop.monitor[watch.DIVIDED], loop.monitor[watch.STEPS]
+    divided, steps = loop.monitor.divided, loop.monitor.steps
     assert 0 < divided < 30
     loop.advance(1, 400)
-    assert loop.monitor[watch.DIVIDED] == divided
-    assert loop.monitor[watch.STEPS] == steps + 400
+    assert loop.monitor.divided == divided
+    assert loop.monitor.steps == steps + 400
     assert loop.time == pytest.approx(1.0)
 
 
@@ -154,8 +156,8 @@ def test_whole_steps_come_back_behind_the_boundary(engine):
 def test_euler_too_stays_inside(engine):
     system = robot_system(robot_state(NEAR), engine=engine, integrator="euler")
     states, _, _, loop = run_loop(system, 0.01, 50)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.DIVIDED] > 0
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.divided > 0
     expected = robots_outputs(robot_state(NEAR), EQUAL, 0.01 * np.arange(51))
     assert relative_error(states[:, :, 1], expected) < 0.05  # a method of first order
 
@@ -264,7 +266,7 @@ def room_for_pieces(m, p):
     """Those arrays of a loop's that pieces are judged by."""
     return SimpleNamespace(
         y=np.zeros(m), g=np.zeros(p), u=np.zeros(m), demand=np.zeros(m),
-        division=np.zeros(division.length(m, p)),
+        division=numbers(division.Division), stages=fresh(division.Stages, m=m, p=p),
     )  # fmt: skip
 
 
@@ -276,53 +278,53 @@ def test_pieces_fill_their_steps_whatever_fails(guarded, outcomes):
     """Each begins to the bit where the one before ended, on the grid of its own length."""
     h, step = 0.007, 3
     problem = SimpleNamespace(settings=np.full(settings_of_laws.COUNT, float(guarded)))
-    work, monitor = room_for_pieces(1, 1), np.zeros(watch.length(1, 1))
+    work, monitor = room_for_pieces(1, 1), watch.fresh(1, 1)
     divided, time = work.division, step * h
     for outcome in outcomes:
-        length, level = division.piece(divided, h), divided[division.LEVEL]
+        length, level = division.piece(divided, h), divided.level
         assert division.begins(divided, step, h) == time
-        assert divided[division.POSITION] % (division.UNITS * (length / h)) == 0
+        assert divided.position % (division.UNITS * (length / h)) == 0
         assert length == h / 2**level
         assert level <= (division.FINEST if guarded else division.DEEPEST)
         if outcome in ("fails", "leaves"):
             if outcome == "leaves":
                 watch.leave(monitor, watch.LEFT_SET, time, -1, 0, 1.0, 0)
             if division.halve(faultless, step, h, 0, problem, work, monitor):
-                assert monitor[watch.EXIT] == watch.INSIDE
+                assert monitor.exit == watch.INSIDE
                 continue
             own = outcome == "leaves" and level == division.DEEPEST
-            assert monitor[watch.EXIT] == (watch.LEFT_SET if own else watch.STEP_TOO_SMALL)
-            assert monitor[watch.EXIT_TIME] == time
+            assert monitor.exit == (watch.LEFT_SET if own else watch.STEP_TOO_SMALL)
+            assert monitor.exit_time == time
             assert level >= division.FINEST
             return
-        divided[division.EASY] = float(outcome == "easy")
+        divided.easy = float(outcome == "easy")
         time = division.ends(divided, step, h)
         step += division.go_on(divided, h, monitor)
         assert time == pytest.approx(division.begins(divided, step, h), abs=0.0)
-        assert monitor[watch.DIVIDED] <= step - 3
+        assert monitor.divided <= step - 3
 
 
 def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
     problem = SimpleNamespace(settings=np.zeros(settings_of_laws.COUNT))
-    work, monitor = room_for_pieces(1, 1), np.zeros(watch.length(1, 1))
-    work.division[division.LEVEL] = division.FINEST
+    work, monitor = room_for_pieces(1, 1), watch.fresh(1, 1)
+    work.division.level = division.FINEST
     stood = 0
     while True:
         watch.leave(monitor, watch.LEFT_SET, 0.0, -1, 0, 1.0, 0)
         if not division.halve(faultless, 0, 0.1, 0, problem, work, monitor):
             break
         division.go_on(work.division, 0.1, monitor)
-        work.division[division.LEVEL] = division.DEEPEST - 1
+        work.division.level = division.DEEPEST - 1
         stood += 1
     assert stood == division.PIECES
-    assert monitor[watch.EXIT] == watch.STEP_TOO_SMALL
+    assert monitor.exit == watch.STEP_TOO_SMALL
 
 
 def test_a_slack_is_used_up_by_stages_too():
     """Three quarters at the second stage, none at the end; and twice as much at the third."""
     work = room_for_pieces(1, 2)
     problem = SimpleNamespace(data=SimpleNamespace(tightening=np.array([0.0, 0.5])))
-    stages = division.stages_of(work.division, 1, 2)
+    stages = work.stages
     stages.g[:] = [-1.0, -1.5, -0.25, -1.5, -1.0, -2.5, -1.0, -1.5]  # stage by stage
     work.g[:] = [-1.0, -1.25]
     assert division.use_of(4, problem, work, stages, 0) == (0.75, 0.0)

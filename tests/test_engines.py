@@ -145,8 +145,8 @@ class Case:
 
     def run(self, h, steps, control=None, every=1, **options):
         states, u, memory, loop = run_loop(self.system(**options), h, steps, control, every)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
-        self.divided = loop.monitor[watch.DIVIDED]
+        assert loop.monitor.exit == watch.INSIDE
+        self.divided = loop.monitor.divided
         return self.flat(states, memory), u
 
     def memories(self, step):

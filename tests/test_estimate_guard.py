@@ -65,23 +65,23 @@ def test_an_estimate_that_leaves_ends_the_run(mode, epsilon, h, integrator, engi
         loop = system.closed_loop(clock(h, 20.0, 5 * h))
         recorded = loop.advance(1000, 1)
         monitor = loop.monitor
-        assert monitor[watch.EXIT] == watch.ESTIMATE_LEFT
-        agent, constraint = int(monitor[watch.EXIT_AGENT]), int(monitor[watch.EXIT_CONSTRAINT])
+        assert monitor.exit == watch.ESTIMATE_LEFT
+        agent, constraint = int(monitor.exit_agent), int(monitor.exit_constraint)
         assert constraint in (agent, agent + 1)
         done, stopped = round(loop.time / h), mode == "continuous"
         if stopped:  # within a step whose pieces became finer and finer, and which was not taken
-            assert done * h < monitor[watch.EXIT_TIME] <= (done + 1) * h + 1e-12
-            assert 0 < monitor[watch.SMALLEST_STEP] < h / 64
+            assert done * h < monitor.exit_time <= (done + 1) * h + 1e-12
+            assert 0 < monitor.smallest_step < h / 64
         else:
-            assert monitor[watch.EXIT_TIME] == pytest.approx(done * h, abs=1e-12)
+            assert monitor.exit_time == pytest.approx(done * h, abs=1e-12)
         assert len(recorded.input) == done + stopped
         stage = 0 if not stopped else 1
         last = loop.finish()
         z, estimates = last.memory[0, 25:], last.memory[0, :25].reshape(5, 5)
         margins = reference.estimate_margins(game, z, estimates)
         if stage == 0:
-            assert margins[agent, constraint] == pytest.approx(monitor[watch.EXIT_VALUE], rel=1e-9)
-            assert monitor[watch.EXIT_VALUE] >= 0
+            assert margins[agent, constraint] == pytest.approx(monitor.exit_value, rel=1e-9)
+            assert monitor.exit_value >= 0
         else:  # the state and memory before the step, both inside
             own = [margins[i, [i, i + 1][: 5 - i]] for i in range(5)]
             assert max(map(np.max, own)) < 0
@@ -248,7 +248,7 @@ def growth(system, h, steps=1000):
     count = system.game.agents
     others = ~np.eye(count, dtype=bool)
     first, last = (row[: count**2].reshape(count, count)[others] - V0 for row in memory)
-    return np.max(np.abs(last)) / np.max(np.abs(first)), loop.monitor[watch.DIVIDED]
+    return np.max(np.abs(last)) / np.max(np.abs(first)), loop.monitor.divided
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])

@@ -120,7 +120,7 @@ def test_actuators_deliver_the_least_of_their_limits():
         (0, [-2.0, 2.0, 2.0, -2.0, 1.0]), (1, [-0.5, 0.5, 2.0, -2.0, 1.0]),
         (2, [-0.5, 0.25, 2.0, -2.0, 1.0]), (3, [-2.0, 0.25, 2.0, -2.0, 1.0]),
     ):  # fmt: skip
-        native.deliver(parts.problem, parts.clock, step, 0, parts.work)
+        native.deliver(parts.problem, parts.clock, step, parts.work)
         assert parts.work.u.tolist() == expected
 
 

@@ -50,13 +50,13 @@ def test_the_input_is_the_law_at_the_next_outputs(integrator, h, steps):
     )
     system = robot_system(start, UNEQUAL, mode="implicit", integrator=integrator)
     state, u, _, loop = instants(system, h, 60, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     expected = [reference.full_information(GAME, RHO, y) for y in state[1:, :, 1]]
     assert np.max(np.abs(u - expected)) < 2e-6 * np.max(np.abs(expected))
-    assert loop.monitor[watch.UNSOLVED] == 0
-    assert loop.monitor[watch.NOT_MONOTONE] == 0
-    assert loop.monitor[watch.PREDICTION] < 1e-8
-    assert loop.monitor[watch.SOLUTIONS] == 61
+    assert loop.monitor.unsolved == 0
+    assert loop.monitor.not_monotone == 0
+    assert loop.monitor.prediction < 1e-8
+    assert loop.monitor.solutions == 61
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_curved_bounds_in_the_plane(steps):
         integrator="euler",
     )  # fmt: skip
     states, u, _, loop = instants(system, 0.005, 40, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     expected = [reference.full_information(oracle, RHO, row) for row in states[1:, :, 1]]
     assert np.max(np.abs(u - expected)) < 1e-6 * np.max(np.abs(expected))
 
@@ -101,7 +101,7 @@ def test_partial_information_is_implicit_in_the_true_outputs():
     law = PartialInformation(graphs.ring(5), 2.0, 0.5)
     system = robot_system(robot_state(FIVE), law=law, mode="implicit", integrator="euler")
     states, u, memory, loop = instants(system, 0.01, 40, 1)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     laplacian = reference.laplacian(5, law.graph.edges)
     for k in range(40):
         y = states[k + 1, :, 1]
@@ -128,7 +128,7 @@ def test_each_agent_alone_keeps_to_its_share(partial):
         decentralised=True,
     )  # fmt: skip
     states, u, memory, loop = instants(system, 0.01, 40, 2)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     for k in range(40):
         now, after = states[k, :, 1], states[k + 1, :, 1]
         for i in range(5):
@@ -168,7 +168,7 @@ def test_fully_distributed_looks_where_z_will_be():
     law = FullyDistributed(graphs.ring(5), 0.05, 0.7)
     system = robot_system(robot_state(FIVE), law=law, mode="implicit", integrator="euler")
     states, u, memory, loop = instants(system, 0.01, 20, 1)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     stays = np.exp(-0.01 / 0.05)
     for k in range(20):
         rows, z = memory[k][:25].reshape(5, 5), memory[k][25:]
@@ -207,8 +207,8 @@ def test_no_start_leaves_at_a_control_instant(decentralised, seed, steps):
     loop = system.closed_loop(clock(0.005, 0.005 * steps * 20, 0.005 * steps))
     loop.advance(1, 20 * steps)
     loop.finish()
-    left = loop.monitor[watch.EXIT] != watch.INSIDE
-    assert not left or loop.monitor[watch.EXIT_BETWEEN] == 1.0
+    left = loop.monitor.exit != watch.INSIDE
+    assert not left or loop.monitor.exit_between == 1.0
 
 
 def test_a_start_near_the_bound_is_kept_where_the_explicit_law_leaves():
@@ -243,7 +243,7 @@ def test_powers_of_the_channels(agents, steps):
     """A full matrix; the plants' maps are affine over any number of steps."""
     system = osnr_system(agents, FullInformation(), 0.2499, mode="implicit", integrator="euler")
     states, u, _, loop = instants(system, 0.01, 20, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     oracle = reference_osnr()
     expected = [reference.full_information(oracle, RHO, row) for row in states[1:, :, 0]]
     assert np.max(np.abs(u - expected)) < 1e-6
@@ -273,7 +273,7 @@ def test_looking_at_a_run_does_not_change_it():
     whole.finish()
     assert np.array_equal(np.concatenate([p.state for p in parts]), expected.state)
     assert np.array_equal(np.concatenate([p.input for p in parts]), expected.input)
-    for entry in (watch.SOLUTIONS, watch.PREDICTION, watch.NOT_MONOTONE):
+    for entry in ("solutions", "prediction", "not_monotone"):
         assert cut.monitor[entry] == whole.monitor[entry]
 
 
@@ -283,7 +283,7 @@ def test_a_push_from_rest_where_all_gaps_vanish_is_solved_for():
     start = robot_state(rest, appendage=np.add(rest, [60.0, -60.0, 60.0, -60.0, 60.0]))
     system = robot_system(start, mode="implicit", integrator="euler")
     states, u, _, loop = instants(system, 0.005, 30, 20)
-    assert loop.monitor[watch.EXIT_BETWEEN] or loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit_between or loop.monitor.exit == watch.INSIDE
     y = states[1 : len(u) + 1, :, 1]
     expected = [reference.full_information(GAME, RHO, row) for row in y]
     assert np.max(np.abs(u[: len(y)] - expected)) < 2e-6 * np.max(np.abs(expected))

@@ -13,13 +13,13 @@ import reference
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
-from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import GAIN
 from gne_mj.faults import SensorDelay
 from gne_mj.game import Game
 from gne_mj.games import velocity_consensus_game
 from gne_mj.loops import implicit, joint, local
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.newton import MOVES, OUTSIDE, RHO
+from gne_mj.loops.newton import OUTSIDE
 from gne_mj.plants import held_map, integrator
 from gne_mj.system import System
 
@@ -58,9 +58,9 @@ def test_each_agent_alone_keeps_to_its_share(partial):
                 rows = found.memory[k].reshape(5, 5)
                 expected -= 2.0 * sum(after[i] - rows[j, i] for j in ((i - 1) % 5, (i + 1) % 5))
             assert found.u[k, i] == pytest.approx(expected, abs=1e-6)
-    assert found.monitor[watch.UNSOLVED] == 0
-    assert found.monitor[watch.PREDICTION] < 1e-8
-    assert found.monitor[watch.SOLVER_STEPS] < 40 * found.monitor[watch.SOLUTIONS]
+    assert found.monitor.unsolved == 0
+    assert found.monitor.prediction < 1e-8
+    assert found.monitor.solver_steps < 40 * found.monitor.solutions
 
 
 def test_agents_alone_in_the_plane():
@@ -84,7 +84,7 @@ def test_agents_alone_in_the_plane():
             expected = [-oracle.partial_gradient(a, ahead) for a in own]
             expected -= alone(oracle, members, own, now, after)
             assert found.u[k, own] == pytest.approx(expected, abs=1e-6)
-    assert found.monitor[watch.UNSOLVED] == 0
+    assert found.monitor.unsolved == 0
 
 
 def test_fully_distributed_agents_look_where_z_will_be():
@@ -176,7 +176,7 @@ def equation_of(equation, system, seed, gain=1.0):
     solver.anchor[:], solver.base[:] = system.start, system.start + rng.normal(size=m)
     solver.own[:], solver.mixed[:] = system.start, system.start
     solver.stiff[:] = rng.uniform(5, 30, m)
-    solver.numbers[RHO], solver.numbers[MOVES] = 0.2, 1.0
+    solver.numbers.rho, solver.numbers.moves = 0.2, 1.0
     work.profile[:] = system.start
 
     def residual(first, last, trial):
@@ -236,22 +236,22 @@ def test_an_agent_without_an_action_says_at_which_constraint():
     residual, parts = equation_of(local, system, 3)
     good, _ = residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
     assert not good
-    assert parts.work.now[SHELL] == 0.0
+    assert parts.work.now.shell == 0.0
     # the ball's three members: looked at three times as far from the anchor
     look = system.start.copy()
     look[:2] += 3.0 * (np.array([1.95, 1.2]) - system.start[:2])
-    assert parts.work.now[SHELL_VALUE] == pytest.approx(look @ look - 4.0)
+    assert parts.work.now.shell_value == pytest.approx(look @ look - 4.0)
     parts.problem.order.band[1] = 0  # without shares
     residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
-    assert parts.work.now[SHELL_VALUE] == pytest.approx(1.95**2 + 1.2**2 + 0.25 + 0.04 - 4.0)
+    assert parts.work.now.shell_value == pytest.approx(1.95**2 + 1.2**2 + 0.25 + 0.04 - 4.0)
 
 
 def test_all_agents_without_actions_say_at_which_constraint():
     residual, parts = equation_of(joint, coupled_system(), 3)
     outside = np.array([1.95, 1.2, 0.5, -0.2])
     assert not residual(0, 3, outside)[0]
-    assert parts.work.now[SHELL] == 0.0
-    assert parts.work.now[SHELL_VALUE] == pytest.approx(outside @ outside - 4.0)
+    assert parts.work.now.shell == 0.0
+    assert parts.work.now.shell_value == pytest.approx(outside @ outside - 4.0)
 
 
 def test_a_steps_length_is_measured_where_the_agent_looks():
@@ -370,8 +370,8 @@ def test_secants_find_the_law_on_a_map_that_bends(decentralised):
     bent = Bent(lambda u: 0.02 * u + 0.004 * u**3)
     system = coupled_system(decentralised=decentralised)
     found = run_plain(system, clock(0.05), 6, bent)
-    assert found.monitor[watch.UNSOLVED] == found.monitor[watch.NOT_MONOTONE] == 0
-    assert found.monitor[watch.PREDICTION] < 1e-6
+    assert found.monitor.unsolved == found.monitor.not_monotone == 0
+    assert found.monitor.prediction < 1e-6
     assert bent.count <= 2 + 6 * 6
     if not decentralised:
         barrier = LogBarrier(system.game, PENALTY)
@@ -382,7 +382,7 @@ def test_secants_find_the_law_on_a_map_that_bends(decentralised):
 
 def test_a_map_that_falls_is_told():
     found = run_plain(coupled_system(), clock(0.05), 3, Bent(lambda u: 0.05 * np.sin(7.0 * u)))
-    assert found.monitor[watch.NOT_MONOTONE] > 0
+    assert found.monitor.not_monotone > 0
 
 
 def test_the_worst_way_in_which_an_agent_ended_is_told(monkeypatch):
@@ -391,7 +391,7 @@ def test_the_worst_way_in_which_an_agent_ended_is_told(monkeypatch):
     for codes, worst, asked in (((1, 2, 0), 2, 3), ((0, 0, 0), 0, 3), ((1, OUTSIDE, 0), 3, 2)):
         ways = list(codes)
         monkeypatch.setattr(local, "newton", lambda *_, ways=ways: ways.pop(0))
-        given = parts.problem, 1, np.zeros(0), parts.work, parts.solver
+        given = parts.problem, np.zeros(0), parts.work, parts.solver
         assert local.solve(*given) == worst
         assert len(codes) - len(ways) == asked, "nobody is asked once one has no action"
 
@@ -400,7 +400,7 @@ def test_the_worst_way_in_which_an_agent_ended_is_told(monkeypatch):
 
 
 def test_what_a_solution_showed_is_counted():
-    monitor = np.zeros(watch.length(2, 1))
+    monitor = watch.fresh(2, 1)
     for time, steps, accurate, least in (
         (0.0, 3.0, True, 0.5), (0.1, 7.0, False, -0.1), (0.2, 2.0, True, np.inf),
         (0.3, 1.0, False, 0.0), (0.4, 1.0, True, np.nan),
@@ -408,5 +408,5 @@ def test_what_a_solution_showed_is_counted():
         watch.count_solution(monitor, time, steps, accurate, least)
     names = ("SOLUTIONS", "SOLVER_STEPS", "MOST_STEPS", "UNSOLVED", "UNSOLVED_TIME",
              "NOT_MONOTONE", "NOT_MONOTONE_TIME")  # fmt: skip
-    found = [monitor[getattr(watch, name)] for name in names]
+    found = [monitor[name.lower()] for name in names]
     assert found == [5.0, 14.0, 7.0, 2.0, 0.1, 3.0, 0.1]

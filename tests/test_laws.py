@@ -24,7 +24,6 @@ import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.controllers.settings import PENALTY
 from gne_mj.errors import InvalidInput
 from gne_mj.game import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
@@ -97,7 +96,7 @@ def step(game, law, y, memory):
     memory = own_actions_in(memory, y, game.agent_of_action)
     loop = loop_at(game, law, y, memory)
     first = loop.advance(1, 1)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     assert np.array_equal(first.state[0, :, 0], y)
     assert np.array_equal(first.memory[0], memory)
     u, rate = first.input[0], np.zeros(len(memory))
@@ -236,7 +235,7 @@ def ask(game, law, y, weights, memory):
     u, rates = np.full(len(y), np.nan), np.full(len(memory), np.nan)
     problem, _table = tabled(problem_of(game, law), memory)
     scratch = work(len(y), len(weights), game.agents)
-    scratch.now[PENALTY] = RHO
+    scratch.now.penalty = RHO
     code = functions.action(problem, y, weights, memory, scratch, u)
     functions.rate(problem, y, memory, rates)
     return code, u, rates
@@ -529,13 +528,13 @@ def test_an_estimate_outside_is_reported_with_its_agent_and_constraint(number):
     assert loop.advance(3, 1).input.shape == (0, now.count)
     monitor = loop.monitor
     finite = np.isfinite(margins[agent, constraint])
-    assert monitor[watch.EXIT] == (watch.ESTIMATE_LEFT if finite else watch.DIVERGED)
-    assert monitor[watch.EXIT_AGENT] == agent
-    assert monitor[watch.EXIT_CONSTRAINT] == constraint
-    assert monitor[watch.EXIT_STAGE] == monitor[watch.EXIT_TIME] == 0
+    assert monitor.exit == (watch.ESTIMATE_LEFT if finite else watch.DIVERGED)
+    assert monitor.exit_agent == agent
+    assert monitor.exit_constraint == constraint
+    assert monitor.exit_stage == monitor.exit_time == 0
     if finite:
         assert margins[agent, constraint] > 0
-        assert monitor[watch.EXIT_VALUE] == pytest.approx(margins[agent, constraint], rel=1e-12)
+        assert monitor.exit_value == pytest.approx(margins[agent, constraint], rel=1e-12)
     assert loop.time == 0
     assert np.all(np.isnan(loop.finish().input))
 
@@ -571,8 +570,8 @@ def test_the_true_profile_comes_before_the_estimates():
     _, estimates, z = draw(now)
     loop = loop_at(now.game, law, np.full(5, V0 + 50.0), pack_memory(estimates, z))
     loop.advance(1, 1)
-    assert loop.monitor[watch.EXIT] == watch.LEFT_SET
-    assert loop.monitor[watch.EXIT_AGENT] == -1
+    assert loop.monitor.exit == watch.LEFT_SET
+    assert loop.monitor.exit_agent == -1
 
 
 def test_the_memory_at_the_start_knows_everybody():

@@ -248,7 +248,7 @@ def test_within_the_bounds_nothing_leaves():
         tried += 1
         loop = system.closed_loop(clock)
         loop.advance(1, clock.steps(clock.duration))
-        assert loop.monitor[watch.EXIT] == watch.INSIDE, seed
+        assert loop.monitor.exit == watch.INSIDE, seed
         assert certify(system, clock).held["promised"]
         if tried <= 15:
             stronger = tuple(
@@ -262,7 +262,7 @@ def test_within_the_bounds_nothing_leaves():
             )  # fmt: skip
             loop = beyond.closed_loop(clock)
             loop.advance(1, clock.steps(clock.duration))
-            left += loop.monitor[watch.EXIT] != watch.INSIDE
+            left += loop.monitor.exit != watch.INSIDE
             assert not certify(beyond, clock).held["promised"]
     assert tried >= 25
     assert left >= 5

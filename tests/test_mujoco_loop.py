@@ -46,8 +46,8 @@ def test_continuous_equals_a_plain_rk4_of_the_ode(numbers, start):
     expected = reference.rk4_fixed(reference_rate(numbers), state[:, :3].ravel(), h, steps)
     system = robot_system(state, numbers, engine="mujoco")
     states, _, _, loop = run_loop(system, h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.DIVIDED] == 0
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.divided == 0
     assert relative_error(states[:, :, :3].reshape(len(expected), -1), expected) < 1e-11
 
 
@@ -213,7 +213,7 @@ def test_a_reset_simulation_is_not_started():
     loop = system.closed_loop(clock(0.01))
     loop.advance(5, 1)
     mujoco.mj_resetData(loop.plant.model, loop.plant.data)
-    assert loop.monitor[watch.STARTED] == 0.0
+    assert loop.monitor.started == 0.0
     with callbacks(control=loop._control, passive=loop.plant.passive):
         mujoco.mj_step(loop.plant.model, loop.plant.data)
     assert np.all(loop.plant.data.ctrl == 0.0)
@@ -241,14 +241,14 @@ def test_leaving_the_set_is_seen_at_its_step_and_the_state_before_it_is_kept():
         loop = system.closed_loop(clock(0.05, control=0.5))
         recorded = loop.advance(400, 1)
         monitor = loop.monitor
-        assert monitor[watch.EXIT] == watch.LEFT_SET
+        assert monitor.exit == watch.LEFT_SET
         at = len(recorded.input)
-        assert monitor[watch.EXIT_TIME] == pytest.approx(0.05 * at)
+        assert monitor.exit_time == pytest.approx(0.05 * at)
         assert loop.time == pytest.approx(0.05 * at)
         last = loop.finish()
         y = last.state[0, :, 1]
         g = system.game.constraints(y)
-        assert g[int(monitor[watch.EXIT_CONSTRAINT])] == monitor[watch.EXIT_VALUE] >= 0
+        assert g[int(monitor.exit_constraint)] == monitor.exit_value >= 0
         assert np.all(np.isnan(last.input))
         assert np.all(system.game.constraints(recorded.state[:, :, 1]) < 0)
         again = loop.advance(5, 1)

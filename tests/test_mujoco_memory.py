@@ -11,7 +11,8 @@ from gne_mj.controllers import FullyDistributed, PartialInformation, PlainLaw
 from gne_mj.errors import EngineError
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.layout import MONITOR
+from gne_mj.loops.layout import steps_of
+from gne_mj.loops.mujoco import room_of
 from gne_mj.plants.native_mujoco import callbacks
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -98,9 +99,8 @@ def test_a_state_that_is_set_again_goes_on_bitwise(information, mode, integrator
         if mode == "sampled":
             assert np.array_equal(other.userdata, loop.plant.data.userdata)
         else:  # but what the loop keeps to divide steps, which MuJoCo alone does not
-            at = loop._start + MONITOR
-            monitors = slice(at, at + len(loop.monitor))
-            assert np.array_equal(other.userdata[monitors], loop.monitor)
+            room = room_of(other.userdata, loop.plant.sizes.room, steps_of(loop._table)).loop
+            assert room.monitor == loop.monitor
 
 
 @LAWS
@@ -176,7 +176,7 @@ def test_a_memory_of_a_single_entry_moves(integrator):
     for system in systems:
         loop = system.closed_loop(clock(H))
         loop.advance(100, 1)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         runs.append(loop.finish())
     assert abs(runs[0].memory[0, 0] - 1.0) > 0.1
     if integrator == "rk4":

@@ -57,11 +57,11 @@ def test_looking_ahead_knows_what_is_still_to_act(tmp_path):
     """The outputs at the end of each period are those predicted, to the last bit."""
     loop = loop_of(carts(tmp_path), "implicit")
     loop.advance(40, 4)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.SOLUTIONS] == 40
-    assert loop.monitor[watch.UNSOLVED] == 0
-    assert loop.monitor[watch.NOT_MONOTONE] == 0
-    assert loop.monitor[watch.PREDICTION] == 0.0
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.solutions == 40
+    assert loop.monitor.unsolved == 0
+    assert loop.monitor.not_monotone == 0
+    assert loop.monitor.prediction == 0.0
 
 
 def test_a_push_from_outside_is_not_known_ahead(tmp_path):

@@ -77,8 +77,8 @@ def test_full_information_equals_a_plain_rk4(name):
     rate = reference.closed_loop_rate(agent, "full_information", game, RHO)
     expected = reference.rk4_fixed(rate, system.state[:, : agent.n].ravel(), h, steps)
     states, u, _, loop = run_loop(system, h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    assert loop.monitor[watch.DIVIDED] == 0
+    assert loop.monitor.exit == watch.INSIDE
+    assert loop.monitor.divided == 0
     assert loop.time == pytest.approx(h * steps)
     assert relative_error(states[:, :, : agent.n].reshape(len(expected), -1), expected) < 1e-11
     y = np.array([agent.output(x.reshape(-1, agent.n)) for x in expected])
@@ -104,7 +104,7 @@ def test_fully_distributed_equals_a_plain_rk4(name, graph):
     z, estimates = reference.consensus_start(system.start, with_z=True)
     expected = reference.rk4_fixed(rate, reference.pack(system.state, z, estimates), h, steps)
     states, _, memory, loop = run_loop(system, h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     others = ~np.eye(10, dtype=bool)
     got = [
         np.concatenate([x.ravel(), row[100:], row[:100].reshape(10, 10)[others]])
@@ -195,7 +195,7 @@ def test_sampled_distributed_equals_a_plain_loop(graph):
         x = flat.reshape(10, 2)
     expected.append(x)
     states, got, memory, loop = run_loop(system, h, substeps * periods, control=period)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     assert relative_error(states, np.array(expected)) < 1e-12
     assert relative_error(got[:-1], np.array(inputs)) < 1e-11
     assert relative_error(memory[-1][100:], z) < 1e-12
@@ -229,19 +229,20 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
     u = np.concatenate([recorded.input, last.input])
     y, times, monitor = state[:, :, 1], h * np.arange(steps + 1), loop.monitor
     game = reference.VelocityGame(V0, DELTA)
-    p = m = 5
 
-    assert monitor[watch.STARTED] == 1
-    assert monitor[watch.EXIT] == watch.INSIDE
-    assert monitor[watch.STEPS] == steps
-    assert monitor[watch.TIME] == pytest.approx(times[-1], rel=1e-12)
+    assert monitor.started == 1
+    assert monitor.exit == watch.INSIDE
+    assert monitor.steps == steps
+    assert monitor.time == pytest.approx(times[-1], rel=1e-12)
 
     g = np.array([reference.constraints(game, row) for row in y])
-    worst = monitor[watch.worst_at(p) :][: 2 * p].reshape(2, p)
+    worst = monitor.worst, monitor.worst_time
     assert np.allclose(worst[0], g.max(axis=0), rtol=0, atol=1e-12)
     assert np.allclose(worst[1], times[g.argmax(axis=0)], rtol=1e-12)
 
-    peak, peak_time, square, energy, last_y, last_u = monitor[watch.inputs_at(p) :].reshape(6, m)
+    peak, peak_time, square, energy, last_y, last_u = (
+        monitor[name] for name in ("peak", "peak_time", "square", "energy", "last_y", "last_u")
+    )
     demand = np.array([reference.full_information(game, RHO, row) for row in y])
     if mode == "sampled":
         demand = np.repeat(demand[::5], 5, axis=0)[: steps + 1]
@@ -262,20 +263,20 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
     assert np.allclose(u, np.clip(demand, -limit, limit), rtol=1e-10, atol=1e-10)
 
     over = np.argwhere(magnitude > limit)
-    assert monitor[watch.SATURATED] == (len(over) > 0) == (limit < np.inf)
+    assert monitor.saturated == (len(over) > 0) == (limit < np.inf)
     if len(over):
         step, action = over[0]
-        assert monitor[watch.SATURATED_TIME] == pytest.approx(times[step])
-        assert monitor[watch.SATURATED_ACTION] == action
-        assert monitor[watch.SATURATED_DEMAND] == pytest.approx(demand[step, action], rel=1e-11)
+        assert monitor.saturated_time == pytest.approx(times[step])
+        assert monitor.saturated_action == action
+        assert monitor.saturated_demand == pytest.approx(demand[step, action], rel=1e-11)
 
     robot = reference_robots(UNEQUAL)
     rest = robot.equilibrium(np.full(5, V0))
     storage = np.array([robot.storage(row[:, :3], rest) for row in state])
-    assert monitor[watch.STORAGE_START] == pytest.approx(storage[0], rel=1e-12)
-    assert monitor[watch.STORAGE] == pytest.approx(storage[-1], rel=1e-9)
+    assert monitor.storage_start == pytest.approx(storage[0], rel=1e-12)
+    assert monitor.storage == pytest.approx(storage[-1], rel=1e-9)
     rise = max(0.0, np.max(np.diff(storage)))
-    assert monitor[watch.STORAGE_RISE] == pytest.approx(rise, rel=1e-6, abs=1e-12)
+    assert monitor.storage_rise == pytest.approx(rise, rel=1e-6, abs=1e-12)
 
 
 # ------------------------------------------------------------------- advancing piece by piece
@@ -345,19 +346,19 @@ def test_an_estimate_that_leaves_at_a_later_stage_is_latched():
     loop = system.closed_loop(clock(0.05, 20.0))
     recorded = loop.advance(400, 1)
     monitor = loop.monitor
-    assert monitor[watch.EXIT] in (watch.ESTIMATE_LEFT, watch.LEFT_SET)
+    assert monitor.exit in (watch.ESTIMATE_LEFT, watch.LEFT_SET)
     assert len(recorded.input) < 400
-    if monitor[watch.EXIT] == watch.ESTIMATE_LEFT:
-        assert 0 <= monitor[watch.EXIT_AGENT] < 10
-    assert monitor[watch.EXIT_VALUE] >= 0
+    if monitor.exit == watch.ESTIMATE_LEFT:
+        assert 0 <= monitor.exit_agent < 10
+    assert monitor.exit_value >= 0
 
 
 def test_inputs_that_are_no_usable_numbers_are_a_divergence():
     game_scale = robot_system(robot_state(V0 + np.array([1e-12, 0, 0, 0, 0])), delta=2e-12, rho=1e3)
     loop = game_scale.closed_loop(clock(1e-3))
     assert len(loop.advance(1, 1).input) == 0
-    assert loop.monitor[watch.EXIT] == watch.DIVERGED
-    assert abs(loop.monitor[watch.EXIT_VALUE]) >= 1e10
+    assert loop.monitor.exit == watch.DIVERGED
+    assert abs(loop.monitor.exit_value) >= 1e10
 
 
 @pytest.mark.parametrize("engine", ["ode", "mujoco"])
@@ -365,5 +366,5 @@ def test_no_samples_are_no_observation(engine):
     """Neither a look at the present nor a step."""
     loop = robot_system(robot_state(FIVE), engine=engine).closed_loop(clock(0.01))
     assert len(loop.advance(0, 5).input) == 0
-    assert np.all(loop.monitor == 0.0)
+    assert loop.monitor == watch.fresh(5, 5)
     assert loop.time == 0.0

@@ -309,12 +309,12 @@ def test_kernels_are_asked_as_they_were_written():
         assert words in str(caught.value)
     assert penalised_equilibrium(game, 0.1, [0.5, 0.1]).residual < 1e-12
 
-    monitor = np.zeros(watch.length(2, 2))
-    monitor[watch.EXIT] = watch.DIVERGED
-    monitor[-2:] = [-2.0, 0.0]
+    monitor = watch.fresh(2, 2)
+    monitor.exit = watch.DIVERGED
+    monitor.last_u[:] = [-2.0, 0.0]
     with pytest.raises(UserCodeError, match="agent 1 at y = "):  # half a step further
         check_numbers(game, monitor, np.array([0.05, 1.0]), 0.05)
-    monitor[-2:] = 0.0
+    monitor.last_u[:] = 0.0
     check_numbers(game, monitor, np.array([0.05, 1.0]), 0.05)
-    monitor[watch.EXIT] = watch.LEFT_SET
+    monitor.exit = watch.LEFT_SET
     check_numbers(game, monitor, np.array([-1.0, 1.0]), 0.05)

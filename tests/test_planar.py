@@ -93,7 +93,7 @@ def test_rk4_equals_a_plain_rk4(engine, seed):
     state, h, steps = interior(np.random.default_rng(seed), used=0.8), 0.005, 2000
     expected = reference.rk4_fixed(expected_rate(), state[:, :3].ravel(), h, steps)
     states, _, _, loop = run_loop(system(state, engine), h, steps)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     assert relative_error(states[:, :, :3].reshape(len(expected), -1), expected) < 1e-11
 
 
@@ -121,13 +121,12 @@ def test_any_fleet_over_any_graph_stays_inside(seed):
     fleet_of = Agents(flexible_robot, table, np.full(2 * count, np.inf), dimension=2)
     drawn = System("robots", draw.game, fleet_of, FullInformation(), RHO, state)
     states, _, _, loop = run_loop(drawn, 0.002, 1500)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    p = draw.oracle.p
-    worst = loop.monitor[watch.worst_at(p) : watch.worst_at(p) + p]
+    assert loop.monitor.exit == watch.INSIDE
+    worst = loop.monitor.worst
     g = np.array([reference.constraints(draw.oracle, row) for row in states[:, :, 1]])
     assert np.all(worst < 0)
     assert np.allclose(worst, np.max(g, axis=0), rtol=0, atol=1e-13)
-    assert loop.monitor[watch.STORAGE_RISE] <= 1e-9 * max(1.0, loop.monitor[watch.STORAGE_START])
+    assert loop.monitor.storage_rise <= 1e-9 * max(1.0, loop.monitor.storage_start)
 
 
 @pytest.mark.slow

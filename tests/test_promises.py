@@ -35,7 +35,6 @@ from gne_mj.faults import (
     Silence,
 )
 from gne_mj.games import velocity_game
-from gne_mj.loops import monitor as watch
 from gne_mj.margins import influence, tightening
 from gne_mj.summary import summary
 from gne_mj.system import System
@@ -102,9 +101,8 @@ def test_a_limit_that_the_start_exceeds_is_told_with_its_factor(mode):
     report = certify(system, clock(H))
     loop = system.closed_loop(clock(H))
     loop.finish()
-    assert loop.monitor[watch.SATURATED]  # what a run of it sees at once
-    at = int(watch.inputs_at(5))
-    peaks = loop.monitor[at : at + 5]
+    assert loop.monitor.saturated  # what a run of it sees at once
+    peaks = loop.monitor.peak
     np.testing.assert_allclose(report.inputs["each"], peaks, rtol=1e-12)
     assert report.inputs["largest"] == pytest.approx(np.max(peaks))
     assert report.inputs["largest_factor"] == pytest.approx(np.max(peaks))
@@ -262,7 +260,7 @@ def test_periods_that_are_not_accurate_are_excepted():
     monitor = loop.monitor.copy()
     told = []
     for unsolved in (0.0, 3.0):
-        monitor[watch.UNSOLVED], monitor[watch.UNSOLVED_TIME] = unsolved, 0.07
+        monitor.unsolved, monitor.unsolved_time = unsolved, 0.07
         y = rows.state[:, :, system.agents.kind.OUTPUT]
         found = certify_run(
             system, np.array([0.2]), y, rows.input, monitor, tolerance=1e-3, duration=0.2,

@@ -182,7 +182,7 @@ def test_channels_agree_with_scipy(kind, epsilon):
     }[kind]
     system = channels(agents, epsilon)
     rows, _, memory, loop = run_loop(system, 0.05, 20)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     want = expected(
         system, oracle, reference_osnr(three_channels()), np.arange(21) * 0.05, epsilon, 1.0
     )
@@ -195,7 +195,7 @@ def test_a_start_within_1e_10_of_a_bound_is_followed():
     agents, y = pi_cascades(3), np.array([0.2, 1e-10, 0.1])
     system = channels(agents, 1e-5, y=y)
     rows, _, memory, loop = run_loop(system, 0.02, 5)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     want = expected(
         system, reference_pi(3), reference_osnr(three_channels()), np.arange(6) * 0.02, 1e-5, 1.0
     )
@@ -240,7 +240,7 @@ def test_input_limit():
     )
     assert np.max(np.abs(got[0] - want[0])) < 1e-5
     assert np.max(np.abs(got[1])) == 0.3
-    assert got[3].monitor[watch.SATURATED] == 1.0
+    assert got[3].monitor.saturated == 1.0
 
 
 def test_steps_hardly_depend_on_epsilon():
@@ -248,7 +248,7 @@ def test_steps_hardly_depend_on_epsilon():
     for epsilon in (1e-2, 1e-4, 1e-6, 1e-8):
         loop = channels(pi_cascades(3), epsilon, 0.1).closed_loop(clock(0.05, 30.0))
         loop.advance(600, 1)
-        assert loop.monitor[watch.EXIT] == watch.INSIDE
+        assert loop.monitor.exit == watch.INSIDE
         counts.append(loop.steps[0])
     assert max(counts) < 1.5 * min(counts)
     assert max(counts) < 150
@@ -270,8 +270,9 @@ def test_samples_do_not_depend_on_how_a_run_is_divided():
 
 
 def exit_of(loop):
-    codes = loop.monitor[[watch.EXIT, watch.EXIT_AGENT, watch.EXIT_CONSTRAINT]]
-    return (*codes.astype(int), loop.monitor[watch.EXIT_TIME])
+    monitor = loop.monitor
+    codes = (monitor.exit, monitor.exit_agent, monitor.exit_constraint)
+    return (*map(int, codes), monitor.exit_time)
 
 
 @pytest.mark.slow
@@ -317,5 +318,5 @@ def test_close_to_the_boundary():
         robot_state([1e-6, 0.5, 0.0, 0.5, 2.0]), EQUAL, law=law, integrator="rosenbrock"
     )
     loop = run_loop(system, 1e-2, 100)[3]
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
+    assert loop.monitor.exit == watch.INSIDE
     assert loop.steps[0] < 300

@@ -136,12 +136,12 @@ def test_the_barriers_value_is_infinite_outside_of_any_bound():
 
 def monitor_of(system, worst, **entries):
     p, m = system.game.constraints_count, system.game.actions
-    monitor = np.zeros(watch.length(m, p))
-    monitor[watch.STARTED] = 1.0
-    monitor[watch.HEADER : watch.HEADER + p] = worst
-    monitor[watch.HEADER + p : watch.HEADER + 2 * p] = 0.1 * np.arange(1, p + 1)
+    monitor = watch.fresh(m, p)
+    monitor.started = 1.0
+    monitor.worst[:] = worst
+    monitor.worst_time[:] = 0.1 * np.arange(1, p + 1)
     for name, value in entries.items():
-        monitor[getattr(watch, name)] = value
+        monitor[name.lower()] = value
     return monitor
 
 
@@ -160,7 +160,7 @@ def test_the_worst_gap_is_the_one_nearest_to_its_own_bound():
     assert certificate._worst_gap(system, monitor)["gap"] == 0.0
     worst = certificate._worst_constraint(system, monitor_of(system, [-3.0, -2.0, -2.5]))
     assert (worst["index"], worst["margin"], worst["time"]) == (2, 2.0, 0.2)
-    nothing = np.zeros_like(monitor)
+    nothing = watch.fresh(system.game.actions, system.game.constraints_count)
     assert certificate._worst_gap(system, nothing) is None
     assert certificate._worst_constraint(system, nothing) is None
 
@@ -187,14 +187,14 @@ def test_exits_tell_whose_they_are():
         assert report["at_control_instant"] is True
         assert report["stage"] == 1
         known = name != "number"
-        index = int(monitor[watch.EXIT_CONSTRAINT])
+        index = int(monitor.exit_constraint)
         assert report["constraint"] == (system.game.constraint_names[index] if known else None)
         status, message = certificate._exit(system, monitor)
         assert words[name] in message
         now = certificate.status_now(system, monitor)
         assert (now["status"], now["exit_agents"]) == (status, whose[name])
         assert now["exit_time"] == 0.75
-        monitor[watch.EXIT_BETWEEN], monitor[watch.EXIT_STAGE] = 1.0, 2.0
+        monitor.exit_between, monitor.exit_stage = 1.0, 2.0
         assert certificate._exit_report(system, monitor)["at_control_instant"] is False
         assert "(stage 3 of the integration step)" in certificate._exit(system, monitor)[1]
         between = "between two control instants" in certificate._exit(system, monitor)[1]
@@ -210,8 +210,8 @@ def test_actuators_tell_the_greatest_demand_and_whose():
     system = line(faults=(Saturation(agents=(1,), limit=5.0, start=1.0, end=2.0),))
     system = replace(system, agents=replace(system.agents, input_limit=limits))
     monitor = monitor_of(system, [-1.0] * 3, TIME=4.0)
-    at = watch.inputs_at(3)
-    monitor[at : at + 12] = [3, 9, 4, 0.3, 0.9, 0.4, 16, 36, 64, 1, 2, 3]
+    monitor.peak[:], monitor.peak_time[:] = [3, 9, 4], [0.3, 0.9, 0.4]
+    monitor.square[:], monitor.energy[:] = [16, 36, 64], [1, 2, 3]
     found = certificate._actuators(system, monitor)
     assert (found["peak"], found["peak_agent"], found["peak_time"]) == (9.0, 2, 0.9)
     assert found["rms"] == [2.0, 3.0, 4.0]
@@ -219,8 +219,8 @@ def test_actuators_tell_the_greatest_demand_and_whose():
     assert found["limits"] == limits.tolist()
     assert found["saturated"] is None
     for time, limit in ((0.5, 7.0), (1.0, 5.0), (1.5, 5.0), (2.0, 7.0)):
-        monitor[watch.SATURATED], monitor[watch.SATURATED_TIME] = 1.0, time
-        monitor[watch.SATURATED_ACTION], monitor[watch.SATURATED_DEMAND] = 1, -9.0
+        monitor.saturated, monitor.saturated_time = 1.0, time
+        monitor.saturated_action, monitor.saturated_demand = 1, -9.0
         assert certificate._actuators(system, monitor)["saturated"] == {
             "agent": 2, "time": time, "demand": -9.0, "limit": limit,
         }  # fmt: skip
@@ -241,7 +241,9 @@ def test_mode_implicit_tells_when_it_was_not_accurate():
         "first_not_monotone": 1.25,
     }  # fmt: skip
     assert expected.items() <= certificate._implicit(system, monitor).items()
-    fresh = certificate._implicit(system, np.zeros_like(monitor))
+    fresh = certificate._implicit(
+        system, watch.fresh(system.game.actions, system.game.constraints_count)
+    )
     assert fresh["first_not_accurate"] is fresh["first_not_monotone"] is None
     assert fresh["mean_newton_steps"] == 0.0
     assert certificate._implicit(line(mode="sampled"), monitor) is None
@@ -254,8 +256,7 @@ def test_planar_agents_are_told_by_agent_and_not_by_entry():
         "plane", game, agents, FullInformation(), 0.1, agents.equilibrium(np.full(4, 0.5))
     )
     monitor = monitor_of(system, [-1.0] * 2)
-    at = watch.inputs_at(2)
-    monitor[at : at + 4] = [1, 2, 3, 2]
+    monitor.peak[:] = [1, 2, 3, 2]
     assert certificate._actuators(system, monitor)["peak_agent"] == 2
 
 

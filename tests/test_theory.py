@@ -381,12 +381,12 @@ def test_measured_v_agrees_with_the_certificate(above):
     loop.finish()
     monitor = loop.monitor
     assert Theorem(system).lyapunov is above
-    rounding = 1e-12 * monitor[watch.STORAGE_START]
+    rounding = 1e-12 * monitor.storage_start
     if above:
-        assert monitor[watch.STORAGE_RISE] <= rounding
-        assert monitor[watch.STORAGE] < monitor[watch.STORAGE_START]
+        assert monitor.storage_rise <= rounding
+        assert monitor.storage < monitor.storage_start
     else:
-        assert monitor[watch.STORAGE_RISE] > 1e6 * rounding
+        assert monitor.storage_rise > 1e6 * rounding
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.2, 2.0))
@@ -408,8 +408,8 @@ def test_certified_runs_stay_inside_and_v_never_rises(seed, tau):
     loop.advance(1, 2000)
     loop.finish()
     monitor = loop.monitor
-    assert monitor[watch.EXIT] == watch.INSIDE
-    assert monitor[watch.STORAGE_RISE] <= 1e-9 * monitor[watch.STORAGE_START]
+    assert monitor.exit == watch.INSIDE
+    assert monitor.storage_rise <= 1e-9 * monitor.storage_start
 
 
 # --------------------------------------------------------------------------------------- gain
@@ -706,7 +706,7 @@ def trial(epsilon, system, timing):
     loop = replace(system, law=law).closed_loop(timing)
     loop.advance(1, timing.steps(timing.duration))
     loop.finish()
-    return loop.monitor[watch.EXIT] == watch.INSIDE
+    return loop.monitor.exit == watch.INSIDE
 
 
 @pytest.mark.slow

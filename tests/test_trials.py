@@ -366,13 +366,13 @@ class _Loop:
         self.steps += steps
 
     def finish(self):
-        self.monitor[watch.STARTED] = 1.0
+        self.monitor.started = 1.0
 
 
 def test_what_a_run_of_the_map_showed(monkeypatch):
     p, m = ROBOTS.game.constraints_count, ROBOTS.game.actions
-    monitor = np.zeros(watch.length(m, p))
-    monitor[watch.worst_at(p) : watch.worst_at(p) + p] = [-5.0, -0.5, -3.0, -4.0, -9.0]
+    monitor = watch.fresh(m, p)
+    monitor.worst[:] = [-5.0, -0.5, -3.0, -4.0, -9.0]
     made = []
 
     def closed_loop(system, clock, plant=None):
@@ -388,11 +388,11 @@ def test_what_a_run_of_the_map_showed(monkeypatch):
     assert made[0][0].steps == 12
     assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "inside"
     assert made[1][1] is made[0][0].plant, "one fleet serves all runs of a mode"
-    monitor[watch.EXIT] = watch.LEFT_SET
+    monitor.exit = watch.LEFT_SET
     assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "instant"
-    monitor[watch.EXIT_BETWEEN] = 1.0
+    monitor.exit_between = 1.0
     assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "between"
-    monitor[watch.EXIT] = watch.DIVERGED
+    monitor.exit = watch.DIVERGED
     assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "nothing"
 
     def refused(system, clock, plant=None):

@@ -56,9 +56,8 @@ def outcome(law, index, engine="mujoco"):
     loop = system.closed_loop(clock(H, DURATION))
     loop.advance(1, round(DURATION / H))
     loop.finish()
-    at = int(watch.worst_at(5))
-    gaps = np.sqrt(loop.monitor[at : at + 5] + delta**2)
-    return int(loop.monitor[watch.EXIT]), float(np.max(gaps / delta))
+    gaps = np.sqrt(loop.monitor.worst + delta**2)
+    return int(loop.monitor.exit), float(np.max(gaps / delta))
 
 
 @pytest.mark.parametrize(
@@ -119,6 +118,5 @@ def test_a_start_beside_the_bound_stays_inside(engine):
     state[:, 1] = state[:, 2] = V0 + np.cumsum(gaps)
     loop = robot_system(state, engine=engine).closed_loop(clock(1e-4, 1.0))
     loop.advance(1, 10_000)
-    assert loop.monitor[watch.EXIT] == watch.INSIDE
-    at = int(watch.worst_at(5))
-    assert np.max(loop.monitor[at : at + 5]) < 0
+    assert loop.monitor.exit == watch.INSIDE
+    assert np.max(loop.monitor.worst) < 0

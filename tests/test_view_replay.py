@@ -159,14 +159,15 @@ def test_messages_are_counted_as_the_law_gets_them():
             continue
         for link, (_, sender) in enumerate(links):
             gone = False
-            for number, row in enumerate(faults.rows):
-                on = row[native.START] <= step * 0.01 + 1e-9 < row[native.END]
-                if row[native.TARGET] != link or not on:
+            for number in range(faults.pointer[-1]):
+                row = native.fault(faults, number)
+                on = row.start <= step * 0.01 + 1e-9 < row.end
+                if row.target != link or not on:
                     continue
                 with np.errstate(over="ignore"):
-                    chance = native.uniform(system.seed, row[native.STREAM], link, step // 2)
+                    chance = native.uniform(system.seed, row.stream, link, step // 2)
                 silence = number >= faults.pointer[native.SILENCE]
-                gone |= silence or chance < row[native.SIZE]
+                gone |= silence or chance < row.amount
             if sender == 3 and 30 <= step < 50:
                 assert gone
             plain[link, int(gone)] += 1

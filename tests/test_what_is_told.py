@@ -30,15 +30,15 @@ GAMES = {2: velocity_game(2, V0, 3.0)}
 
 def run_of(**entries):
     """A monitor of two actions and three constraints, begun unless said otherwise."""
-    monitor = np.zeros(watch.length(M, P))
-    monitor[watch.STARTED] = 1.0
+    monitor = watch.fresh(M, P)
+    monitor.started = 1.0
     for name, value in entries.items():
         if name == "worst":
-            monitor[watch.worst_at(P) : watch.worst_at(P) + P] = value
+            monitor.worst[:] = value
         elif name == "when":
-            monitor[watch.worst_at(P) + P : watch.worst_at(P) + 2 * P] = value
+            monitor.worst_time[:] = value
         else:
-            monitor[getattr(watch, name)] = value
+            monitor[name.lower()] = value
     return monitor
 
 
@@ -46,7 +46,7 @@ def run_of(**entries):
 
 
 def test_of_a_run_that_never_began_nothing_was_the_worst():
-    runs = np.stack(
+    runs = watch.together(
         [
             run_of(worst=[-1, -2, -3], when=[0.1, 0.2, 0.3]),
             run_of(STARTED=0.0),
@@ -59,7 +59,7 @@ def test_of_a_run_that_never_began_nothing_was_the_worst():
         ]
     )  # fmt: skip
     kept = runs.copy()
-    worst, when = verdicts.worst_constraints(runs, P)
+    worst, when = verdicts.worst_constraints(runs)
     assert worst.tolist() == [
         [-1, -2, -3], [-np.inf] * 3, [-1, 0.5, -3], [-np.inf, -np.inf, 0.25], [-1, 3, -3],
     ]  # fmt: skip
@@ -68,12 +68,12 @@ def test_of_a_run_that_never_began_nothing_was_the_worst():
     assert np.array_equal(runs, kept), "what was seen stays as it is"
     # an exit below what was seen before does not hide that
     low = run_of(worst=[2, -2, -3], when=[0.1, 0.2, 0.3], EXIT=watch.LEFT_SET, EXIT_VALUE=1.0)
-    worst, when = verdicts.worst_constraints(low[None], P)
+    worst, when = verdicts.worst_constraints(watch.together([low]))
     assert (worst[0, 0], when[0, 0]) == (2.0, 0.1)
 
 
 def test_how_runs_ended():
-    runs = np.stack([run_of(EXIT=code) for code in (0, 0, 1, 2, 3)])
+    runs = watch.together([run_of(EXIT=code) for code in (0, 0, 1, 2, 3)])
     found = verdicts.status(runs, np.array([0.01, 0.011, 0.0, 0.0, np.nan]), 0.01)
     assert found.tolist() == [
         "converged", "completed", "left_feasible_set", "estimate_left_feasible_set", "diverged",
@@ -100,10 +100,9 @@ def test_a_run_has_settled_when_it_stays_within_a_fiftieth():
 
 
 def test_what_actuators_delivered():
-    runs = np.stack([run_of(TIME=4.0), run_of(TIME=0.0)])
-    at = watch.inputs_at(P)
-    runs[:, at : at + 4 * M] = [3, 5, 0.1, 0.2, 16, 36, -1, 1]
-    found = verdicts.inputs(runs, P, M)
+    runs = watch.together([run_of(TIME=4.0), run_of(TIME=0.0)])
+    runs.peak, runs.peak_time, runs.square, runs.energy = [3, 5], [0.1, 0.2], [16, 36], [-1, 1]
+    found = verdicts.inputs(runs)
     assert found.peak.tolist() == [[3, 5]] * 2
     assert found.peak_time.tolist() == [[0.1, 0.2]] * 2
     assert found.rms.tolist() == [[2, 3], [0, 0]]
@@ -226,17 +225,17 @@ def batch(system, *monitors, rows=5):
     state[:, 0] += 1.0
     empty = np.zeros((runs, rows, 0))
     samples = Samples(state, np.ones((runs, rows, M)), empty, empty, empty, empty)
-    return combination, span, Outcome(samples, np.stack(monitors))
+    return combination, span, Outcome(samples, watch.together(monitors))
 
 
 def monitor_of(**entries):
     """As run_of, for two constraints."""
-    monitor = np.zeros(watch.length(M, 2))
-    monitor[watch.STARTED] = 1.0
-    monitor[watch.worst_at(2) : watch.worst_at(2) + 4] = [-3.0, -2.0, 0.3, 0.2]
-    monitor[watch.inputs_at(2) : watch.inputs_at(2) + 2 * M] = [4.0, 7.0, 0.4, 0.7]
+    monitor = watch.fresh(M, 2)
+    monitor.started = 1.0
+    monitor.worst[:], monitor.worst_time[:] = [-3.0, -2.0], [0.3, 0.2]
+    monitor.peak[:], monitor.peak_time[:] = [4.0, 7.0], [0.4, 0.7]
     for name, value in entries.items():
-        monitor[getattr(watch, name)] = value
+        monitor[name.lower()] = value
     return monitor
 
 

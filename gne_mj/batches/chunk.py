@@ -20,7 +20,6 @@ from gne_mj.batches.summary import (
 from gne_mj.errors import InfeasibleStart, part_of
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.batch import Case
-from gne_mj.loops.faults import SEED
 from gne_mj.loops.layout import Setup
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
@@ -185,7 +184,7 @@ def _seeded(setup: Setup, seed: int) -> Setup:
     """The same run with other random numbers in its faults."""
     faults = setup.problem.faults
     numbers = faults.numbers.copy()
-    numbers[SEED] = seed
+    numbers.seed = seed
     return setup._replace(problem=setup.problem._replace(faults=faults._replace(numbers=numbers)))
 
 

@@ -366,5 +366,5 @@ def _one_run(combination: Combination, record: int) -> Labelled:
     rows = Recorder(
         1, span.rows, (m, system.agents.states), len(system.loop_memory), bool(system.faults)
     )
-    monitor = np.zeros((1, watch.length(m, system.game.constraints_count)))
+    monitor = watch.fresh(m, system.game.constraints_count, 1)
     return columns_of(combination, span, Outcome(rows.all(), monitor), record)

@@ -17,7 +17,7 @@ from gne_mj.plain import raise_pending
 from gne_mj.plants import mjcf_file
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mujoco import NA, NQ, NV, SIZES
+from gne_mj.plants.mujoco import sizes_in
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     STATE,
@@ -33,7 +33,7 @@ from gne_mj.plants.native_mujoco import (
     table_of,
     timed_step,
 )
-from gne_mj.table import Table, integers
+from gne_mj.table import Table
 
 # What a look found in place of the first constraint that is violated
 INSIDE, DIVERGED = -1, -2
@@ -84,8 +84,8 @@ def build(at: Offsets, fleet: ModuleType) -> Any:
         """
         _ = source
         table = abs(table_of(at, model, data))
-        sizes = integers(table, SIZES)
-        nq, nv, na = sizes[NQ], sizes[NV], sizes[NA]
+        sizes = sizes_in(table)
+        nq, nv, na = sizes.nq, sizes.nv, sizes.na
         qpos, qvel = field(data, at.qpos, nq), field(data, at.qvel, nv)
         act = field(data, at.act, na)
         for taken in range(steps + 1):

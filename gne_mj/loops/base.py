@@ -2,8 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
 PIECE = 1_000_000
 
 
-@dataclass(frozen=True)
-class Samples:
+class Samples(NamedTuple):
     """What a loop recorded at the sample times, one row each.
 
     Attributes:
@@ -34,26 +32,25 @@ class Samples:
             agents, whose state says it, (samples, 0).
     """
 
-    state: NDArray[np.float64]
-    input: NDArray[np.float64]
-    memory: NDArray[np.float64]
-    seen: NDArray[np.float64]
-    acts: NDArray[np.float64]
-    configuration: NDArray[np.float64]
+    state: Annotated[NDArray[np.float64], "m, states"]
+    input: Annotated[NDArray[np.float64], "m"]
+    memory: Annotated[NDArray[np.float64], "memory"]
+    seen: Annotated[NDArray[np.float64], "m * faulty"]
+    acts: Annotated[NDArray[np.float64], "m * faulty"]
+    configuration: Annotated[NDArray[np.float64], "joints"]
 
     @classmethod
     def join(cls, parts: Sequence["Samples"]) -> "Samples":
         """One after the other."""
-        names = [each.name for each in fields(cls)]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def thinned(self, every: int) -> "Samples":
         """Every so many-th row."""
-        return Samples(*(getattr(self, each.name)[::every] for each in fields(self)))
+        return Samples(*(column[::every] for column in self))
 
     def first(self, rows: int) -> "Samples":
         """So many rows; all but some of the last ones if negative."""
-        return Samples(*(getattr(self, each.name)[:rows] for each in fields(self)))
+        return Samples(*(column[:rows] for column in self))
 
 
 class Present(NamedTuple):
@@ -68,11 +65,11 @@ class ClosedLoop(ABC):
     """One system's plant, game and law, advanced natively from sample to sample.
 
     Attributes:
-        monitor: the flat array of :mod:`gne_mj.loops.monitor`.
+        monitor: what :mod:`gne_mj.loops.monitor` measures, by name.
         keeps: what must live as long as the loop, as plain functions that it knows by address.
     """
 
-    monitor: NDArray[np.float64]
+    monitor: Any
     keeps: object = None
 
     @abstractmethod
@@ -88,7 +85,7 @@ class ClosedLoop(ABC):
 
         In pieces, so that Ctrl-C is heard between them.
         """
-        while steps > 0 and self.monitor[watch.EXIT] == watch.INSIDE:
+        while steps > 0 and self.monitor.exit == watch.INSIDE:
             self.advance(1, min(steps, PIECE))
             steps -= PIECE
 
@@ -114,7 +111,7 @@ class ClosedLoop(ABC):
         """
         self._adopt(setup)
         # V is measured from another equilibrium now, so that a step across the change says nothing.
-        self.monitor[watch.STORAGE] = np.nan
+        self.monitor.storage = np.nan
 
     @abstractmethod
     def _adopt(self, setup: "Setup") -> None:

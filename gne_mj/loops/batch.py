@@ -10,7 +10,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,21 +73,20 @@ class Outcome:
 
     Attributes:
         samples: rows of every run, (runs, rows, ...), not numbers from a run's exit on.
-        monitors: (runs, :func:`gne_mj.loops.monitor.length`).
+        monitors: (runs,), see :func:`gne_mj.loops.monitor.fresh`.
     """
 
     samples: Samples
-    monitors: NDArray[np.float64]
+    monitors: Any
 
     def part(self, runs: slice) -> "Outcome":
         """Of some runs only."""
-        columns = (getattr(self.samples, each.name)[runs] for each in fields(Samples))
-        return Outcome(Samples(*columns), self.monitors[runs])
+        return Outcome(Samples(*(column[runs] for column in self.samples)), self.monitors[runs])
 
 
 def begin(
     cases: Sequence[Case], span: Span, faulty: bool
-) -> tuple[list[Table], Steps, Recorder, NDArray[np.float64]]:
+) -> tuple[list[Table], Steps, Recorder, Any]:
     """What a native batch begins with: tables, the sizes that all share, room for rows, monitors.
 
     Args:
@@ -98,7 +98,7 @@ def begin(
     sizes = steps_of(tables[0])
     m, p, states, memory = sizes.actions, sizes.constraints, sizes.states, sizes.memory
     recorder = Recorder(len(cases), span.rows, (m, states), memory, faulty, every=span.every)
-    return tables, sizes, recorder, np.zeros((len(cases), watch.length(m, p)))
+    return tables, sizes, recorder, watch.fresh(m, p, len(cases))
 
 
 class BatchLoop(ABC):
@@ -119,7 +119,7 @@ class EachLoop(BatchLoop):
         """See the base class."""
         whole, rest = divmod(span.steps, span.every)
 
-        def one(case: Case) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]] | None:
+        def one(case: Case) -> tuple[list[NDArray[np.float64]], Any] | None:
             loop, parts = case.loop(), []
             for first in range(0, whole, SLICE):
                 if stopped():
@@ -132,8 +132,7 @@ class EachLoop(BatchLoop):
             if done == span.rows - 1 and not np.any(np.isnan(last.input)):
                 parts.append(last)
             columns = []
-            for each in fields(Samples):
-                found = np.concatenate([getattr(part, each.name) for part in parts])
+            for found in Samples.join(parts):
                 column = np.full((span.rows, *found.shape[1:]), np.nan)
                 column[: len(found)] = found
                 columns.append(column)
@@ -147,7 +146,7 @@ class EachLoop(BatchLoop):
         columns = zip(*(columns for columns, _ in kept), strict=True)
         return Outcome(
             Samples(*(np.stack(column) for column in columns)),
-            np.stack([monitor for _, monitor in kept]),
+            watch.together([monitor for _, monitor in kept]),
         )
 
 

@@ -16,7 +16,7 @@ length times the closed loop's rate. An ordinary piece stands. Of any other
 
 A piece that fails is taken back and halved. One that succeeds by far is followed by one of twice
 its length, where that lies on the coarser grid and no piece has failed lately. All this depends on
-the present state alone, which ``work.division`` is part of, so that a run comes out the same
+the present state alone, which ``work`` is part of, so that a run comes out the same
 however it is cut into calls.
 
 Where a law does not measure what its barrier keeps inside, as the fully distributed one, and
@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from gne_mj.controllers.settings import GUARDED
 from gne_mj.loops import monitor as watch
 from gne_mj.native import copy, kernel
-from gne_mj.records import in_array
+from gne_mj.numbers import Numbers
 
 FINEST = 12  # steps are halved at most so often
 PIECES = 1 << FINEST
@@ -44,20 +44,23 @@ DEEPEST = 32  # to tell whether an exit is the law's own: so often
 UNITS = 1 << DEEPEST
 SHARES = tuple(2.0**-level for level in range(DEEPEST + 1))
 
-# Entries of ``work.division``, before the arrays of Stages
-LEVEL = 0  # pieces are 2^-LEVEL of a step
-POSITION = 1  # where in its step the next piece begins, in 1/UNITS of it
-CALM = 2  # pieces since one failed
-KNOWN = 3  # what is evaluated at the present state, one of the constants below
-SPLIT = 4  # 1: the present step is divided
-EASY = 5  # 1: twice the length is sure to do
-RATED = 6  # Euler, 1: the second row of Stages.g has the rates of g in the piece before
-SIZED = 7  # 1: Stages.size is known
-DEEP = 8  # pieces shorter than 1/PIECES since one that was not
-HEADER = 9
+
+class Division(Numbers):
+    """How the present step is divided: ``work.division``."""
+
+    level: float  # pieces are 2^-level of a step
+    position: float  # where in its step the next piece begins, in 1/UNITS of it
+    calm: float  # pieces since one failed
+    known: float  # what is evaluated at the present state, one of the constants below
+    split: float  # 1: the present step is divided
+    easy: float  # 1: twice the length is sure to do
+    rated: float  # Euler, 1: the second row of Stages.g has the rates of g in the piece before
+    sized: float  # 1: Stages.size is known
+    deep: float  # pieces shorter than 1/PIECES since one that was not
+
 
 END = -1  # in place of a stage's number: the end of a piece
-NOTHING, OUTPUTS, LAW = range(3)  # KNOWN: outputs and slacks; these and what the law asks for
+NOTHING, OUTPUTS, LAW = range(3)  # known: outputs and slacks; these and what the law asks for
 
 # An ordinary piece: z, the outputs' differences that are none beside their size, and the part of a
 # slack that changes. Its error is below 1e-7 of that slack.
@@ -75,27 +78,12 @@ CALM_FOR = 32  # pieces after a failure before twice the length is tried again
 
 
 class Stages(NamedTuple):
-    """What a piece's stages have shown, stage after stage; views of ``work.division``."""
+    """What a piece's stages have shown, stage after stage; ``work.stages``."""
 
     y: Annotated[np.ndarray, "4 * m"]  # outputs
     g: Annotated[np.ndarray, "4 * p"]  # constraints
     # typical sizes of outputs, then of each slack: at the start or at y*
     size: Annotated[np.ndarray, "1 + p"]
-
-
-_length, _views = in_array(Stages, "m p")
-
-
-@kernel
-def length(m, p):
-    """Entries of ``work.division``."""
-    return HEADER + _length(m, p)
-
-
-@kernel
-def stages_of(division, m, p):
-    """The arrays in ``work.division``."""
-    return _views(division, HEADER, m, p)
 
 
 def sizes_at(y: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,19 +94,19 @@ def sizes_at(y: NDArray[np.float64], slacks: NDArray[np.float64]) -> NDArray[np.
 @kernel
 def piece(division, h):
     """Length in s of the present piece."""
-    return h * SHARES[int(division[LEVEL])]
+    return h * SHARES[int(division.level)]
 
 
 @kernel
 def begins(division, step, h):
     """Time in s at which the present piece begins."""
-    return step * h + division[POSITION] * (h * SHARES[DEEPEST])
+    return step * h + division.position * (h * SHARES[DEEPEST])
 
 
 @kernel
 def ends(division, step, h):
     """Time in s at which it ends, to the bit that at which the next one begins."""
-    position = division[POSITION] + UNITS * SHARES[int(division[LEVEL])]
+    position = division.position + UNITS * SHARES[int(division.level)]
     if position == UNITS:
         return (step + 1) * h
     return step * h + position * (h * SHARES[DEEPEST])
@@ -127,10 +115,9 @@ def ends(division, step, h):
 @kernel
 def note(stage, problem, work):
     """Keep what a stage has shown."""
-    m, p = len(work.y), len(work.g)
-    stages = stages_of(work.division, m, p)
-    if work.division[SIZED] == 0.0:  # the start of the run
-        work.division[SIZED] = 1.0
+    m, p, stages = len(work.y), len(work.g), work.stages
+    if work.division.sized == 0.0:  # the start of the run
+        work.division.sized = 1.0
         copy(problem.size, stages.size)
         for r in range(m):
             stages.size[0] = max(stages.size[0], abs(work.y[r]))
@@ -177,9 +164,9 @@ def error_of(count, h, problem, work, stages, k):
     """The error of slack k in a piece of h seconds over what is allowed of it."""
     m, p, start = len(work.y), len(work.g), stages.g[k]
     slack = -start - problem.data.tightening[k]
-    finest = work.division[LEVEL] >= FINEST
+    finest = work.division.level >= FINEST
     if count == 1:
-        if work.division[RATED] == 0.0 or finest:
+        if work.division.rated == 0.0 or finest:
             return 0.0
         error = 0.5 * abs(work.g[k] - start - h * stages.g[p + k])
         return error / (OF_SLACK_EULER * slack)
@@ -213,23 +200,22 @@ def judge(count, h, problem, work):
         h: the piece's length in s.
         problem, work: of the run.
     """
-    division, p = work.division, len(work.g)
-    stages = stages_of(division, len(work.y), p)
-    division[CALM] += 1.0
-    division[EASY] = 1.0 if division[CALM] >= CALM_FOR else 0.0
+    division, stages, p = work.division, work.stages, len(work.g)
+    division.calm += 1.0
+    division.easy = 1.0 if division.calm >= CALM_FOR else 0.0
     if ordinary(count, problem, work, stages):
-        division[RATED] = 0.0
+        division.rated = 0.0
         return -1
-    finest = division[LEVEL] >= FINEST
+    finest = division.level >= FINEST
     for k in range(p):
         error = error_of(count, h, problem, work, stages, k)
         use, gain = use_of(count, problem, work, stages, k)
         if not error <= 1.0 or not gain <= GAIN or not (use <= USE or finest):
             return k
         if GROWTH * error > 1.0 or use > 0.4 * USE or gain > 0.4 * GAIN:
-            division[EASY] = 0.0
+            division.easy = 0.0
     if count == 1:
-        division[RATED] = 1.0
+        division.rated = 1.0
         for k in range(p):
             stages.g[p + k] = (work.g[k] - stages.g[k]) / h
     return -1
@@ -238,21 +224,21 @@ def judge(count, h, problem, work):
 @kernel
 def go_on(division, h, monitor):
     """Move on to the end of a piece that stands; whether its step is done."""
-    level = int(division[LEVEL])
-    division[DEEP] = division[DEEP] + 1.0 if level > FINEST else 0.0
+    level = int(division.level)
+    division.deep = division.deep + 1.0 if level > FINEST else 0.0
     if level > 0:
-        division[SPLIT] = 1.0
+        division.split = 1.0
         length = h * SHARES[level]
-        if monitor[watch.SMALLEST_STEP] == 0.0 or length < monitor[watch.SMALLEST_STEP]:
-            monitor[watch.SMALLEST_STEP] = length
-    position = int(division[POSITION]) + (UNITS >> level)
-    if level > 0 and division[EASY] > 0.0 and position % (2 * (UNITS >> level)) == 0:
-        division[LEVEL] -= 1.0
-    division[POSITION] = position % UNITS
+        if monitor.smallest_step == 0.0 or length < monitor.smallest_step:
+            monitor.smallest_step = length
+    position = int(division.position) + (UNITS >> level)
+    if level > 0 and division.easy > 0.0 and position % (2 * (UNITS >> level)) == 0:
+        division.level -= 1.0
+    division.position = position % UNITS
     if position < UNITS:
         return False
-    monitor[watch.DIVIDED] += division[SPLIT]
-    division[SPLIT] = 0.0
+    monitor.divided += division.split
+    division.split = 0.0
     return True
 
 
@@ -271,25 +257,25 @@ def halve(faults, step, h, which, problem, work, monitor):
         problem, work, monitor: of the run.
     """
     division = work.division
-    left = monitor[watch.EXIT] == watch.LEFT_SET
+    left = monitor.exit == watch.LEFT_SET
     obeyed = True
     for r in range(len(work.u)):
         obeyed &= work.u[r] == work.demand[r]
     guarded = obeyed and problem.settings[GUARDED] > 0.0 and faults.measured(problem)
-    level = int(division[LEVEL])
+    level = int(division.level)
     doubtful = (left and obeyed and not guarded) or level > FINEST
-    division[KNOWN] = NOTHING
-    if level < FINEST or (doubtful and level < DEEPEST and division[DEEP] < PIECES):
-        division[LEVEL] += 1.0
-        division[CALM] = 0.0
+    division.known = NOTHING
+    if level < FINEST or (doubtful and level < DEEPEST and division.deep < PIECES):
+        division.level += 1.0
+        division.calm = 0.0
         watch.forget_exit(monitor)
         return True
     if left and (guarded or (doubtful and level < DEEPEST)):
-        which = int(monitor[watch.EXIT_CONSTRAINT])
+        which = int(monitor.exit_constraint)
         watch.forget_exit(monitor)
-    start = stages_of(division, len(work.y), len(work.g)).g
+    start = work.stages.g
     watch.leave(
         monitor, watch.STEP_TOO_SMALL, begins(division, step, h), -1, which, start[which], 0
     )
-    division[POSITION] = 0.0
+    division.position = 0.0
     return False

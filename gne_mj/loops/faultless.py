@@ -17,10 +17,10 @@ def measured(problem):
 
 
 @kernel
-def begin(channels, problem, clock, step, stage, state, memory, work):
+def begin(parts, at, state, memory):
     """Nothing happens but that the outputs are what the law's memory is held at."""
-    if clock.mode != 0:
-        copy(work.y, work.held)
+    if parts.clock.mode != 0:
+        copy(parts.work.y, parts.work.held)
 
 
 @kernel
@@ -30,22 +30,26 @@ def choose(y, seen):
 
 
 @kernel
-def sense(problem, clock, step, stage, work, y, seen):
-    """The outputs (m,) that the law sees: y, or ``seen``, filled."""
+def sense(problem, work, y, seen):
+    """The outputs (m,) that the law sees: work.y or work.seen, which are given, the latter filled.
+
+    Native code returns no arrays but those that it was given as such.
+    """
     return y
 
 
 @kernel
-def sense_state(plant, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, parts, step, state, known, scratch):
     """The flat state as the law has it: the state, or ``known``, filled."""
     return state
 
 
 @kernel
-def deliver(problem, clock, step, stage, work):
+def deliver(problem, clock, step, work):
     """Fill work.u with the demand within the actuators' limits."""
+    limit = problem.limit
     for r in range(len(work.u)):
-        work.u[r] = min(max(work.demand[r], -problem.limit[r]), problem.limit[r])
+        work.u[r] = min(max(work.demand[r], -limit[r]), limit[r])
 
 
 @kernel
@@ -55,5 +59,5 @@ def push(problem, clock, step, u, acts):
 
 
 @kernel
-def record(channels, problem, clock, step, state, u, work, seen, acts):
+def record(parts, step, state, seen, acts):
     """Nothing to record: outputs and inputs are what they are."""

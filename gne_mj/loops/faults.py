@@ -11,20 +11,18 @@ memory has what came last over every link, and behind it a ring of the rows that
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.settings import DEALT, LINKS, PENALTY, SHELL, SHELL_VALUE
-from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS
+from gne_mj.controllers.settings import LINKS
+from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Fault
 from gne_mj.native import compiled, copy, kernel
+from gne_mj.numbers import numbers_in
 
 # Kinds of rows, in their order in ``Faults.rows``
 PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
-# Columns: channel, link or agent; from and until when in s; how much; a push's shape and its
-# period in s; which random numbers
-TARGET, START, END, SIZE, SHAPE, PERIOD, STREAM = range(FAULT_COLUMNS)
-STEADY, SINE, SQUARE, RANDOM = range(4)
+STEADY, SINE, SQUARE, RANDOM = range(4)  # forms of pushes
 # Whether the law's action follows from the present state alone, whichever step comes next
 KNOWN_AHEAD = False
-# Entries of ``Faults.numbers``; delays in control periods
-SEED, SENSOR_DELAY, MESSAGE_DELAY, NUMBERS = range(4)
+
+_fault_at = numbers_in(Fault)
 
 _GOLDEN, _FIRST, _SECOND = (
     np.uint64(0x9E3779B97F4A7C15),
@@ -52,15 +50,21 @@ def uniform(seed, stream, target, count):
 
 
 @kernel
+def fault(faults, f):
+    """The f-th fault."""
+    return _fault_at(faults.rows, f * FAULT_COLUMNS)
+
+
+@kernel
 def active(row, time):
     """Whether a fault is on; half a nanosecond of rounding does not count."""
-    return row[START] <= time + 5e-10 and time + 5e-10 < row[END]
+    return row.start <= time + 5e-10 and time + 5e-10 < row.end
 
 
 @kernel
 def spread(faults, row, count):
     """A random number between -1 and 1 for this row and step."""
-    return 2.0 * uniform(faults.numbers[SEED], row[STREAM], row[TARGET], count) - 1.0
+    return 2.0 * uniform(faults.numbers.seed, row.stream, row.target, count) - 1.0
 
 
 @kernel
@@ -73,24 +77,24 @@ def count_of(clock, step):
 def measured(problem):
     """Whether the law has the outputs as they are: no noise, no bias, no delay."""
     faults = problem.faults
-    return faults.pointer[NOISE] == faults.pointer[BIAS + 1] and faults.numbers[SENSOR_DELAY] == 0.0
+    return faults.pointer[NOISE] == faults.pointer[BIAS + 1] and faults.numbers.sensor_delay == 0.0
 
 
 @kernel
-def begin(channels, problem, clock, step, stage, state, memory, work):
+def begin(parts, at, state, memory):
     """What happens before the law acts: sensors read, estimates corrupted, messages exchanged."""
-    m, count = len(work.y), count_of(clock, step)
-    fresh = stage == 0 and work.now[DEALT] <= step
-    if stage == 0:
-        work.now[DEALT] = step + 1.0
-    read_sensors(channels, problem, clock, count, step, state, work)
-    if clock.mode != 0:
+    work, step = parts.work, at.step
+    fresh = at.stage == 0 and work.now.dealt <= step
+    if at.stage == 0:
+        work.now.dealt = step + 1.0
+    read_sensors(parts, step, state)
+    if parts.clock.mode != 0:
         copy(work.seen, work.held)
     if len(memory) > 0:
         if fresh:
-            corrupt(problem, clock, count, step, m, memory)
-        if problem.settings[LINKS] > 0.0:
-            exchange(problem, clock, count, step, memory, work)
+            corrupt(parts.problem, parts.clock, step, memory)
+        if parts.problem.settings[LINKS] > 0.0:
+            exchange(parts.problem, parts.clock, step, memory, work)
 
 
 @kernel
@@ -100,10 +104,11 @@ def choose(y, seen):
 
 
 @kernel
-def read_sensors(channels, problem, clock, count, step, state, work):
+def read_sensors(parts, step, state):
     """Fill work.seen (m,) with the outputs as they are read, which may be of some periods ago."""
-    faults, m, time = problem.faults, len(work.y), step * clock.h
-    delay = int(faults.numbers[SENSOR_DELAY])
+    work, faults = parts.work, parts.problem.faults
+    m, time, count = len(work.y), step * parts.clock.h, count_of(parts.clock, step)
+    delay = int(faults.numbers.sensor_delay)
     if delay > 0:
         slots = delay + 1
         size = (len(work.history) // slots) - m
@@ -112,45 +117,45 @@ def read_sensors(channels, problem, clock, count, step, state, work):
         copy(state[:size], work.history[at : at + size])
         at = (max(count - delay, 0) % slots) * size
         for r in range(m):
-            work.seen[r] = work.history[at + r * states + channels.output]
+            work.seen[r] = work.history[at + r * states + parts.channels.output]
     else:
         copy(work.y, work.seen)
     for f in range(faults.pointer[NOISE], faults.pointer[NOISE + 1]):
-        row = faults.rows[f]
+        row = fault(faults, f)
         if active(row, time):
-            work.seen[int(row[TARGET])] += row[SIZE] * spread(faults, row, count)
+            work.seen[int(row.target)] += row.amount * spread(faults, row, count)
     for f in range(faults.pointer[BIAS], faults.pointer[BIAS + 1]):
-        row = faults.rows[f]
+        row = fault(faults, f)
         if active(row, time):
-            work.seen[int(row[TARGET])] += row[SIZE]
+            work.seen[int(row.target)] += row.amount
 
 
 @kernel
-def corrupt(problem, clock, count, step, m, memory):
+def corrupt(problem, clock, step, memory):
     """Shift an agent's estimates, once, at the first control instant from a fault's start on."""
-    faults, time = problem.faults, step * clock.h
+    faults, m, time = problem.faults, len(problem.data.owner), step * clock.h
     for f in range(faults.pointer[CORRUPTION], faults.pointer[CORRUPTION + 1]):
-        row = faults.rows[f]
+        row = fault(faults, f)
         long = clock.h if clock.mode == 0 else clock.h * clock.period
-        if row[START] <= time + 5e-10 and time + 5e-10 < row[START] + long:
-            i = int(row[TARGET])
+        if row.start <= time + 5e-10 and time + 5e-10 < row.start + long:
+            i = int(row.target)
             for r in range(m):
                 if problem.data.owner[r] != i:
-                    shift = 2.0 * uniform(faults.numbers[SEED], row[STREAM], i * m + r, 0) - 1.0
-                    memory[i * m + r] += row[SIZE] * shift
+                    shift = 2.0 * uniform(faults.numbers.seed, row.stream, i * m + r, 0) - 1.0
+                    memory[i * m + r] += row.amount * shift
 
 
 @kernel
 def comes(faults, time, count, link):
     """Whether the message over a link is not lost in a control period; it may still be late."""
     for f in range(faults.pointer[LOSS], faults.pointer[LOSS + 1]):
-        row = faults.rows[f]
-        chance = uniform(faults.numbers[SEED], row[STREAM], link, count)
-        if row[TARGET] == link and active(row, time) and chance < row[SIZE]:
+        row = fault(faults, f)
+        chance = uniform(faults.numbers.seed, row.stream, link, count)
+        if row.target == link and active(row, time) and chance < row.amount:
             return False
     for f in range(faults.pointer[SILENCE], faults.pointer[SILENCE + 1]):
-        row = faults.rows[f]
-        if row[TARGET] == link and active(row, time):
+        row = fault(faults, f)
+        if row.target == link and active(row, time):
             return False
     return True
 
@@ -172,12 +177,13 @@ def count_messages(faults, h, period, first, last, out):
 
 
 @kernel
-def exchange(problem, clock, count, step, memory, work):
+def exchange(problem, clock, step, memory, work):
     """Send all rows; over each link comes what was sent some periods ago, or nothing."""
     data, graph, faults = problem.data, problem.graph, problem.faults
     agents, m, time = len(data.offsets) - 1, len(work.y), step * clock.h
+    count = count_of(clock, step)
     links = int(problem.settings[LINKS])
-    ring, slots = links + len(graph.neighbour) * m, int(faults.numbers[MESSAGE_DELAY]) + 1
+    ring, slots = links + len(graph.neighbour) * m, int(faults.numbers.message_delay) + 1
     at = ring + (count % slots) * agents * m
     for r in range(m):
         memory[data.owner[r] * m + r] = work.seen[r]
@@ -185,36 +191,37 @@ def exchange(problem, clock, count, step, memory, work):
     for link in range(len(graph.neighbour)):
         delay = 0
         for f in range(faults.pointer[LATE], faults.pointer[LATE + 1]):
-            row = faults.rows[f]
-            if row[TARGET] == link and active(row, time):
-                delay = max(delay, int(row[SIZE]))
+            row = fault(faults, f)
+            if row.target == link and active(row, time):
+                delay = max(delay, int(row.amount))
         if comes(faults, time, count, link) and count >= delay:
             sent = ring + ((count - delay) % slots) * agents * m + graph.neighbour[link] * m
             copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
 
 
 @kernel
-def sense(problem, clock, step, stage, work, y, seen):
+def sense(problem, work, y, seen):
     """The outputs (m,) that the law sees: ``seen``. Fills the barrier's weights there."""
-    rho, data = work.now[PENALTY], problem.data
-    work.now[SHELL] = -1.0
+    rho, data = work.now.penalty, problem.data
+    work.now.shell = -1.0
     for k in range(len(work.weights)):
         room = -games.constraint(data, k, seen) - data.tightening[k]
         work.weights[k] = rho / room
-        if not room > 0.0 and work.now[SHELL] < 0.0:
-            work.now[SHELL], work.now[SHELL_VALUE] = float(k), -room
+        if not room > 0.0 and work.now.shell < 0.0:
+            work.now.shell, work.now.shell_value = float(k), -room
     return seen
 
 
 @kernel
-def sense_state(plant, problem, channels, clock, step, work, state, known, scratch):
+def sense_state(plant, parts, step, state, known, scratch):
     """The flat state as the law has it: ``known``, filled.
 
     A state of some periods ago is moved on by the plant's map under the inputs asked for since.
     """
-    faults, count = problem.faults, count_of(clock, step)
+    work, channels, faults = parts.work, parts.channels, parts.problem.faults
+    count = count_of(parts.clock, step)
     m, states = channels.rest.shape
-    delay = int(faults.numbers[SENSOR_DELAY])
+    delay = int(faults.numbers.sensor_delay)
     late, size, slots = min(delay, count), m * states, delay + 1
     if delay > 0:
         at = ((count - late) % slots) * size
@@ -225,22 +232,22 @@ def sense_state(plant, problem, channels, clock, step, work, state, known, scrat
         known[r * states + channels.output] = work.seen[r]
     for ago in range(late):
         at = slots * size + ((count - late + ago) % slots) * m
-        plant.roll(channels, clock, known, work.history[at : at + m], scratch)
+        plant.roll(channels, parts.clock, known, work.history[at : at + m], scratch)
     return known
 
 
 @kernel
-def deliver(problem, clock, step, stage, work):
+def deliver(problem, clock, step, work):
     """Fill work.u with the demand within the limits of now."""
     faults, m, time = problem.faults, len(work.u), step * clock.h
     for r in range(m):
         limit = problem.limit[r]
         for f in range(faults.pointer[LIMIT], faults.pointer[LIMIT + 1]):
-            row = faults.rows[f]
-            if row[TARGET] == r and active(row, time):
-                limit = min(limit, row[SIZE])
+            row = fault(faults, f)
+            if row.target == r and active(row, time):
+                limit = min(limit, row.amount)
         work.u[r] = min(max(work.demand[r], -limit), limit)
-    delay = int(faults.numbers[SENSOR_DELAY])
+    delay = int(faults.numbers.sensor_delay)
     if delay > 0:
         slots = delay + 1
         size = (len(work.history) // slots) - m
@@ -254,28 +261,29 @@ def push(problem, clock, step, u, acts):
     faults, time = problem.faults, step * clock.h
     copy(u, acts)
     for f in range(faults.pointer[PUSH], faults.pointer[PUSH + 1]):
-        row = faults.rows[f]
+        row = fault(faults, f)
         if active(row, time):
             phase = 0.0
-            if row[PERIOD] > 0.0:
-                phase = (time + 5e-10 - row[START]) / row[PERIOD]
-            size = row[SIZE]
-            if row[SHAPE] == SINE:
+            if row.period > 0.0:
+                phase = (time + 5e-10 - row.start) / row.period
+            size = row.amount
+            if row.form == SINE:
                 size *= np.sin(2.0 * np.pi * phase)
-            elif row[SHAPE] == SQUARE:
+            elif row.form == SQUARE:
                 size *= 1.0 if np.floor(2.0 * phase) % 2.0 == 0.0 else -1.0
-            elif row[SHAPE] == RANDOM:
+            elif row.form == RANDOM:
                 size *= spread(faults, row, step)
-            acts[int(row[TARGET])] += size
+            acts[int(row.target)] += size
     return acts
 
 
 @kernel
-def record(channels, problem, clock, step, state, u, work, seen, acts):
-    """Fill rows (m,) with what the law has seen for the input u of this step, and what acts."""
+def record(parts, step, state, seen, acts):
+    """Fill rows (m,) with what the law has seen for the input of this step, and what acts."""
+    work, channels = parts.work, parts.channels
     copy(work.seen, seen)
     states = channels.rest.shape[1]
-    if clock.mode == 0:  # the look may have been at a later stage, with the step's own errors
-        for r in range(len(u)):
+    if parts.clock.mode == 0:  # the look may have been at a later stage, with its own errors
+        for r in range(len(seen)):
             seen[r] += state[r * states + channels.output] - work.y[r]
-    push(problem, clock, step, u, acts)
+    push(parts.problem, parts.clock, step, parts.u, acts)

@@ -6,12 +6,13 @@ import numpy as np
 
 from gne_mj import game_functions as games
 from gne_mj.controllers.propagation import Propagator, scratch_length
-from gne_mj.controllers.settings import NOW, PENALTY, RHO, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import RHO, Now
 from gne_mj.game import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.native import kernel
+from gne_mj.numbers import Numbers, names_of, numbers
 from gne_mj.records import in_array
 
 # MuJoCo silently applies no force at all beyond this magnitude (its mjMAXVAL).
@@ -28,20 +29,38 @@ class Order(NamedTuple):
     within: Annotated[np.ndarray, "n", int]  # and the constraint that each of these entries is of
 
 
+class Fault(Numbers):
+    """One fault of one target; times in s."""
+
+    target: float  # channel, link or agent
+    start: float
+    end: float
+    amount: float
+    form: float  # a push's, see gne_mj.loops.faults
+    period: float  # a push's, in s
+    stream: float  # which random numbers
+
+
+class FaultNumbers(Numbers):
+    """What holds for all faults of a run; delays in control periods."""
+
+    seed: float
+    sensor_delay: float
+    message_delay: float  # the greatest
+
+
 class Faults(NamedTuple):
     """Faults of a run, see :mod:`gne_mj.loops.faults`."""
 
-    rows: Annotated[np.ndarray, "n // columns, columns"]  # (faults, columns), sorted by kind
-    # kind k has the rows from pointer[k] to pointer[k + 1]
+    rows: Annotated[np.ndarray, "n"]  # one Fault after the other, sorted by kind
+    # kind k has those from pointer[k] to pointer[k + 1]
     pointer: Annotated[np.ndarray, "n", int]
-    numbers: Annotated[np.ndarray, "3"]  # [seed, sensor delay, greatest message delay], in periods
+    numbers: FaultNumbers
 
 
 NO_ORDER = Order(*(np.zeros(n, dtype=np.int64) for n in (0, 2, 0, 0, 0)))
-FAULT_COLUMNS, FAULT_KINDS = 7, 8
-NO_FAULTS = Faults(
-    np.zeros((0, FAULT_COLUMNS)), np.zeros(FAULT_KINDS + 1, dtype=np.int64), np.zeros(3)
-)
+FAULT_COLUMNS, FAULT_KINDS = len(names_of(Fault)), 8
+NO_FAULTS = Faults(np.zeros(0), np.zeros(FAULT_KINDS + 1, dtype=np.int64), numbers(FaultNumbers))
 
 
 class Problem(NamedTuple):
@@ -68,6 +87,7 @@ class Problem(NamedTuple):
 class Work(NamedTuple):
     """Scratch arrays of one loop, so that a step allocates nothing."""
 
+    now: Now
     g: Annotated[np.ndarray, "p"]  # constraint values at the last evaluation
     weights: Annotated[np.ndarray, "p"]  # rho / (-g - t)
     demand: Annotated[np.ndarray, "m"]  # what the law asks for
@@ -75,14 +95,12 @@ class Work(NamedTuple):
     y: Annotated[np.ndarray, "m"]  # outputs
     u: Annotated[np.ndarray, "m"]  # inputs at a stage
     held: Annotated[np.ndarray, "m"]  # outputs at the last control instant, held modes
-    stands: Annotated[np.ndarray, "1"]  # the step that the law's memory belongs to, held modes
     scratch: Annotated[np.ndarray, "propagation(agents)"]  # for the propagation of estimates
-    now: Annotated[np.ndarray, "now_length"]  # see gne_mj.controllers.settings
     seen: Annotated[np.ndarray, "m"]  # outputs as the law sees them
     acts: Annotated[np.ndarray, "m"]  # inputs with pushes, which move the plant
     history: Annotated[np.ndarray, "history"]  # past states and inputs, where sensors are late
-    # of steps, mode continuous: see gne_mj.loops.division
-    division: Annotated[np.ndarray, "divided(m, p)"]
+    division: division.Division  # of steps, mode continuous
+    stages: division.Stages
     solver: Annotated[np.ndarray, "solver"]  # of mode implicit
 
 
@@ -96,10 +114,7 @@ class Sizes(NamedTuple):
 NO_SIZES = Sizes()
 
 
-work_length, work_views = in_array(
-    Work, "m p agents history solver",
-    propagation=scratch_length, now_length=NOW, divided=division.length,
-)  # fmt: skip
+work_length, work_views = in_array(Work, "m p agents history solver", propagation=scratch_length)
 
 
 def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> Work:
@@ -114,15 +129,15 @@ def inside(problem, time, stage, y, work, monitor):
     """Fill work.g, work.weights and work.now; latch an exit, and return False, if g(y) is not < 0.
 
     Outputs that are inside, but closer to the boundary than the barrier's tightening, are no exit;
-    the constraint is in work.now[SHELL], and its weight is of no use.
+    the constraint is in work.now.shell, and its weight is of no use.
     """
     rho = functions.penalty(problem, time, problem.settings[RHO])
-    work.now[PENALTY] = rho
+    work.now.penalty = rho
     outside = games.evaluate(problem.data, rho, y, work.g, work.weights)
-    work.now[SHELL] = outside
+    work.now.shell = outside
     if outside < 0:
         return True
-    work.now[SHELL_VALUE] = work.g[outside] + problem.data.tightening[outside]
+    work.now.shell_value = work.g[outside] + problem.data.tightening[outside]
     for k in range(outside, len(work.g)):
         value = work.g[k]
         if not value < 0.0:
@@ -152,9 +167,9 @@ def feedback(problem, time, stage, y, memory, work, monitor, u):
 @kernel
 def explicit_law(problem, time, stage, y, memory, work, monitor):
     """Fill work.demand by the law at y (m,), whose weights are given; False if it has no action."""
-    shell = int(work.now[SHELL])
+    shell = int(work.now.shell)
     if shell >= 0:
-        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now[SHELL_VALUE], stage)
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now.shell_value, stage)
         return False
     left = functions.action(problem, y, work.weights, memory, work, work.demand)
     if left >= 0:

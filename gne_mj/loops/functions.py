@@ -108,15 +108,15 @@ def settle(problem, ahead, held):
 
 
 @kernel
-def solve(problem, b, memory, work):
+def solve(problem, memory, work):
     """Solve for the outputs of the period's end; how that ended (:mod:`gne_mj.loops.newton`).
 
-    work.solver has base and slope of the plant's map, and b is the half bandwidth of the matrix.
+    work.solver has base and slope of the plant's map.
     """
     return call_integer(
         problem.functions[SOLVE],
         (
-            problem.table, b, address_in(memory), address_in(work.profile), address_in(work.now),
+            problem.table, address_in(memory), address_in(work.profile), address_in(work.now),
             address_in(work.solver), len(work.solver),
         ),
     )  # fmt: skip

@@ -12,11 +12,10 @@ long as the plant does what its map says and the input that is delivered is the 
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.settings import SHELL, SHELL_VALUE
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import usable
-from gne_mj.loops.newton import FOUND, OUTSIDE, STANDS, STEPS, UNSOLVED, solver_in
+from gne_mj.loops.newton import OUTSIDE, UNSOLVED, solver_in
 from gne_mj.native import copy, kernel
 
 # The map may be linearised so often; predictions agree if no constraint differs by more than this
@@ -29,24 +28,21 @@ FAR = 1e-2
 
 
 @kernel
-def act(
-    faults, plant, context, problem, channels, clock, time, step, state, memory, work, monitor
-):  # fmt: skip
+def act(faults, plant, context, parts, at, state, memory):
     """Fill work.demand; False, with the exit latched, if there is no input."""
+    problem, channels, clock, work = parts.problem, parts.channels, parts.clock, parts.work
+    time, step, monitor = at.time, at.step, parts.monitor
     m, states = channels.rest.shape
-    p, b = len(work.g), problem.order.band[0]
-    solver = solver_in(work.solver, problem.order, p, states)
-    found = solver.numbers[FOUND]
-    if solver.numbers[STANDS] == step + 1.0:  # a run that goes on after its end was looked at
+    solver = solver_in(work.solver, problem.order, len(work.g), states)
+    found = solver.numbers.found
+    if solver.numbers.stands == step + 1.0:  # a run that goes on after its end was looked at
         copy(solver.held, work.demand)
         return True
-    solver.numbers[STANDS] = step + 1.0
+    solver.numbers.stands = step + 1.0
     if found > 0.0:
         watch.compare(monitor, time, work.y, solver.ahead)
-    faults.sense(problem, clock, step, 0, work, work.y, work.seen)
-    known = faults.sense_state(
-        plant, problem, channels, clock, step, work, state, solver.state, solver.scratch
-    )
+    faults.sense(problem, work, work.y, work.seen)
+    known = faults.sense_state(plant, parts, step, state, solver.state, solver.scratch)
     if found == 0.0:
         find_slopes(plant, context, channels, clock, known, solver)
     # where the inputs so far lead to
@@ -58,15 +54,15 @@ def act(
         solver.before[r], solver.earlier[r] = last, before
     if found == 0.0:
         copy(problem.equilibrium, solver.ahead)  # inside for certain, as y(0) that is seen is not
-    solver.numbers[FOUND] += 1.0
-    solver.numbers[STEPS] = 0.0
+    solver.numbers.found += 1.0
+    solver.numbers.steps = 0.0
     map_ahead(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     ended, agreed, least = OUTSIDE, False, np.inf
     for _ in range(MOST_MAPS):
         for r in range(m):
             solver.base[r] = solver.reached[r] - solver.slope[r] * solver.u[r]
-        ended = functions.solve(problem, b, memory, work)
+        ended = functions.solve(problem, memory, work)
         if ended == OUTSIDE:
             break
         farthest = 0.0
@@ -90,10 +86,10 @@ def act(
     for r in range(m):
         solver.ahead[r], work.demand[r] = solver.y[r], solver.held[r]
     functions.settle(problem, solver.ahead, work.held)
-    watch.count_solution(monitor, time, solver.numbers[STEPS], agreed and ended < UNSOLVED, least)
+    watch.count_solution(monitor, time, solver.numbers.steps, agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
-        constraint = int(work.now[SHELL])
-        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now[SHELL_VALUE], 0)
+        constraint = int(work.now.shell)
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now.shell_value, 0)
         return False
     return usable(time, 0, work, monitor)
 

@@ -9,19 +9,20 @@ import sys
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import GAIN
 from gne_mj.loops import functions
-from gne_mj.loops.newton import RHO, newton
+from gne_mj.loops.newton import newton
 from gne_mj.native import kernel
 
 _EQUATION = sys.modules[__name__]
+ALONE = False  # whether each agent solves by itself
 
 
 @kernel
-def solve(problem, b, memory, work, solver):
+def solve(problem, memory, work, solver):
     """Fill solver.y from solver.base and solver.slope; returns how that ended."""
     agents = len(problem.data.offsets) - 1
-    return newton(_EQUATION, problem, 0, agents, b, True, memory, work, solver)
+    return newton(_EQUATION, problem, 0, agents, True, memory, work, solver)
 
 
 @kernel
@@ -34,13 +35,13 @@ def row_of(problem, first, r):
 def residual(problem, first, last, memory, work, solver):
     """Fill solver.residual at solver.trial; False if that is not strictly inside."""
     data, y, column, within = problem.data, solver.trial, problem.order.column, problem.order.within
-    weight = problem.settings[GAIN] * solver.numbers[RHO]
+    weight = problem.settings[GAIN] * solver.numbers.rho
     games.values(data, data.all_constraints, y, solver.inverse)
     for k in range(len(solver.inverse)):
         room = -solver.inverse[k] - data.tightening[k]
         if not room > 0.0:
-            work.now[SHELL] = k
-            work.now[SHELL_VALUE] = -room
+            work.now.shell = k
+            work.now.shell_value = -room
             return False
         solver.inverse[k] = 1.0 / room
     functions.pulls(problem, first, last, y, memory, solver.residual)
@@ -59,7 +60,7 @@ def assemble(problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
     data, y, start, column = problem.data, solver.trial, problem.order.start, problem.order.column
     at, position, band = data.offsets, problem.order.position, solver.band
-    scale = problem.settings[GAIN] * solver.numbers[RHO]
+    scale = problem.settings[GAIN] * solver.numbers.rho
     for a in range(len(y)):
         i, r = data.owner[a], position[a]
         for c in range(2 * b + 1):

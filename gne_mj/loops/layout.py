@@ -1,9 +1,8 @@
 """Where a native loop finds its numbers: a table of what does not change, a room of what does.
 
 A table (:mod:`gne_mj.table`) has the plant's arrays first, then the game's, the graph's and all
-else that a run is made of. A room is one flat array: [step, stage, the recorder's block, monitor,
-input held, scratch arrays, what the engine adds]. MuJoCo has it in ``userdata``; so a run's whole
-memory is part of MuJoCo's state.
+else that a run is made of. A room is one flat array, as :class:`Room` says, and behind it what
+the engine adds. MuJoCo has it in ``userdata``; so a run's whole memory is part of MuJoCo's state.
 """
 
 from collections.abc import Sequence
@@ -12,19 +11,18 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.loops import monitor as watch
-from gne_mj.loops.feedback import FAULT_COLUMNS, Problem, work_length, work_views
+from gne_mj.controllers.propagation import scratch_length
+from gne_mj.loops.feedback import Problem, Work
+from gne_mj.loops.monitor import Monitor, Seen
 from gne_mj.native import kernel
+from gne_mj.numbers import Numbers
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
-from gne_mj.records import arrays, in_numbers, in_table, place
+from gne_mj.records import arrays, in_array, in_numbers, in_table, place
 from gne_mj.table import Table, floats
 
 PLANT_TABLE = 3  # arrays of the plant, before all others
-
-# A room's first entries
-STEP_NOW, STAGE_NOW, RECORDER, MONITOR = range(4)
 
 
 class Steps(NamedTuple):
@@ -59,7 +57,7 @@ def _place(name: str) -> int:
 
 STEPS, H = _place("steps"), _place("h")
 steps_in = in_numbers(Steps, STEPS)  # of a table, by its address
-_problem = in_table(Problem, _place("problem"), columns=FAULT_COLUMNS)
+_problem = in_table(Problem, _place("problem"))
 _channels = in_table(Channels, _place("channels"))
 
 
@@ -130,12 +128,6 @@ def problem_and_table(setup: Setup, agents: Agents, memory: int) -> tuple[Proble
 
 
 @kernel
-def room_needed(m, p, agents, history, solver):
-    """Entries of a room, without what the engine adds."""
-    return MONITOR + watch.length(m, p) + m + work_length(m, p, agents, history, solver)
-
-
-@kernel
 def problem_in(table):
     """What the law reads, from a run's table."""
     return _problem(table, steps_in(table).agents)
@@ -155,13 +147,63 @@ def channels_in(table):
     return _channels(table, steps.actions, steps.output)
 
 
+class Progress(Numbers):
+    """How far a run is."""
+
+    step: float  # the present one
+    stage: float  # of it that comes next, in MuJoCo
+    recorder: float  # address of the block that rows go to, 0: none
+
+
+class Room(NamedTuple):
+    """What changes in a run, but for what the engine adds."""
+
+    progress: Progress
+    monitor: Monitor
+    u: Annotated[np.ndarray, "m"]  # input held
+    work: Work
+
+
+ROOM = {"propagation": scratch_length}  # what its shapes use
+_length, _room_in = in_array(Room, "m p agents history solver", **ROOM)
+
+
 @kernel
-def parts_of(room, start, steps):
-    """Views into a room that begins at ``start``: monitor, input, scratch, what is behind them."""
-    m, p, agents, history, solver = (
-        steps.actions, steps.constraints, steps.agents, steps.history, steps.solver
+def loop_room_length(s):
+    """Entries of a room, without what the engine adds; of sizes as a table has them."""
+    return _length(s.actions, s.constraints, s.agents, s.history, s.solver)
+
+
+@kernel
+def loop_room_in(flat, s):
+    """A room's views, without what the engine adds."""
+    return _room_in(flat, 0, s.actions, s.constraints, s.agents, s.history, s.solver)
+
+
+class Parts(NamedTuple):
+    """What kernels of a running loop work on."""
+
+    problem: Problem
+    channels: Channels
+    clock: Clock
+    monitor: Seen
+    figures: Monitor
+    u: np.ndarray  # (m,) input held
+    work: Work
+
+
+class Instant(NamedTuple):
+    """When something is evaluated."""
+
+    time: float  # in s
+    step: int
+    stage: int  # of the step; of a piece of it in mode continuous
+
+
+@kernel
+def parts_in(table, room):
+    """The parts of a run, from its table and room."""
+    return Parts(
+        problem_in(table), channels_in(table), clock_in(table), room.monitor.seen, room.monitor,
+        room.u, room.work,
     )  # fmt: skip
-    u = start + MONITOR + watch.length(m, p)
-    work = work_views(room, u + m, m, p, agents, history, solver)
-    end = u + m + work_length(m, p, agents, history, solver)
-    return room[start + MONITOR : u], room[u : u + m], work, room[end:]

@@ -11,18 +11,19 @@ from numba import types
 from numpy.typing import NDArray
 
 from gne_mj.barrier import scheduled
-from gne_mj.controllers.settings import NOW
+from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
 from gne_mj.loops import functions, implicit
 from gne_mj.loops.layout import (
-    channels_in,
-    clock_in,
-    parts_of,
+    Instant,
+    loop_room_in,
+    loop_room_length,
+    parts_in,
     problem_in,
-    room_needed,
     steps_in,
 )
 from gne_mj.loops.newton import solver_in
-from gne_mj.native import callback, source_key
+from gne_mj.native import callback, kernel, source_key
+from gne_mj.numbers import numbers_in
 from gne_mj.table import floats_at
 
 _whole, _real = types.int64, types.float64
@@ -33,7 +34,16 @@ class LawWork(NamedTuple):
     """What a law works on."""
 
     profile: np.ndarray  # (m,) overwritten
-    now: np.ndarray  # see gne_mj.controllers.settings
+    now: Now
+
+
+_now_in = numbers_in(Now)
+
+
+@kernel
+def law_work_at(profile, now, m):
+    """From the addresses of both."""
+    return LawWork(floats_at(profile, m), _now_in(floats_at(now, LENGTH_OF_NOW), 0))
 
 
 def link(
@@ -71,8 +81,7 @@ def action(law: ModuleType, game: ModuleType) -> Any:
         m = steps.actions
         return law.action(
             game, problem_in(table), floats_at(y, m), floats_at(weights, steps.constraints),
-            floats_at(memory, steps.memory), LawWork(floats_at(profile, m), floats_at(now, NOW)),
-            floats_at(u, m),
+            floats_at(memory, steps.memory), law_work_at(profile, now, m), floats_at(u, m),
         )  # fmt: skip
 
     return callback(_whole(*[_whole] * 7), action)
@@ -114,6 +123,7 @@ def of_memory(law: ModuleType) -> dict[int, Any]:
 
 
 @cache
+@cache
 def penalty(fall: Callable[[float, float], float]) -> Any:
     """The penalty at a time, by a schedule's kernel (:class:`gne_mj.barrier.Fall`)."""
     source = source_key(sys.modules[fall.__module__])
@@ -126,8 +136,8 @@ def penalty(fall: Callable[[float, float], float]) -> Any:
 
 
 @cache
-def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
-    """What mode implicit solves a law for."""
+def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any]:
+    """What mode implicit solves a law for, each agent by itself if ``alone``."""
     source = source_key(law, game)
 
     def prepare(table, first, last, y, memory):
@@ -181,7 +191,7 @@ def of_implicit(law: ModuleType, game: ModuleType) -> dict[int, Any]:
         functions.ADD_PULL_SLOPE: callback(_whole(*[_whole] * 6), add_pull_slope),
         functions.SETTLE: callback(_whole(*[_whole] * 3), settle),
     }
-    if hasattr(law, "own_profile"):  # what agents alone need of a law
+    if alone:
         found[functions.OWN_PROFILE] = callback(_real(*[_whole] * 5), own_profile)
     return found
 
@@ -195,18 +205,16 @@ def solve(equation: ModuleType) -> Any:
     """
     source = source_key()
 
-    def solve(table, b, memory, profile, now, solver, length):
+    def solve(table, memory, profile, now, solver, length):
         _ = source
-        steps = steps_in(table)
-        m = steps.actions
-        problem = problem_in(table)
+        steps, problem = steps_in(table), problem_in(table)
         views = solver_in(floats_at(solver, length), problem.order, steps.constraints, steps.states)
         return equation.solve(
-            problem, b, floats_at(memory, steps.memory),
-            LawWork(floats_at(profile, m), floats_at(now, NOW)), views,
+            problem, floats_at(memory, steps.memory), law_work_at(profile, now, steps.actions),
+            views,
         )  # fmt: skip
 
-    return callback(_whole(*[_whole] * 7), solve)
+    return callback(_whole(*[_whole] * 6), solve)
 
 
 @cache
@@ -223,14 +231,10 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
     def act(table, room, time, step, state, memory, model, data):
         _ = source
         steps = steps_in(table)
-        size = room_needed(
-            steps.actions, steps.constraints, steps.agents, steps.history, steps.solver
-        )
-        monitor, _u, work, _rest = parts_of(floats_at(room, size), 0, steps)
+        parts = parts_in(table, loop_room_in(floats_at(room, loop_room_length(steps)), steps))
         good = implicit.act(
-            faults, plant, (at, model, data, table), problem_in(table), channels_in(table),
-            clock_in(table), time, step, floats_at(state, steps.actions * steps.states),
-            floats_at(memory, steps.memory), work, monitor,
+            faults, plant, (at, model, data, table), parts, Instant(time, step, 0),
+            floats_at(state, steps.actions * steps.states), floats_at(memory, steps.memory),
         )  # fmt: skip
         return 1 if good else 0
 

@@ -17,16 +17,17 @@ import sys
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.settings import GAIN, SHELL, SHELL_VALUE
+from gne_mj.controllers.settings import GAIN
 from gne_mj.loops import functions
-from gne_mj.loops.newton import MOVES, OUTSIDE, RHO, SOLVED, newton
+from gne_mj.loops.newton import OUTSIDE, SOLVED, newton
 from gne_mj.native import copy, kernel
 
 _EQUATION = sys.modules[__name__]
+ALONE = True  # whether each agent solves by itself
 
 
 @kernel
-def solve(problem, b, memory, work, solver):
+def solve(problem, memory, work, solver):
     """Fill solver.y agent by agent; returns the worst way in which one ended.
 
     If an agent has no action at all, work.now says at which constraint.
@@ -35,9 +36,9 @@ def solve(problem, b, memory, work, solver):
     copy(solver.anchor, solver.mixed)
     for i in range(len(at) - 1):
         moves = functions.own_profile(problem, i, solver.anchor, memory, work.profile)
-        solver.numbers[MOVES] = moves
+        solver.numbers.moves = moves
         copy(work.profile[at[i] : at[i + 1]], solver.own[at[i] : at[i + 1]])
-        ended = newton(_EQUATION, problem, i, i + 1, b, False, memory, work, solver)
+        ended = newton(_EQUATION, problem, i, i + 1, False, memory, work, solver)
         copy(solver.anchor[at[i] : at[i + 1]], solver.mixed[at[i] : at[i + 1]])
         worst = max(worst, ended)
         if ended == OUTSIDE:
@@ -56,7 +57,7 @@ def pace(problem, k, solver):
     """How fast the agent's view of constraint k moves with its action: n_l times its own move."""
     pointer = problem.data.member_pointer
     share = pointer[k + 1] - pointer[k] if problem.order.band[1] > 0 else 1
-    return solver.numbers[MOVES] * share
+    return solver.numbers.moves * share
 
 
 @kernel
@@ -71,7 +72,7 @@ def look_along(problem, k, first, work, solver):
 @kernel
 def residual(problem, first, last, memory, work, solver):
     """Fill the agent's entries of solver.residual at solver.trial; False if it has no action."""
-    data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
+    data, rho, gain = problem.data, solver.numbers.rho, problem.settings[GAIN]
     low, high = data.offsets[first], data.offsets[first + 1]
     for a in range(low, high):
         solver.mixed[a] = solver.trial[a]
@@ -84,8 +85,8 @@ def residual(problem, first, last, memory, work, solver):
         look_along(problem, k, first, work, solver)
         room = -games.constraint(data, k, work.profile) - data.tightening[k]
         if not room > 0.0:
-            work.now[SHELL] = k
-            work.now[SHELL_VALUE] = -room
+            work.now.shell = k
+            work.now.shell_value = -room
             return False
         solver.inverse[k] = 1.0 / room
         for a in range(low, high):
@@ -99,7 +100,7 @@ def residual(problem, first, last, memory, work, solver):
 @kernel
 def assemble(problem, first, last, b, memory, work, solver):
     """Fill the band with the residual's derivative where it was evaluated last."""
-    data, rho, gain = problem.data, solver.numbers[RHO], problem.settings[GAIN]
+    data, rho, gain = problem.data, solver.numbers.rho, problem.settings[GAIN]
     at, band = data.offsets, solver.band
     low, high = at[first], at[first + 1]
     for a in range(low, high):

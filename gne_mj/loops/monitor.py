@@ -1,87 +1,100 @@
 """What is measured at every integration step of a run, in one flat array for native code.
 
-The array is a header (entries below), then per constraint its greatest value and when, then per
-action the peak of |u| and when, the integral of u^2, the energy, and the last output and input.
 All zero means "not started", so that a reset simulation starts afresh.
 """
+
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from gne_mj.native import kernel
+from gne_mj.numbers import Numbers
+from gne_mj.records import dtype_of
 
-STARTED = 0
-EXIT = 1  # one of the codes below
-EXIT_TIME = 2
-EXIT_AGENT = 3  # whose estimate left; -1 for the true profile
-EXIT_CONSTRAINT = 4
-EXIT_VALUE = 5
-EXIT_STAGE = 6  # 0: at a step's start; more: at a later stage of a step, EXIT_TIME being its time
-STEPS = 7  # pieces of divided steps included
-TIME = 8  # of the last observation
-STORAGE = 9  # V at the last observation
-STORAGE_START = 10
-STORAGE_RISE = 11  # greatest rise of V from one step to the next
-STORAGE_RISE_TIME = 12
-SATURATED = 13  # 1 once an input was limited
-SATURATED_TIME = 14  # when that was first
-SATURATED_ACTION = 15
-SATURATED_DEMAND = 16
-EXIT_BETWEEN = 17  # 1: the exit was not at a control instant
-# Mode implicit
-SOLUTIONS = 18  # inputs that were solved for
-SOLVER_STEPS = 19  # of Newton's method, in all
-MOST_STEPS = 20  # for one input
-UNSOLVED = 21  # solutions that are not accurate (though inside)
-UNSOLVED_TIME = 22  # when that was first
-PREDICTION = 23  # greatest |y - predicted y| at a control instant
-PREDICTION_TIME = 24
-NOT_MONOTONE = 25  # periods with dy+/du not positive in some channel
-NOT_MONOTONE_TIME = 26
-# Mode continuous, see gne_mj.loops.division
-DIVIDED = 27  # steps that were divided
-SMALLEST_STEP = 28  # length in s of the shortest piece of one; 0 if none was divided
-HEADER = 29
+
+class Seen(Numbers):
+    """A monitor's single numbers; times in s."""
+
+    started: float  # 1 once something was observed
+    exit: float  # one of the codes below
+    exit_time: float
+    exit_agent: float  # whose estimate left; -1 for the true profile
+    exit_constraint: float
+    exit_value: float
+    exit_stage: float  # 0: at a step's start; more: at a later stage, exit_time being its time
+    steps: float  # pieces of divided steps included
+    time: float  # of the last observation
+    storage: float  # V at the last observation
+    storage_start: float
+    storage_rise: float  # greatest rise of V from one step to the next
+    storage_rise_time: float
+    saturated: float  # 1 once an input was limited
+    saturated_time: float  # when that was first
+    saturated_action: float
+    saturated_demand: float
+    exit_between: float  # 1: the exit was not at a control instant
+    # Mode implicit
+    solutions: float  # inputs that were solved for
+    solver_steps: float  # of Newton's method, in all
+    most_steps: float  # for one input
+    unsolved: float  # solutions that are not accurate (though inside)
+    unsolved_time: float  # when that was first
+    prediction: float  # greatest |y - predicted y| at a control instant
+    prediction_time: float
+    not_monotone: float  # periods with dy+/du not positive in some channel
+    not_monotone_time: float
+    # Mode continuous, see gne_mj.loops.division
+    divided: float  # steps that were divided
+    smallest_step: float  # length in s of the shortest piece of one; 0 if none was divided
+
+
+class Monitor(NamedTuple):
+    """A monitor in native code; in Python the numbers are beside the arrays (:func:`fresh`)."""
+
+    seen: Seen
+    worst: Annotated[np.ndarray, "p"]  # each constraint's greatest value
+    worst_time: Annotated[np.ndarray, "p"]
+    peak: Annotated[np.ndarray, "m"]  # of |u| that was asked for
+    peak_time: Annotated[np.ndarray, "m"]
+    square: Annotated[np.ndarray, "m"]  # integral of u^2
+    energy: Annotated[np.ndarray, "m"]  # integral of u y
+    last_y: Annotated[np.ndarray, "m"]
+    last_u: Annotated[np.ndarray, "m"]
+
 
 # STEP_TOO_SMALL: the boundary is so near that even the finest pieces of a step do not do
 # FORCES_LOST: MuJoCo has left out forces; EXIT_VALUE says which of its warnings told so
 INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST = range(6)
 
 
-@kernel
-def length(actions, constraints):
-    """Length of the flat array."""
-    return HEADER + 2 * constraints + 6 * actions
+def fresh(actions: int, constraints: int, *runs: int) -> Any:
+    """Monitors that have seen nothing: of one run, or an array of so many (a ``np.recarray``)."""
+    made = np.zeros(runs, dtype_of(Monitor, m=actions, p=constraints))
+    return made.view(np.recarray) if runs else made[()]
 
 
-@kernel
-def worst_at(constraints):
-    """Where the constraints' greatest values start; the times follow them."""
-    return HEADER
-
-
-@kernel
-def inputs_at(constraints):
-    """Where the inputs' figures start: peak, its time, integral of u^2, energy, last y, last u."""
-    return HEADER + 2 * constraints
+def together(monitors: list[Any]) -> Any:
+    """The monitors of some runs as one array (runs,), in which every entry is one of arrays."""
+    return np.stack(monitors).view(np.recarray)
 
 
 @kernel
 def leave(monitor, code, time, agent, constraint, value, stage):
     """Latch the first exit."""
-    if monitor[EXIT] == INSIDE:
-        monitor[EXIT] = code
-        monitor[EXIT_TIME] = time
-        monitor[EXIT_AGENT] = agent
-        monitor[EXIT_CONSTRAINT] = constraint
-        monitor[EXIT_VALUE] = value
-        monitor[EXIT_STAGE] = stage
+    if monitor.exit == INSIDE:
+        monitor.exit = code
+        monitor.exit_time = time
+        monitor.exit_agent = agent
+        monitor.exit_constraint = constraint
+        monitor.exit_value = value
+        monitor.exit_stage = stage
 
 
 @kernel
 def forget_exit(monitor):
     """Take a latched exit back: the piece of a step that it was seen in is not taken."""
-    for entry in range(EXIT, EXIT_STAGE + 1):
-        monitor[entry] = 0.0
+    monitor.exit = monitor.exit_time = monitor.exit_agent = 0.0
+    monitor.exit_constraint = monitor.exit_value = monitor.exit_stage = 0.0
 
 
 @kernel
@@ -89,77 +102,73 @@ def compare(monitor, time, y, ahead):
     """Note how far the outputs y (m,) are from those predicted for this control instant."""
     for r in range(len(y)):
         distance = abs(y[r] - ahead[r])
-        if not distance <= monitor[PREDICTION]:
-            monitor[PREDICTION] = distance
-            monitor[PREDICTION_TIME] = time
+        if not distance <= monitor.prediction:
+            monitor.prediction = distance
+            monitor.prediction_time = time
 
 
 @kernel
 def count_solution(monitor, time, steps, accurate, least):
     """Note one solution of mode implicit: Newton steps, accuracy, least secant over slope."""
-    monitor[SOLUTIONS] += 1.0
-    monitor[SOLVER_STEPS] += steps
-    monitor[MOST_STEPS] = max(monitor[MOST_STEPS], steps)
+    monitor.solutions += 1.0
+    monitor.solver_steps += steps
+    monitor.most_steps = max(monitor.most_steps, steps)
     if not accurate:
-        if monitor[UNSOLVED] == 0.0:
-            monitor[UNSOLVED_TIME] = time
-        monitor[UNSOLVED] += 1.0
+        if monitor.unsolved == 0.0:
+            monitor.unsolved_time = time
+        monitor.unsolved += 1.0
     if not least > 0.0:
-        if monitor[NOT_MONOTONE] == 0.0:
-            monitor[NOT_MONOTONE_TIME] = time
-        monitor[NOT_MONOTONE] += 1.0
+        if monitor.not_monotone == 0.0:
+            monitor.not_monotone_time = time
+        monitor.not_monotone += 1.0
 
 
 @kernel
-def observe(monitor, time, y, g, demand, before, u, storage):
+def observe(monitor, figures, time, work, before, u, storage):
     """Take one observation at the start of a step (or at the end of the run).
 
     Args:
-        monitor: the flat array, changed.
+        monitor: numbers, changed.
+        figures: the whole of it, changed.
         time: now, in s.
-        y: outputs (m,).
-        g: constraint values (p,).
-        demand: what the law asks for (m,).
+        work: of the loop, with outputs y (m,), constraint values g (p,) and what the law asks
+            for, demand (m,).
         before: the input that acted until now (m,); used only if there was an earlier observation.
         u: the input that acts from now on (m,), demand within the actuators' limits.
         storage: V now.
     """
-    p, m = len(g), len(y)
-    first = monitor[STARTED] == 0.0
-    elapsed = 0.0 if first else time - monitor[TIME]
+    first = monitor.started == 0.0
+    elapsed = 0.0 if first else time - monitor.time
     if first:
-        monitor[STARTED] = 1.0
-        monitor[STORAGE_START] = storage
-        for k in range(p):
-            monitor[HEADER + k] = -np.inf
+        monitor.started = 1.0
+        monitor.storage_start = storage
+        for k in range(len(figures.worst)):
+            figures.worst[k] = -np.inf
     else:
         if elapsed > 0.0:  # the end of a run may be observed again when it goes on
-            monitor[STEPS] += 1.0
-        rise = storage - monitor[STORAGE]
-        if rise > monitor[STORAGE_RISE]:
-            monitor[STORAGE_RISE] = rise
-            monitor[STORAGE_RISE_TIME] = time
-    monitor[TIME] = time
-    monitor[STORAGE] = storage
-    for k in range(HEADER, HEADER + p):
-        value = g[k - HEADER]
-        if value > monitor[k]:
-            monitor[k] = value
-            monitor[k + p] = time
-    base = HEADER + 2 * p
-    for r in range(m):
-        at = base + r  # of the peak; m further on its time, and so on
-        last_y, last_u = monitor[at + 4 * m], monitor[at + 5 * m]
-        monitor[at + 2 * m] += 0.5 * elapsed * (last_u * last_u + before[r] * before[r])
-        monitor[at + 3 * m] += 0.25 * elapsed * (last_u + before[r]) * (last_y + y[r])
-        monitor[at + 4 * m] = y[r]
-        monitor[at + 5 * m] = u[r]
-        magnitude = abs(demand[r])
-        if magnitude > monitor[at]:
-            monitor[at] = magnitude
-            monitor[at + m] = time
-        if u[r] != demand[r] and monitor[SATURATED] == 0.0:
-            monitor[SATURATED] = 1.0
-            monitor[SATURATED_TIME] = time
-            monitor[SATURATED_ACTION] = r
-            monitor[SATURATED_DEMAND] = demand[r]
+            monitor.steps += 1.0
+        rise = storage - monitor.storage
+        if rise > monitor.storage_rise:
+            monitor.storage_rise = rise
+            monitor.storage_rise_time = time
+    monitor.time = time
+    monitor.storage = storage
+    for k in range(len(figures.worst)):
+        if work.g[k] > figures.worst[k]:
+            figures.worst[k] = work.g[k]
+            figures.worst_time[k] = time
+    for r in range(len(u)):
+        y, last_y, last_u = work.y[r], figures.last_y[r], figures.last_u[r]
+        figures.square[r] += 0.5 * elapsed * (last_u * last_u + before[r] * before[r])
+        figures.energy[r] += 0.25 * elapsed * (last_u + before[r]) * (last_y + y)
+        figures.last_y[r] = y
+        figures.last_u[r] = u[r]
+        magnitude = abs(work.demand[r])
+        if magnitude > figures.peak[r]:
+            figures.peak[r] = magnitude
+            figures.peak_time[r] = time
+        if u[r] != work.demand[r] and monitor.saturated == 0.0:
+            monitor.saturated = 1.0
+            monitor.saturated_time = time
+            monitor.saturated_action = r
+            monitor.saturated_demand = work.demand[r]

@@ -6,13 +6,12 @@ itself: the first one of each step measures, acts and observes exactly as the OD
 only act. In that mode the law's memory is in ``act``, moved by MuJoCo's integrator at the rates
 that a second callback gives; in the held modes it is in ``userdata``, where nothing but the law
 moves it. What else is kept from call to call is in ``userdata`` as well; both are part of MuJoCo's
-state. userdata holds [mark, address of the table, the fleet's own, the loop's room], and the room
-ends with [flat state at the step's start, flat state at a later stage, memory].
+state. userdata holds [mark, address of the table, the fleet's own, the loop's room].
 """
 
 from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,31 +22,29 @@ from gne_mj.game import Game
 from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
-from gne_mj.loops.feedback import NO_SIZES, Sizes
+from gne_mj.loops.feedback import NO_SIZES
+from gne_mj.loops.feedback import Sizes as LoopSizes
 from gne_mj.loops.layout import (
-    RECORDER,
-    STAGE_NOW,
-    STEP_NOW,
+    ROOM,
+    Instant,
+    Room,
     Setup,
-    channels_in,
-    clock_in,
-    parts_of,
+    Steps,
+    parts_in,
     problem_in,
-    room_needed,
     steps_in,
     steps_of,
     table_arrays,
 )
-from gne_mj.loops.ode import CONTINUOUS, look
+from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, look
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.mujoco import MEMORY, NA, NQ, NU, NUSERDATA, NV, PLACES, ROOM, SIZES, STAGES
+from gne_mj.plants.mujoco import PLACES, STAGES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
     LOOP_MARK,
-    MARK,
     STATE,
     USERDATA_HEADER,
     Offsets,
@@ -64,37 +61,282 @@ from gne_mj.plants.native_mujoco import (
     table_of,
     timed_step,
 )
+from gne_mj.records import by_name, dtype_of, in_array
 from gne_mj.table import Table, integers
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
 
 
-@kernel
-def split(rest, steps):
-    """What MuJoCo's loop has behind a room's other parts: flat states now and later, memory."""
-    size = steps.actions * steps.states
-    return rest[:size], rest[size : 2 * size], rest[2 * size :]
+class MujocoRoom(NamedTuple):
+    """What changes in a run, in userdata."""
+
+    loop: Room
+    state: Annotated[np.ndarray, "m * states"]  # flat, at the step's start
+    later: Annotated[np.ndarray, "m * states"]  # and at a later stage
+    memory: Annotated[np.ndarray, "held"]  # the law's, in the held modes
+
+
+_length, _room_in = in_array(MujocoRoom, "m p agents states held history solver", **ROOM)
 
 
 @kernel
-def save(functions, model, data, row):
-    """Keep what a step of MuJoCo starts from; functions as ``state_functions()`` has them."""
-    call_state(functions[0], model, data, row.ctypes.data, functions[2])
+def held_memory(s):
+    """Entries of a law's memory in userdata: the others are in act."""
+    return 0 if s.mode == CONTINUOUS else s.memory
 
 
 @kernel
-def restore(functions, model, data, row):
+def mujoco_room_length(s):
+    """Entries of the room of a loop of these sizes, as a table has them."""
+    return _length(
+        s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history, s.solver
+    )
+
+
+@kernel
+def mujoco_room_in(userdata, start, s):
+    """The views of a room that begins there."""
+    return _room_in(
+        userdata, start, s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history,
+        s.solver,
+    )  # fmt: skip
+
+
+def room_of(userdata: NDArray[np.float64], start: int, s: Steps) -> Any:
+    """The same as Python knows it, by name."""
+    dtype = dtype_of(
+        MujocoRoom, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
+        held=held_memory(s), history=s.history, solver=s.solver, **ROOM,
+    )  # fmt: skip
+    return by_name(userdata[start:], dtype)
+
+
+class Place(NamedTuple):
+    """Where a simulation's numbers are: addresses, and what the fleet's table says."""
+
+    at: Offsets
+    table: int
+    model: int
+    data: int
+    sizes: Sizes
+
+
+@kernel
+def place_of(at, table, model, data):
+    """The place of a simulation that is ours."""
+    return Place(at, table, model, data, sizes_in(table))
+
+
+@kernel
+def room_at(place, steps):
+    """A simulation's room."""
+    userdata = field(place.data, place.at.userdata, place.sizes.nuserdata)
+    return mujoco_room_in(userdata, place.sizes.room, steps)
+
+
+def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
+    """Acts at a stage of MuJoCo's integrator; at a step's start it observes and writes a row."""
+    source = source_key(fleet)
+
+    def control(model, data):
+        _ = source
+        model, data = address_of(model), address_of(data)
+        table = table_of(at, model, data)
+        if table <= 0:
+            return
+        place = place_of(at, table, model, data)
+        steps = steps_in(table)
+        room = room_at(place, steps)
+        continuous, progress = steps.mode == CONTINUOUS, room.loop.progress
+        act = field(data, at.act, place.sizes.na)
+        memory = act[place.sizes.memory :] if continuous else room.memory
+        step, stage = np.int64(progress.step), np.int64(progress.stage)
+        last = stage + 1 == steps.evaluations
+        progress.step = step + 1 if last else step
+        progress.stage = 0 if last else stage + 1
+        if stage > 0 and not continuous:
+            return
+        parts, work = parts_in(table, room.loop), room.loop.work
+        monitor, divided, h = parts.monitor, work.division, parts.clock.h
+        time, length, state = (
+            division.begins(divided, step, h),
+            division.piece(divided, h),
+            room.state,
+        )
+        if stage > 0:
+            time += length if stage == 3 else 0.5 * length
+            state = room.later
+        if stage > 0 or divided.known == division.NOTHING:
+            fleet.gather(at, data, table, state)
+        userdata = field(data, at.userdata, place.sizes.nuserdata)
+        storage = fleet.stored(parts.channels, state, userdata) if stage == 0 else 0.0
+        where = (address_in(progress), place.model, data)
+        good = monitor.exit == watch.INSIDE and look(
+            faults, where, parts, Instant(time, step, stage), storage, state, memory
+        )
+        block = np.int64(progress.recorder)
+        if good and stage == 0 and block > 0 and divided.position == 0.0:
+            qpos = field(data, at.qpos, place.sizes.nq)
+            record(block, faults, parts, step, Present(state, memory, qpos))
+        if good and continuous:
+            division.note(stage, parts.problem, work)
+        places, ctrl = integers(table, PLACES), field(data, at.ctrl, place.sizes.nu)
+        acts = faults.push(parts.problem, parts.clock, step, work.u, work.acts)
+        for r in range(len(acts)):
+            ctrl[fleet.actuator_of(places, r)] = acts[r] if good else 0.0
+
+    return callback(CALLBACK, control)
+
+
+def _remember_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
+    """Gives the rates of a law's memory that MuJoCo's integrator moves."""
+    source = source_key(fleet)
+
+    def remember(model, data, actuator):
+        _ = source
+        model, data = address_of(model), address_of(data)
+        table = table_of(at, model, data)
+        if table <= 0:
+            return 0.0
+        place = place_of(at, table, model, data)
+        rates = field(data, at.act_dot, place.sizes.na)[place.sizes.memory :]
+        work = room_at(place, steps_in(table)).loop.work
+        memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
+        functions.rate(problem_in(table), faults.choose(work.y, work.seen), memory, rates)
+        return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
+
+    return callback(ACTIVATION, remember)
+
+
+@kernel
+def save(machine, row):
+    """Keep what a step of MuJoCo starts from."""
+    call_state(machine.get, machine.model, machine.data, row.ctypes.data, machine.parts)
+
+
+@kernel
+def restore(machine, row):
     """The way back."""
-    call_state(functions[1], model, data, row.ctypes.data, functions[2])
+    call_state(machine.set, machine.model, machine.data, row.ctypes.data, machine.parts)
+
+
+class Machine(NamedTuple):
+    """What moves a simulation: addresses, and room for what its steps start from."""
+
+    step: int  # of mj_step
+    get: int  # of mj_getState
+    set: int  # of mj_setState
+    parts: int  # of the state that these move
+    model: int
+    data: int
+    saved: np.ndarray  # (2, entries of such a state), at a piece's start and at the step's
+
+
+@kernel
+def forces_stand(place, monitor, time):
+    """Whether MuJoCo has left out no force; else the exit is latched."""
+    lost = forces_lost(place.at, place.data, place.sizes.nv)
+    if lost >= 0:
+        watch.leave(monitor, watch.FORCES_LOST, time, -1, -1, lost, 0)
+    return lost < 0
+
+
+@kernel
+def whole_step(place, machine, parts, step):
+    """Take a step in a held mode, or put back what it started from."""
+    save(machine, machine.saved[0])
+    timed_step(place.at, machine.step, machine.model, machine.data)
+    forces_stand(place, parts.monitor, step * parts.clock.h)
+    if parts.monitor.exit == watch.INSIDE:
+        return DONE
+    restore(machine, machine.saved[0])
+    return ENDED
+
+
+@kernel
+def begin_piece(place, machine, parts, step):
+    """Take a piece of a step in mode continuous; ENDED, with what it started from, if it is not."""
+    divided, monitor, h, saved = parts.work.division, parts.monitor, parts.clock.h, machine.saved
+    at, model, data = place.at, place.model, place.data
+    save(machine, saved[0])
+    if divided.position == 0.0 and divided.level > 0.0:
+        copy(saved[0], saved[1])
+    set_number(model, at.timestep, division.piece(divided, h))
+    set_number(data, at.time, division.begins(divided, step, h))
+    call(machine.step, model, data)
+    if not forces_stand(place, monitor, step * h):
+        if divided.position == 0.0:
+            copy(saved[0], saved[1])
+        restore(machine, saved[1])
+        divided.position = 0.0
+        return ENDED
+    if monitor.exit != watch.INSIDE and monitor.exit_stage == 0.0:
+        restore(machine, saved[0])
+        return ENDED
+    return UNDER_WAY
+
+
+@kernel
+def end_piece(faults, machine, parts, step, stages, good):
+    """Judge a piece, if it was inside at all, and go on or put back what it started from."""
+    divided, h, saved, which = parts.work.division, parts.clock.h, machine.saved, 0
+    if good:
+        length = division.piece(divided, h)
+        which = division.judge(stages, length, parts.problem, parts.work)
+        if which < 0:
+            return DONE if division.go_on(divided, h, parts.monitor) else UNDER_WAY
+    restore(machine, saved[0])
+    if divided.position == 0.0:
+        copy(saved[0], saved[1])
+    if division.halve(faults, step, h, which, parts.problem, parts.work, parts.monitor):
+        return AGAIN
+    restore(machine, saved[1])
+    return ENDED
+
+
+def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
+    """Takes steps; an exit sets what MuJoCo moves back to the start of the step it is of."""
+    source = source_key(fleet)
+
+    def advance(machine, count):
+        _ = source
+        model, data = machine.model, machine.data
+        table = table_of(at, model, data)
+        place, steps = place_of(at, table, model, data), steps_in(table)
+        room = room_at(place, steps)
+        parts, progress, state = parts_in(table, room.loop), room.loop.progress, room.state
+        memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
+        divided, h, moving = parts.work.division, parts.clock.h, steps.mode == CONTINUOUS
+        step, done, result = np.int64(progress.step), 0, UNDER_WAY
+        divided.known = division.NOTHING
+        while done < count and result != ENDED:
+            if moving:
+                result = begin_piece(place, machine, parts, step)
+                if result == ENDED:
+                    break
+                good = parts.monitor.exit == watch.INSIDE
+                if good:
+                    fleet.refresh(model, data, table)
+                    fleet.gather(at, data, table, state)
+                    end = Instant(division.ends(divided, step, h), step, division.END)
+                    good = look(faults, (0, model, data), parts, end, 0.0, state, memory)
+                result = end_piece(faults, machine, parts, step, steps.evaluations, good)
+            else:
+                result = whole_step(place, machine, parts, step)
+            if result == DONE:
+                step, done = step + 1, done + 1
+            if moving and result != ENDED:
+                progress.step, progress.stage = step, 0.0
+        divided.known = division.NOTHING
+        set_number(model, at.timestep, h)
+        return done
+
+    return compiled(advance)
 
 
 @cache
-def build(
-    at: Offsets,
-    fleet: ModuleType,
-    faults: ModuleType,
-) -> tuple[Any, ...]:
+def build(at: Offsets, fleet: ModuleType, faults: ModuleType) -> tuple[Any, ...]:
     """The callbacks for control and memory, and the native loop.
 
     Args:
@@ -102,153 +344,16 @@ def build(
         fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
         faults: module of kernels, as :func:`gne_mj.loops.ode.look` has it.
     """
-    source = source_key(fleet)
+    return tuple(make(at, fleet, faults) for make in (_control_of, _remember_of, _advance_of))
 
-    def control(model, data):
-        _ = source
-        struct = address_of(data)
-        table = table_of(at, address_of(model), struct)
-        if table <= 0:
-            return
-        sizes, steps = integers(table, SIZES), steps_in(table)
-        m, stages, mode = steps.actions, steps.evaluations, steps.mode
-        ctrl = field(struct, at.ctrl, sizes[NU])
-        userdata = field(struct, at.userdata, sizes[NUSERDATA])
-        start = sizes[ROOM]
-        monitor, u, work, rest = parts_of(userdata, start, steps)
-        state, later, memory = split(rest, steps)
-        if mode == CONTINUOUS:
-            memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
-        step, stage = np.int64(userdata[start + STEP_NOW]), np.int64(userdata[start + STAGE_NOW])
-        last = stage + 1 == stages
-        userdata[start + STEP_NOW] = step + 1 if last else step
-        userdata[start + STAGE_NOW] = 0 if last else stage + 1
-        if stage > 0 and mode != CONTINUOUS:
-            return
-        problem, clock, divided = problem_in(table), clock_in(table), work.division
-        time, length = division.begins(divided, step, clock.h), division.piece(divided, clock.h)
-        if stage > 0:
-            time += length if stage == 3 else 0.5 * length
-            state = later
-        if stage > 0 or divided[division.KNOWN] == division.NOTHING:
-            fleet.gather(at, struct, table, state)
-        channels = channels_in(table)
-        storage = fleet.stored(channels, state, userdata) if stage == 0 else 0.0
-        place = (address_in(userdata) + 8 * start, address_of(model), struct)
-        good = monitor[watch.EXIT] == watch.INSIDE and look(
-            faults, place, problem, channels, clock, time, step, stage, storage, state, memory, u,
-            monitor, work,
-        )  # fmt: skip
-        block = np.int64(userdata[start + RECORDER])
-        if good and stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
-            qpos = field(struct, at.qpos, sizes[NQ])
-            record(block, faults, channels, problem, clock, step, state, u, memory, work, qpos)
-        if good and mode == CONTINUOUS:
-            division.note(stage, problem, work)
-        places = integers(table, PLACES)
-        acts = faults.push(problem, clock, step, work.u, work.acts)
-        for r in range(m):
-            ctrl[fleet.actuator_of(places, r)] = acts[r] if good else 0.0
 
-    def remember(model, data, actuator):
-        _ = source
-        struct = address_of(data)
-        table = table_of(at, address_of(model), struct)
-        if table <= 0:
-            return 0.0
-        sizes, steps = integers(table, SIZES), steps_in(table)
-        rates = field(struct, at.act_dot, sizes[NA])[sizes[MEMORY] :]
-        userdata = field(struct, at.userdata, sizes[NUSERDATA])
-        work = parts_of(userdata, sizes[ROOM], steps)[2]
-        memory = field(struct, at.act, sizes[NA])[sizes[MEMORY] :]
-        seen = faults.choose(work.y, work.seen)
-        functions.rate(problem_in(table), seen, memory, rates)
-        return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
-
-    def advance(mj_step, functions, model, data, saved, count):
-        """So many steps; an exit sets what MuJoCo moves back to the start of the step it is of.
-
-        Args:
-            mj_step, model, data: addresses.
-            functions: see :func:`save`.
-            saved: (2, entries of such a state), at the start of a piece of a step and of the step.
-            count: steps.
-        """
-        _ = source
-        table = table_of(at, model, data)
-        sizes, steps = integers(table, SIZES), steps_in(table)
-        userdata = field(data, at.userdata, sizes[NUSERDATA])
-        start, moving = sizes[ROOM], steps.mode == CONTINUOUS
-        monitor, u, work, rest = parts_of(userdata, start, steps)
-        state, channels = split(rest, steps)[0], channels_in(table)
-        memory = field(data, at.act, sizes[NA])[sizes[MEMORY] :]
-        problem, clock, divided = problem_in(table), clock_in(table), work.division
-        step, done, h = np.int64(userdata[start + STEP_NOW]), 0, clock.h
-        divided[division.KNOWN] = division.NOTHING
-        while done < count:
-            save(functions, model, data, saved[0])
-            if not moving:
-                timed_step(at, mj_step, model, data)
-                lost = forces_lost(at, data, sizes[NV])
-                if lost >= 0:
-                    watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
-                if monitor[watch.EXIT] != watch.INSIDE:
-                    restore(functions, model, data, saved[0])
-                    break
-                step, done = step + 1, done + 1
-                continue
-            if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
-                copy(saved[0], saved[1])
-            length = division.piece(divided, h)
-            set_number(model, at.timestep, length)
-            set_number(data, at.time, division.begins(divided, step, h))
-            call(mj_step, model, data)
-            lost = forces_lost(at, data, sizes[NV])
-            if lost >= 0:
-                watch.leave(monitor, watch.FORCES_LOST, step * h, -1, -1, lost, 0)
-                if divided[division.POSITION] == 0.0:
-                    copy(saved[0], saved[1])
-                restore(functions, model, data, saved[1])
-                divided[division.POSITION] = 0.0
-                break
-            good = monitor[watch.EXIT] == watch.INSIDE
-            if not good and monitor[watch.EXIT_STAGE] == 0.0:
-                restore(functions, model, data, saved[0])
-                break
-            if good:
-                fleet.refresh(model, data, table)
-                fleet.gather(at, data, table, state)
-                good = look(
-                    faults, (0, model, data), problem, channels, clock,
-                    division.ends(divided, step, h), step, division.END, 0.0, state, memory, u,
-                    monitor, work,
-                )  # fmt: skip
-            which = division.judge(steps.evaluations, length, problem, work) if good else 0
-            if good and which < 0:
-                if division.go_on(divided, h, monitor):
-                    step, done = step + 1, done + 1
-            else:
-                restore(functions, model, data, saved[0])
-                if divided[division.POSITION] == 0.0:
-                    copy(saved[0], saved[1])
-                if not division.halve(faults, step, h, which, problem, work, monitor):
-                    restore(functions, model, data, saved[1])
-                    break
-            userdata[start + STEP_NOW] = step
-            userdata[start + STAGE_NOW] = 0.0
-        divided[division.KNOWN] = division.NOTHING
-        set_number(model, at.timestep, h)
-        return done
-
-    return (
-        callback(CALLBACK, control),
-        callback(ACTIVATION, remember),
-        compiled(advance),
-    )
+def machine_of(model: mujoco.MjModel, data: mujoco.MjData, saved: NDArray[np.float64]) -> Machine:
+    """What moves this simulation; ``saved`` as :func:`room_for_states` makes it."""
+    return Machine(step_address(), *state_functions(), model._address, data._address, saved)
 
 
 def room(
-    game: Game, agents: Agents, memory: int, mode: int, sizes: Sizes = NO_SIZES
+    game: Game, agents: Agents, memory: int, mode: int, sizes: LoopSizes = NO_SIZES
 ) -> tuple[int, int]:
     """Entries of userdata, and of act, that a plant must leave for this game's loop.
 
@@ -258,9 +363,9 @@ def room(
         mode: CONTINUOUS, SAMPLED or IMPLICIT of :mod:`gne_mj.loops.ode`.
         sizes: of the scratch arrays that depend on the kind of loop.
     """
-    needed = room_needed(game.actions, game.constraints_count, game.agents, *sizes)
-    needed = int(needed) + 2 * game.actions * agents.states
-    return (needed, memory) if mode == CONTINUOUS else (needed + memory, 0)
+    held, moved = (0, memory) if mode == CONTINUOUS else (memory, 0)
+    needed = _length(game.actions, game.constraints_count, game.agents, agents.states, held, *sizes)
+    return int(needed), moved
 
 
 def mujoco_table(plant: "FleetPlant", setup: Setup, agents: Agents, memory: int) -> Table:
@@ -291,17 +396,17 @@ class MujocoLoop(ClosedLoop):
         self._table = mujoco_table(plant, setup, plant.agents, len(memory))
         self._faulty = faults is not faultless
         data, sizes = plant.data, steps_of(self._table)
-        self._start = int(plant.table_arrays[SIZES][ROOM])
-        self._memory = put_start(data, self._start, self._table, setup.clock.mode, memory)
+        room = room_of(data.userdata, plant.sizes.room, sizes)
+        self._progress, self.monitor, self._u = room.loop, room.loop.monitor, room.loop.u
+        self._memory = put_start(data, self._table, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._remembers = moved  # by MuJoCo's integrator
-        self._saved = room_for_states(plant.model)
-        self.monitor, self._u, *_ = parts_of(data.userdata, self._start, sizes)
+        self._machine = machine_of(plant.model, data, room_for_states(plant.model))
 
     @property
     def _step(self) -> int:
         """Steps taken; in userdata, so that a state that is set again brings its own time."""
-        return int(self.plant.data.userdata[self._start + STEP_NOW])
+        return int(self._progress.step)
 
     @property
     def time(self) -> float:
@@ -310,20 +415,17 @@ class MujocoLoop(ClosedLoop):
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
-        if self.monitor[watch.EXIT] != watch.INSIDE:
+        if self.monitor.exit != watch.INSIDE:
             samples = 0
         data, first = self.plant.data, self._step
         recorder = self._recorder(samples, every)
-        data.userdata[self._start + STAGE_NOW] = 0.0
+        self._progress.stage = 0.0
         remember = self._remember if self._remembers else None
         with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
-            steps = self._advance(
-                step_address(), state_functions(), self.plant.model._address, data._address,
-                self._saved, samples * every,
-            )  # fmt: skip
+            steps = self._advance(self._machine, samples * every)
         # The callback counts steps, but one that ended in an exit was not taken.
-        data.userdata[self._start + STEP_NOW] = first + steps
-        data.userdata[self._start + RECORDER] = 0.0
+        self._progress.step = first + steps
+        self._progress.recorder = 0.0
         data.time = self.time
         return recorder.samples(0)
 
@@ -333,8 +435,8 @@ class MujocoLoop(ClosedLoop):
         state = self.plant.state
         recorder = self._recorder(1, 1)
         with callbacks(passive=self.plant.passive):
-            observe(self.plant, self._control, self._start)
-        data.userdata[self._start + RECORDER] = 0.0
+            observe(self.plant, self._control, self._progress)
+        self._progress.recorder = 0.0
         if recorder.done[0]:
             return recorder.samples(0)
         none = np.full((1, len(self._u)), np.nan)
@@ -363,7 +465,7 @@ class MujocoLoop(ClosedLoop):
         """Room for rows from now on, made known to the callbacks."""
         agents, userdata = self.plant.agents, self.plant.data.userdata
         # Marked as this loop's again: the plant's own step may have come between.
-        if userdata[MARK] == 0.0:
+        if userdata[0] == 0.0:
             raise EngineError(
                 "the loop's MuJoCo data was reset: make a new loop to start from there"
             )
@@ -372,26 +474,25 @@ class MujocoLoop(ClosedLoop):
             1, rows, (agents.channels, agents.states), len(self._memory), self._faulty,
             self.plant.configuration, first=self._step, every=every,
         )  # fmt: skip
-        userdata[self._start + RECORDER] = recorder.addresses[0]
+        self._progress.recorder = recorder.addresses[0]
         return recorder
 
 
-def observe(plant: "FleetPlant", control: Any, start: int) -> None:
+def observe(plant: "FleetPlant", control: Any, progress: Any) -> None:
     """Observe the present state without moving on, by the callback of a step's start.
 
     Args:
         plant: with mjData of a loop.
         control: the loop's callback.
-        start: of its room in userdata.
+        progress: of the loop, as its room in userdata has it.
 
     The plant's callbacks must be installed.
     """
     model, data = plant.model, plant.data
     plant.refresh()
-    step = data.userdata[start + STEP_NOW]
-    data.userdata[start + STAGE_NOW] = 0.0
+    step, progress.stage = progress.step, 0.0
     control.ctypes(model._address, data._address)
-    data.userdata[start + STEP_NOW], data.userdata[start + STAGE_NOW] = step, 0.0
+    progress.step, progress.stage = step, 0.0
 
 
 def room_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
@@ -400,9 +501,9 @@ def room_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 
 def put_start(
-    data: mujoco.MjData, start: int, table: Table, mode: int, memory: NDArray[np.float64]
+    data: mujoco.MjData, table: Table, mode: int, memory: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Make mjData the start of a run, its room at ``start`` of userdata; returns the memory."""
+    """Make mjData the start of a run; returns the memory."""
     data.userdata[:] = 0.0
     place = data.act if mode == CONTINUOUS and len(memory) else data.userdata
     held: NDArray[np.float64] = place[len(place) - len(memory) :]

@@ -10,21 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
-from gne_mj.loops.layout import MONITOR, RECORDER, steps_of
-from gne_mj.loops.mujoco import build, observe, put_start, room_for_states
-from gne_mj.loops.ode import CONTINUOUS
-from gne_mj.loops.recorder import FIRST
-from gne_mj.plants.mujoco import ROOM, SIZES
-from gne_mj.plants.native_mujoco import (
-    callbacks,
-    offsets,
-    state_functions,
-    step_address,
+from gne_mj.loops.layout import steps_of
+from gne_mj.loops.mujoco import (
+    build,
+    machine_of,
+    observe,
+    put_start,
+    room_for_states,
+    room_of,
 )
+from gne_mj.loops.ode import CONTINUOUS
+from gne_mj.plants.native_mujoco import callbacks, offsets
 from gne_mj.table import Table
 
 if TYPE_CHECKING:
@@ -53,7 +52,6 @@ class MujocoBatch(BatchLoop):
     ) -> None:
         self._passive, self._faulty, self._threads = plant.passive, faulty, threads
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
-        self._start = int(plant.table_arrays[SIZES][ROOM])
         self._fleets: SimpleQueue[_Fleet] = SimpleQueue()
         for number in range(threads):
             self._fleets.put(_Fleet(plant.twin() if number else plant))
@@ -61,23 +59,22 @@ class MujocoBatch(BatchLoop):
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
         tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
-        first = self._start + MONITOR
         blocks = recorder.addresses
 
         def one(run: int) -> bool:
             fleet = self._fleets.get()
             try:
-                userdata = fleet.begin(cases[run], tables[run], self._start)
-                userdata[self._start + RECORDER] = blocks[run]
+                progress = fleet.begin(cases[run], tables[run])
+                progress.recorder = blocks[run]
                 for done in range(0, span.steps, STRIDE):
                     if stopped():
                         return False
-                    fleet.advance(self._advance, min(STRIDE, span.steps - done))
-                    if userdata[first + watch.EXIT] != watch.INSIDE:
+                    self._advance(fleet.machine, min(STRIDE, span.steps - done))
+                    if progress.monitor.exit != watch.INSIDE:
                         break
-                recorder.blocks[run, FIRST] = span.last
-                observe(fleet.plant, self._control, self._start)
-                monitors[run] = userdata[first : first + monitors.shape[1]]
+                recorder.heads.first[run] = span.last
+                observe(fleet.plant, self._control, progress)
+                monitors[run] = progress.monitor
                 return True
             finally:
                 self._fleets.put(fleet)
@@ -96,11 +93,11 @@ class _Fleet:
 
     def __init__(self, plant: "FleetPlant") -> None:
         self.plant = plant
-        self._saved = room_for_states(plant.model)
+        self.machine = machine_of(plant.model, plant.data, room_for_states(plant.model))
         self._parameters = plant.agents.parameters
 
-    def begin(self, case: Case, table: Table, start: int) -> NDArray[np.float64]:
-        """Make this the start of a run; returns userdata."""
+    def begin(self, case: Case, table: Table) -> Any:
+        """Make this the start of a run; returns its progress and monitor, by name."""
         plant = self.plant
         if not np.array_equal(case.parameters, self._parameters):
             for name, at, values in plant.model_fields(case.parameters[None]):
@@ -108,11 +105,6 @@ class _Fleet:
             mujoco.mj_setConst(plant.model, plant.data)
             self._parameters = case.parameters
         plant.reset(case.state)
-        put_start(plant.data, start, table, steps_of(table).mode, case.memory)
-        userdata: NDArray[np.float64] = plant.data.userdata
-        return userdata
-
-    def advance(self, advance: Any, steps: int) -> None:
-        """So many steps on."""
-        model, data = self.plant.model._address, self.plant.data._address
-        advance(step_address(), state_functions(), model, data, self._saved, steps)
+        sizes = steps_of(table)
+        put_start(plant.data, table, sizes.mode, case.memory)
+        return room_of(plant.data.userdata, plant.sizes.room, sizes).loop

@@ -17,8 +17,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gne_mj import banded
-from gne_mj.controllers.settings import PENALTY
 from gne_mj.native import copy, kernel
+from gne_mj.numbers import Numbers
 from gne_mj.records import in_array
 
 # How it ended
@@ -40,16 +40,23 @@ SHORTEST = 1e-14
 # at the latest.
 ACCURATE, MOST_USES = 1e-10, 12
 
-# Entries of ``numbers``: how many inputs were found, steps taken, how much an agent's barrier
-# profile moves with its action, how often the factors were used and what they leave of an error,
-# the penalty that is solved for, and the step (plus 1) that was solved for last
-FOUND, STEPS, MOVES, USES, LEAVES, RHO, STANDS, COUNT = range(8)
+
+class SolverNumbers(Numbers):
+    """What mode implicit counts and keeps."""
+
+    found: float  # inputs so far
+    steps: float  # taken for the present one
+    moves: float  # how much an agent's barrier profile moves with its action
+    uses: float  # how often the factors were used
+    leaves: float  # what they leave of an error
+    rho: float  # the penalty that is solved for
+    stands: float  # the step (plus 1) that was solved for last
 
 
 class Solver(NamedTuple):
     """Arrays of mode implicit, views into a loop's ``work.solver``."""
 
-    numbers: Annotated[np.ndarray, "count"]  # see above
+    numbers: SolverNumbers
     slope: Annotated[np.ndarray, "m"]  # dy+/du of each channel; kept from period to period
     stiff: Annotated[np.ndarray, "m"]  # 1 / slope
     ahead: Annotated[np.ndarray, "m"]  # outputs expected at the next control instant; kept
@@ -80,7 +87,7 @@ class Solver(NamedTuple):
 
 
 # Of m actions, p constraints, so many entries of dg/dy, and states of a channel
-solver_length, _views = in_array(Solver, "m p entries states b", count=COUNT)
+solver_length, _views = in_array(Solver, "m p entries states b")
 
 
 @kernel
@@ -90,16 +97,16 @@ def solver_in(flat, order, p, states):
 
 
 @kernel
-def newton(equation, problem, first, last, b, reuse, memory, work, solver):
+def newton(equation, problem, first, last, reuse, memory, work, solver):
     """Solve for the outputs solver.y of agents ``first`` to ``last`` - 1, from solver.y.
 
     If that is not in the domain, the outputs seen now or those that the last solution expected are
     taken. Factors of the last period are used again, if ``reuse``, as long as that is accurate.
-    Returns how it ended; solver.numbers[STEPS] grows by the iterations taken.
+    Returns how it ended; solver.numbers.steps grows by the iterations taken.
     """
-    at, numbers = problem.data.offsets, solver.numbers
-    target = work.now[PENALTY]
-    numbers[RHO] = target
+    at, numbers, b = problem.data.offsets, solver.numbers, problem.order.band[0]
+    target = work.now.penalty
+    numbers.rho = target
     patience = PATIENCE
     low, high = at[first], at[last]
     n = high - low
@@ -113,8 +120,8 @@ def newton(equation, problem, first, last, b, reuse, memory, work, solver):
             for r in range(low, high):
                 trial[r] = y[r] + length * step[equation.row_of(problem, first, r)]
         patience -= 1
-        if patience < 0 and numbers[RHO] < 1e12 * target:
-            numbers[RHO] *= RAISE
+        if patience < 0 and numbers.rho < 1e12 * target:
+            numbers.rho *= RAISE
             length, patience = 0.0, PATIENCE
             copy(y[low:high], trial[low:high])
         good = equation.residual(problem, first, last, memory, work, solver)
@@ -138,19 +145,19 @@ def newton(equation, problem, first, last, b, reuse, memory, work, solver):
                 continue
             copy(trial[low:high], y[low:high])
         norm = size
-        numbers[STEPS] += 1.0
-        usable = reuse and numbers[USES] > 0.0 and numbers[RHO] == target
+        numbers.steps += 1.0
+        usable = reuse and numbers.uses > 0.0 and numbers.rho == target
         if usable:
             banded.solve_definite(solver.band, n, b, solver.old_step)
-            if numbers[USES] < MOST_USES:
+            if numbers.uses < MOST_USES:
                 remaining = equation.local_length(problem, first, last, solver.old_step, solver)
-                if remaining * max(numbers[LEAVES], remaining) <= ACCURATE:
-                    numbers[USES] += 1.0
+                if remaining * max(numbers.leaves, remaining) <= ACCURATE:
+                    numbers.uses += 1.0
                     for r in range(low, high):
                         y[r] += solver.old_step[equation.row_of(problem, first, r)]
                     return SOLVED
         equation.assemble(problem, first, last, b, memory, work, solver)
-        numbers[USES] = 0.0
+        numbers.uses = 0.0
         if not banded.factorise_definite(solver.band, n, b):
             return UNSOLVED
         for r in range(low, high):
@@ -161,16 +168,16 @@ def newton(equation, problem, first, last, b, reuse, memory, work, solver):
             for r in range(n):
                 off = max(off, abs(step[r] - solver.old_step[r]))
                 whole = max(whole, abs(step[r]))
-            numbers[LEAVES] = min(2.0 * off / whole, 1.0) if whole > 0.0 else 1.0
+            numbers.leaves = min(2.0 * off / whole, 1.0) if whole > 0.0 else 1.0
         else:
-            numbers[LEAVES] = 1.0
-        numbers[USES] = 1.0
+            numbers.leaves = 1.0
+        numbers.uses = 1.0
         remaining = equation.local_length(problem, first, last, step, solver)
         if not remaining < np.inf:
             return UNSOLVED
         length = 1.0
-        if numbers[RHO] > target and remaining <= CENTRED:
-            numbers[RHO] = max(target, LOWER * numbers[RHO])
+        if numbers.rho > target and remaining <= CENTRED:
+            numbers.rho = max(target, LOWER * numbers.rho)
             length, patience = 0.0, PATIENCE
         elif remaining <= LAST_STEP:
             for r in range(low, high):

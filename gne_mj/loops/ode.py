@@ -8,7 +8,7 @@ passed, with the outputs held at their values at the period's start.
 
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -19,29 +19,25 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
-    RECORDER,
-    STEP_NOW,
+    ROOM,
+    Instant,
+    Room,
     Setup,
-    channels_in,
-    clock_in,
+    Steps,
     ode_table,
-    parts_of,
-    problem_in,
-    room_needed,
+    parts_in,
     steps_in,
     steps_of,
 )
 from gne_mj.loops.recorder import Recorder, record
-from gne_mj.native import callback, copy, kernel, shaped, source_key
+from gne_mj.native import callback, copy, kernel, source_key
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import EULER, RK4
+from gne_mj.records import by_name, dtype_of, in_array
 from gne_mj.table import floats_at
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
-
-# Rates at four stages, a trial state, the state at the start of a divided step, and scratch
-SCRATCH_ROWS = 7
 
 CONTINUOUS, SAMPLED, IMPLICIT = range(3)
 
@@ -55,10 +51,7 @@ def measure(channels, state, y):
 
 
 @kernel
-def look(
-    faults, place, problem, channels, clock, time, step, stage, storage, state, memory, u, monitor,
-    work,
-):  # fmt: skip
+def look(faults, place, parts, at, storage, state, memory):
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
     At the end of a piece of a step, mode continuous, what the next piece begins with is evaluated
@@ -70,59 +63,103 @@ def look(
     Args:
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
         place: see :func:`gne_mj.loops.functions.act`.
-        problem, channels, clock: as the loop has them.
-        time: at the stage, in s.
-        step: which step this is.
-        stage: 0 at its start; later ones, and division.END, in mode continuous only.
+        parts: of the loop; its input that acts is changed at stage 0.
+        at: when; stages but the start, and division.END, are in mode continuous only.
         storage: V^{x*} of the agents now; read at stage 0.
-        state: flat, channel after channel, at the stage.
-        memory: the law's at the stage; own actions are written into it, and in the held modes it
-            moves on when a control period has passed.
-        u: (m,) input that acts; changed at stage 0.
-        monitor, work: changed.
+        state, memory: there, flat; own actions are written into the law's memory, and in the held
+            modes it moves on when a control period has passed.
 
     Returns:
         False if the run must end; the exit is then latched in the monitor.
     """
-    y = work.y
-    known = work.division[division.KNOWN] if stage == 0 else float(division.NOTHING)
-    work.division[division.KNOWN] = division.NOTHING
-    instant = clock.mode == CONTINUOUS or step % clock.period == 0
+    problem, clock, work, monitor = parts.problem, parts.clock, parts.work, parts.monitor
+    divided, stage = work.division, max(at.stage, 0)
+    known = divided.known if at.stage == 0 else float(division.NOTHING)
+    divided.known = division.NOTHING
+    instant = clock.mode == CONTINUOUS or at.step % clock.period == 0
     if known == division.NOTHING:
-        measure(channels, state, y)
-        if not inside(problem, time, max(stage, 0), y, work, monitor):
+        measure(parts.channels, state, work.y)
+        if not inside(problem, at.time, stage, work.y, work, monitor):
             if not instant:
-                monitor[watch.EXIT_BETWEEN] = 1.0
+                monitor.exit_between = 1.0
             return False
-    if stage == division.END and not faults.KNOWN_AHEAD:
-        work.division[division.KNOWN] = division.OUTPUTS
+    if at.stage == division.END and not faults.KNOWN_AHEAD:
+        divided.known = division.OUTPUTS
         return True
     if known == division.LAW:
-        faults.deliver(problem, clock, step, stage, work)
+        faults.deliver(problem, clock, at.step, work)
     elif instant:
-        if clock.mode != CONTINUOUS and work.stands[0] < step:  # a control period has passed
+        if clock.mode != CONTINUOUS and work.now.stands < at.step:  # a control period has passed
             functions.propagate(problem, work.held, memory, work.scratch)
-            work.stands[0] = step
-        faults.begin(channels, problem, clock, step, stage, state, memory, work)
+            work.now.stands = at.step
+        faults.begin(parts, at, state, memory)
         if clock.mode == IMPLICIT:
-            good = functions.act(problem, place, time, step, state, memory)
+            good = functions.act(problem, place, at.time, at.step, state, memory)
         else:
-            seen = faults.sense(problem, clock, step, stage, work, y, work.seen)
-            good = explicit_law(problem, time, max(stage, 0), seen, memory, work, monitor)
+            seen = faults.sense(problem, work, work.y, work.seen)
+            good = explicit_law(problem, at.time, stage, seen, memory, work, monitor)
         if not good:
             return False
-        if stage == division.END:
-            work.division[division.KNOWN] = division.LAW
+        if at.stage == division.END:
+            divided.known = division.LAW
             return True
-        faults.deliver(problem, clock, step, stage, work)
+        faults.deliver(problem, clock, at.step, work)
     else:
-        copy(u, work.u)
-    if stage == 0:
-        before = work.u if clock.mode == CONTINUOUS else u
+        copy(parts.u, work.u)
+    if at.stage == 0:
+        before = work.u if clock.mode == CONTINUOUS else parts.u
         storage += functions.storage(problem, memory)
-        watch.observe(monitor, time, y, work.g, work.demand, before, work.u, storage)
-        copy(work.u, u)
+        watch.observe(monitor, parts.figures, at.time, work, before, work.u, storage)
+        copy(work.u, parts.u)
     return True
+
+
+class Vectors(NamedTuple):
+    """What a loop of ODE agents has behind its :class:`Room`; states are flat, with the memory."""
+
+    state: Annotated[np.ndarray, "m * states + memory"]
+    trial: Annotated[np.ndarray, "m * states + memory"]  # at a stage, or at a piece's end
+    begun: Annotated[np.ndarray, "m * states + memory"]  # at the start of a divided step
+    rates: Annotated[np.ndarray, "4, m * states + memory"]  # at the stages of a piece
+    spare: Annotated[np.ndarray, "max(m, 5 * states)"]  # for the agents' kernels
+
+
+class OdeRoom(NamedTuple):
+    """What changes in a run of ODE agents."""
+
+    loop: Room
+    vectors: Vectors
+
+
+_SIZES = "m p agents states memory history solver"
+_length, _room_in = in_array(OdeRoom, _SIZES, **ROOM)
+
+
+@kernel
+def ode_room_length(s):
+    """Entries of the room of a loop of these sizes, as a table has them."""
+    return _length(
+        s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
+    )  # fmt: skip
+
+
+@kernel
+def ode_room_in(flat, s):
+    """A room's views."""
+    return _room_in(
+        flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
+    )  # fmt: skip
+
+
+def rooms_of(flat: NDArray[np.float64], s: Steps) -> Any:
+    """Rooms (..., length) as Python knows them, by name."""
+    return by_name(
+        flat,
+        dtype_of(
+            OdeRoom, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
+            memory=s.memory, history=s.history, solver=s.solver, **ROOM,
+        ),
+    )  # fmt: skip
 
 
 @kernel
@@ -134,29 +171,75 @@ def stage_state(stage, h, state, k, trial):
 
 
 @kernel
-def piece_end(
-    faults, problem, channels, clock, step, length, u, state, k, trial, scratch, work
-):  # fmt: skip
-    """Fill trial with the flat state at the end of a piece, mode continuous.
-
-    Args:
-        length: of the piece, in s.
-        u: (m,) inputs at its start.
-        state: flat, at its start.
-        k: (4, ...) rates at its stages.
-        scratch: overwritten.
-    """
-    if clock.method == RK4:
+def piece_end(faults, parts, step, length, vectors):
+    """Fill the trial with the flat state at the end of a piece of so many s, mode continuous."""
+    channels, state, trial, k = parts.channels, vectors.state, vectors.trial, vectors.rates
+    if parts.clock.method == RK4:
         for r in range(len(state)):
             rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
             trial[r] = state[r] + length / 6.0 * rise
         return
-    acts = faults.push(problem, clock, step, u, work.acts)
+    acts = faults.push(parts.problem, parts.clock, step, parts.u, parts.work.acts)
     size = channels.rest.size
     copy(state[:size], trial[:size])
-    agents_functions.roll(channels, EULER, length, 1, trial, acts, scratch)
+    agents_functions.roll(channels, EULER, length, 1, trial, acts, vectors.spare)
     for r in range(size, len(state)):  # Euler's method for the memory
         trial[r] = state[r] + length * k[0, r]
+
+
+@kernel
+def rates_at(faults, parts, at, now, vectors):
+    """Fill the rates at a stage, whose flat state is ``now``."""
+    size, out = parts.channels.rest.size, vectors.rates[at.stage]
+    work = parts.work
+    acts = faults.push(parts.problem, parts.clock, at.step, work.u, work.acts)
+    seen = faults.choose(work.y, work.seen)
+    if parts.clock.method == RK4:
+        agents_functions.rates(parts.channels, at.stage, now, acts, vectors.spare, out)
+    functions.rate(parts.problem, seen, now[size:], out[size:])
+
+
+@kernel
+def roll_on(faults, parts, step, state, spare):
+    """Move the flat state by a step under the input held."""
+    clock = parts.clock
+    acts = faults.push(parts.problem, clock, step, parts.u, parts.work.acts)
+    agents_functions.roll(parts.channels, clock.method, clock.h, 1, state, acts, spare)
+
+
+@kernel
+def go_to(faults, parts, vectors, step, point, stages):
+    """When a stage or the end of a piece is, and its number; fill the trial but at its start."""
+    clock, divided = parts.clock, parts.work.division
+    time, length = division.begins(divided, step, clock.h), division.piece(divided, clock.h)
+    if point == 0:
+        return time, point
+    if point == stages:
+        piece_end(faults, parts, step, length, vectors)
+        return division.ends(divided, step, clock.h), division.END
+    stage_state(point, length, vectors.state, vectors.rates, vectors.trial)
+    return time + (0.5 * length, 0.5 * length, length)[point - 1], point
+
+
+# What became of a piece: it stands, with its step or before its end; it is taken back; no way on
+DONE, UNDER_WAY, AGAIN, ENDED = range(4)
+
+
+@kernel
+def end_piece(faults, parts, vectors, step, stages, good):
+    """Judge a piece whose stages were inside, if ``good``, and go on or take it back."""
+    clock, divided, problem, work = parts.clock, parts.work.division, parts.problem, parts.work
+    length, which = division.piece(divided, clock.h), 0
+    if good:
+        which = division.judge(stages, length, problem, work)
+        if which < 0:
+            return DONE if division.go_on(divided, clock.h, parts.monitor) else UNDER_WAY
+    if divided.position == 0.0:
+        copy(vectors.state, vectors.begun)
+    if division.halve(faults, step, clock.h, which, problem, work, parts.monitor):
+        return AGAIN
+    copy(vectors.begun, vectors.state)
+    return ENDED
 
 
 @cache
@@ -165,110 +248,60 @@ def build(faults: ModuleType = faultless) -> Any:
 
     It takes the addresses of a run's table and room, and moves the run on by so many steps, or,
     if that is 0, observes the present state without moving on. It returns 0 once the run has left,
-    else 1. Behind the room's other parts are [flat state, memory, scratch].
+    else 1.
     """
     source = source_key()
 
     def advance(table, address, count):
         _ = source
         sizes = steps_in(table)
-        m, states = sizes.actions, sizes.states
-        size, n = m * states, m * states + sizes.memory
-        room = floats_at(address, room_length(sizes))
-        problem, clock, channels = problem_in(table), clock_in(table), channels_in(table)
-        monitor, u, work, rest = parts_of(room, 0, sizes)
-        if monitor[watch.EXIT] != watch.INSIDE:
+        room = ode_room_in(floats_at(address, ode_room_length(sizes)), sizes)
+        parts, progress, given = parts_in(table, room.loop), room.loop.progress, room.vectors
+        clock, divided, size = parts.clock, parts.work.division, parts.channels.rest.size
+        if parts.monitor.exit != watch.INSIDE:
             return 0
-        state, scratch, h = rest[:n], rest[n:], clock.h
-        width = len(scratch) // SCRATCH_ROWS
-        # of the state's own length, so that the memory behind the channels has its own too
-        k, trial = shaped(scratch, (4, width)), scratch[4 * width : 4 * width + n]
-        begun, spare = scratch[5 * width : 5 * width + n], scratch[6 * width :]
-        step, block = np.int64(room[STEP_NOW]), np.int64(room[RECORDER])
+        state, trial, spare = given.state, given.trial, given.spare
+        step, block = np.int64(progress.step), np.int64(progress.recorder)
         moving = clock.mode == CONTINUOUS and count > 0
-        stages = 4 if moving and clock.method == RK4 else 1
-        divided, swapped, done, good = work.division, False, 0, True
-        divided[division.KNOWN] = division.NOTHING
+        stages, swapped, done, good = 4 if moving and clock.method == RK4 else 1, False, 0, True
+        divided.known = division.NOTHING
         while good:
-            if divided[division.POSITION] == 0.0 and divided[division.LEVEL] > 0.0:
-                copy(state, begun)
-            time, length, stage = division.begins(divided, step, h), division.piece(divided, h), 0
-            storage = agents_functions.stored(channels, state, spare)
+            if divided.position == 0.0 and divided.level > 0.0:
+                copy(state, given.begun)
+            vectors, stage = Vectors(state, trial, given.begun, given.rates, spare), 0
+            storage = agents_functions.stored(parts.channels, state, spare)
             for point in range(stages + 1 if moving else 1):
-                now, stage, at = state, point, time
-                if point == stages:
-                    piece_end(
-                        faults, problem, channels, clock, step, length, u, state, k, trial, spare,
-                        work,
-                    )  # fmt: skip
-                    now, stage, at = trial, division.END, division.ends(divided, step, h)
-                elif point > 0:
-                    stage_state(point, length, state, k, trial)
-                    now, at = trial, time + (0.5 * length, 0.5 * length, length)[point - 1]
-                good = look(
-                    faults, (address, 0, 0), problem, channels, clock, at, step, stage, storage,
-                    now, now[size:], u, monitor, work,
-                )  # fmt: skip
+                time, stage = go_to(faults, parts, vectors, step, point, stages)
+                at, now = Instant(time, step, stage), state if point == 0 else trial
+                good = look(faults, (address, 0, 0), parts, at, storage, now, now[size:])
                 if not good:
                     break
-                if stage == 0 and block > 0 and divided[division.POSITION] == 0.0:
-                    record(
-                        block, faults, channels, problem, clock, step, state[:size], u,
-                        state[size:], work, state[:0],
-                    )  # fmt: skip
+                if stage == 0 and block > 0 and divided.position == 0.0:
+                    start = Present(state[:size], state[size:], state[:0])
+                    record(block, faults, parts, step, start)
                 if moving and point < stages:
-                    division.note(stage, problem, work)
-                    acts = faults.push(problem, clock, step, work.u, work.acts)
-                    seen = faults.choose(work.y, work.seen)
-                    if clock.method == RK4:
-                        agents_functions.rates(channels, stage, now, acts, spare, k[point])
-                    functions.rate(problem, seen, now[size:n], k[point, size:n])
+                    division.note(stage, parts.problem, parts.work)
+                    rates_at(faults, parts, at, now, vectors)
             if count == 0 or (not good and stage == 0):
                 break
-            if not moving:
-                acts = faults.push(problem, clock, step, u, work.acts)
-                agents_functions.roll(channels, clock.method, h, 1, state, acts, spare)
+            result = DONE
+            if moving:
+                result = end_piece(faults, parts, vectors, step, stages, good)
+                good = result != ENDED
+            else:
+                roll_on(faults, parts, step, state, spare)
+            if moving and result <= UNDER_WAY:
+                state, trial, swapped = trial, state, not swapped
+            if result == DONE:
                 step, done = step + 1, done + 1
                 if done == count:
                     break
-                continue
-            which = division.judge(stages, length, problem, work) if good else 0
-            if good and which < 0:
-                state, trial, swapped = trial, state, not swapped
-                if division.go_on(divided, h, monitor):
-                    step, done = step + 1, done + 1
-                    if done == count:
-                        break
-                continue
-            if divided[division.POSITION] == 0.0:
-                copy(state, begun)
-            good = division.halve(faults, step, h, which, problem, work, monitor)
-            if not good:
-                copy(begun, state)
         if swapped:
             copy(state, trial)
-        room[STEP_NOW] = step
+        progress.step = step
         return 1 if good else 0
 
     return callback(LOOP, advance)
-
-
-@kernel
-def scratch_width(sizes):
-    """Entries of each of the SCRATCH_ROWS rows behind state and memory."""
-    m, states = sizes.actions, sizes.states
-    return max(m * states + sizes.memory, m, 5 * states)
-
-
-@kernel
-def room_length(sizes):
-    """Entries of the room of a loop of these sizes, as a table has them."""
-    needed = room_needed(
-        sizes.actions, sizes.constraints, sizes.agents, sizes.history, sizes.solver
-    )
-    return (
-        needed + sizes.actions * sizes.states + sizes.memory + SCRATCH_ROWS * scratch_width(sizes)
-    )
 
 
 class OdeLoop(ClosedLoop):
@@ -296,15 +329,16 @@ class OdeLoop(ClosedLoop):
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
         self._faulty = faults is not faultless
         sizes = steps_of(self._table)
-        self._room = np.zeros(room_length(sizes))
-        self.monitor, _u, _work, rest = parts_of(self._room, 0, sizes)
-        self._state = rest[: state.size + len(memory)]
+        self._flat = np.zeros(ode_room_length(sizes))
+        room = rooms_of(self._flat, sizes)
+        self._progress, self.monitor = room.loop, room.loop.monitor
+        self._state = room.vectors.state
         self._state[:] = np.concatenate([state.ravel(), memory])
 
     @property
     def time(self) -> float:
         """Time of the present state in s."""
-        return float(self._room[STEP_NOW] * self._h)
+        return float(self._progress.step * self._h)
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
@@ -331,10 +365,10 @@ class OdeLoop(ClosedLoop):
     def _run(self, rows: int, every: int, steps: int) -> Samples:
         recorder = Recorder(
             1, rows, self._shape, self._memory, self._faulty,
-            first=int(self._room[STEP_NOW]), every=every,
+            first=int(self._progress.step), every=every,
         )  # fmt: skip
         if rows > 0:
-            self._room[RECORDER] = recorder.addresses[0]
-            self._advance(self._table.address, self._room.ctypes.data, steps)
-            self._room[RECORDER] = 0.0
+            self._progress.recorder = recorder.addresses[0]
+            self._advance(self._table.address, self._flat.ctypes.data, steps)
+            self._progress.recorder = 0.0
         return recorder.samples(0)

@@ -6,9 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
-from gne_mj.loops.layout import MONITOR, RECORDER
-from gne_mj.loops.ode import SCRATCH_ROWS, build, room_length, scratch_width
-from gne_mj.loops.recorder import FIRST
+from gne_mj.loops.ode import build, ode_room_length, rooms_of
 from gne_mj.native import call_integer, compiled
 
 PIECE = 8  # runs that a thread takes at a time
@@ -45,23 +43,22 @@ class OdeBatch(BatchLoop):
         tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
         addresses = np.array([table.address for table in tables], dtype=np.int64)
         starts = np.stack([np.concatenate([c.state.ravel(), c.memory]) for c in cases])
-        length = room_length(sizes)
-        state_at = length - starts.shape[1] - SCRATCH_ROWS * scratch_width(sizes)
+        length = ode_room_length(sizes)
 
         def piece(first: int) -> bool:
             part = slice(first, first + PIECE)
-            rooms = np.zeros((len(addresses[part]), length))
-            rooms[:, RECORDER] = recorder.addresses[part]
-            rooms[:, state_at : state_at + starts.shape[1]] = starts[part]
-            at = rooms.ctypes.data + 8 * length * np.arange(len(rooms))
+            flat = np.zeros((len(addresses[part]), length))
+            rooms = rooms_of(flat, sizes)
+            rooms.loop.recorder, rooms.vectors.state = recorder.addresses[part], starts[part]
+            at = flat.ctypes.data + 8 * length * np.arange(len(flat))
             for done in range(0, span.steps, STRIDE):
                 if stopped():
                     return False
                 steps = min(STRIDE, span.steps - done)
                 _advance_each(self._advance.address, addresses[part], at, steps)
-            recorder.blocks[part, FIRST] = span.last
+            recorder.heads.first[part] = span.last
             _advance_each(self._advance.address, addresses[part], at, 0)
-            monitors[part] = rooms[:, MONITOR : MONITOR + monitors.shape[1]]
+            monitors[part] = rooms.loop.monitor
             return True
 
         with workers(self._threads) as pool:

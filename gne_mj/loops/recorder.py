@@ -1,8 +1,7 @@
 """Rows that native loops write at sample times: one block of arrays for each run.
 
-A loop knows a block by its address; 0 stands for none. The block is [first step of which a row is
-written, steps between rows, rows that there is room for, rows written], and then a pair (address,
-length) for each column.
+A loop knows a block by its address; 0 stands for none. The block begins with the numbers of
+:class:`Head`, and has a pair (address, length) for each column of :class:`Samples`.
 """
 
 import numpy as np
@@ -10,39 +9,58 @@ from numpy.typing import NDArray
 
 from gne_mj.loops.base import Samples
 from gne_mj.native import copy, kernel
-from gne_mj.table import exact, floats, integers_at
+from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
+from gne_mj.records import by_name, columns_in, count, shapes
+from gne_mj.table import exact, integers_at
 
-FIRST, EVERY, ROWS, DONE = range(4)
-HEADER = 4  # the same as two pairs of a table
-STATE, INPUT, MEMORY, SEEN, ACTS, CONFIGURATION = range(2, 8)
-WORDS = HEADER + 12
+
+class Head(Numbers):
+    """Which rows a run writes."""
+
+    first: int  # step of the first row
+    every: int  # steps between rows
+    rows: int  # that there is room for
+    done: int  # rows written
+
+
+HEADER = len(names_of(Head))  # the same as two pairs of a table
+WORDS = HEADER + 2 * count(Samples)
+
+_head_in, _columns_in = numbers_in(Head), columns_in(Samples, HEADER // 2)
 
 
 @kernel
-def write(block, index, rows, row, source):
+def write(column, rows, row, source):
     """Write a column's row from the beginning of ``source``."""
-    column = floats(block, index)
     width = len(column) // rows
     copy(source[:width], column[row * width : (row + 1) * width])
 
 
 @kernel
-def record(block, faults, channels, problem, clock, step, state, u, memory, work, qpos):
-    """Write this step's row, if one is due; state, u and qpos are flat, as at its start."""
-    head = integers_at(block, HEADER)
-    behind, rows = step - head[FIRST], head[ROWS]
-    row = behind // head[EVERY]
-    if behind < 0 or behind % head[EVERY] != 0 or row >= rows:
+def record(block, faults, parts, step, now):
+    """Write this step's row, if one is due.
+
+    Args:
+        block: its address.
+        faults: module of kernels, see :func:`gne_mj.loops.ode.look`.
+        parts: of the loop.
+        step: which.
+        now: :class:`gne_mj.loops.base.Present`, all flat, as at the step's start.
+    """
+    head = _head_in(integers_at(block, HEADER), 0)
+    behind, rows = step - head.first, head.rows
+    row = behind // head.every
+    if behind < 0 or behind % head.every != 0 or row >= rows:
         return
-    write(block, STATE, rows, row, state)
-    write(block, INPUT, rows, row, u)
-    write(block, MEMORY, rows, row, memory)
-    write(block, CONFIGURATION, rows, row, qpos)
-    seen, acts = floats(block, SEEN), floats(block, ACTS)
-    width = len(seen) // rows
+    columns = _columns_in(block)
+    write(columns.state, rows, row, now.state)
+    write(columns.input, rows, row, parts.u)
+    write(columns.memory, rows, row, now.memory)
+    write(columns.configuration, rows, row, now.configuration)
+    width = len(columns.seen) // rows
     at, end = row * width, (row + 1) * width
-    faults.record(channels, problem, clock, step, state, u, work, seen[at:end], acts[at:end])
-    head[DONE] = row + 1
+    faults.record(parts, step, now.state, columns.seen[at:end], columns.acts[at:end])
+    head.done = row + 1
 
 
 class Recorder:
@@ -59,7 +77,7 @@ class Recorder:
         every: steps between rows.
 
     Attributes:
-        blocks: (runs, WORDS), what the loops know.
+        heads: (runs,) which rows each run writes.
     """
 
     def __init__(
@@ -74,28 +92,31 @@ class Recorder:
         first: int = 0,
         every: int = 1,
     ) -> None:
-        m = shape[0]
-        struck = m * int(faulty)
-        widths = (m, memory, struck, struck, configuration)
-        columns = [np.empty((runs, rows, width)) for width in widths]
-        self._columns = [np.empty((runs, rows, *shape)), *columns]
-        self.blocks = np.zeros((runs, WORDS), dtype=np.int64)
-        self.blocks[:, : DONE + 1] = first, every, rows, 0
-        for at, column in enumerate(self._columns, start=STATE):
+        m, states = shape
+        of_columns = shapes(
+            Samples, m=m, states=states, memory=memory, faulty=int(faulty), joints=configuration
+        )
+        self._columns = Samples(*(np.empty((runs, rows, *shape)) for shape in of_columns))
+        self._blocks = np.zeros((runs, WORDS), dtype=np.int64)
+        self.heads = by_name(self._blocks, dtype_in(Head))
+        self.heads.first, self.heads.every, self.heads.rows = first, every, rows
+        for at, column in enumerate(self._columns):
             size = column[0].size if runs else 0
-            self.blocks[:, 2 * at] = column.ctypes.data + 8 * size * np.arange(runs)
-            self.blocks[:, 2 * at + 1] = size
+            pairs = self._blocks[:, HEADER + 2 * at :]
+            pairs[:, 0] = column.ctypes.data + 8 * size * np.arange(runs)
+            pairs[:, 1] = size
 
     @property
     def addresses(self) -> NDArray[np.int64]:
         """(runs,) the blocks' addresses."""
-        exact(self.blocks.ctypes.data + self.blocks.nbytes)
-        return self.blocks.ctypes.data + 8 * WORDS * np.arange(len(self.blocks))
+        exact(self._blocks.ctypes.data + self._blocks.nbytes)
+        return self._blocks.ctypes.data + 8 * WORDS * np.arange(len(self._blocks))
 
     @property
     def done(self) -> NDArray[np.int64]:
         """(runs,) rows written."""
-        return self.blocks[:, DONE]
+        done: NDArray[np.int64] = self.heads.done
+        return done
 
     def samples(self, run: int) -> Samples:
         """The rows of one run."""
@@ -103,7 +124,7 @@ class Recorder:
 
     def all(self) -> Samples:
         """The rows of all runs, (runs, rows, ...); those not written are not numbers."""
-        missing = np.arange(self._columns[0].shape[1]) >= self.done[:, None]
+        missing = np.arange(self._columns.input.shape[1]) >= self.done[:, None]
         for column in self._columns:
             column[missing] = np.nan
-        return Samples(*self._columns)
+        return self._columns

@@ -11,7 +11,7 @@ with linear maps, both are the same solution.
 
 import math
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +20,25 @@ from gne_mj.controllers.settings import EPSILON
 from gne_mj.graph import Graph
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
-from gne_mj.loops.estimate_modes import add_from_modes, modes_of, to_modes
-from gne_mj.loops.feedback import Problem, feedback, work
-from gne_mj.loops.layout import Setup, problem_and_table
+from gne_mj.loops.estimate_modes import Modes, add_from_modes, modes_of, to_modes
+from gne_mj.loops.feedback import Work, feedback
+from gne_mj.loops.layout import ROOM, Setup, channels_in, clock_in, ode_table, problem_in
 from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure
-from gne_mj.loops.rodas import ADDING, ORDER, STAGES, method
-from gne_mj.loops.stage_system import StageSystem, linearise, prepare, solve_stage, stage_system
+from gne_mj.loops.rodas import ADDING, ORDER, STAGES, Method, method
+from gne_mj.loops.stage_system import (
+    Fixed,
+    StageSystem,
+    linearise,
+    prepare,
+    solve_stage,
+    stage_system,
+)
 from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj.numbers import Numbers
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.agents import Agents, input_columns
-from gne_mj.plants.functions import compiled_functions
-from gne_mj.plants.ode import Channels
+from gne_mj.records import by_name, dtype_of, in_array
 
 # How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
 SAFETY, GROW, SHRINK = 0.9, 6.0, 0.2
@@ -41,8 +48,17 @@ POWER = 1.0 / ORDER
 SMALLEST, EARLY = 1e-12, 1e-6
 AHEAD = 1e-6
 
-# Entries of a loop's `progress`: the last accepted step runs from START to END.
-START, END, NEXT, LAST_STEP, LAST_ERROR, ACCEPTED, REJECTED, COUNT = range(8)
+
+class Steps(Numbers):
+    """How far a run is: the last accepted step runs from start to end."""
+
+    start: float
+    end: float
+    next: float  # length to be tried, as the others in s
+    last_step: float
+    last_error: float
+    accepted: float
+    rejected: float
 
 
 class Solver(NamedTuple):
@@ -52,22 +68,66 @@ class Solver(NamedTuple):
     k: np.ndarray  # (STAGES, n + w)
     dense: np.ndarray  # (5, n) what the dense output of the last accepted step needs
     greatest: np.ndarray  # (states,) each state's greatest magnitude so far
-    exit: np.ndarray  # why the last stage failed, as the monitor's header
     u: np.ndarray  # (m,) input at a stage
     system: StageSystem
+    modes: Modes  # read-only
+    method: Method  # read-only
+
+
+class Rows(NamedTuple):
+    """What a run has recorded."""
+
+    state: np.ndarray  # (rows, n) states and memory
+    u: np.ndarray  # (rows, m)
+
+
+class Room(NamedTuple):
+    """What changes in a run besides, in one flat array."""
+
+    progress: Steps
+    monitor: watch.Monitor
+    exit: watch.Seen  # why the last stage failed
+    u: Annotated[np.ndarray, "m"]  # input at the last step's start
+    work: Work
+
+
+_ROOM = ROOM | {"history": 0, "solver": 0}
+_length, _room_in = in_array(Room, "m p agents", **_ROOM)
+
+
+class Run(NamedTuple):
+    """What kernels of a run change."""
+
+    progress: Steps
+    monitor: watch.Seen
+    figures: watch.Monitor
+    exit: watch.Seen
+    u: np.ndarray
+    work: Work
+    solver: Solver
 
 
 @kernel
-def look(
-    problem, channels, time, state, monitor, latch, work, known, u
-):  # fmt: skip
+def run_in(table, flat, solver):
+    """What does not change in a run, and what does, from its table and room."""
+    fixed = Fixed(problem_in(table), channels_in(table), solver.modes, solver.method)
+    data = fixed.problem.data
+    m, p, agents = len(data.owner), len(data.member_pointer) - 1, len(data.offsets) - 1
+    room = _room_in(flat, 0, m, p, agents)
+    seen, figures = room.monitor.seen, room.monitor
+    return fixed, Run(room.progress, seen, figures, room.exit, room.u, room.work, solver)
+
+
+@kernel
+def look(fixed, run, time, state, latch, u):
     """Measure, act and observe; fill u. False, with the exit in ``latch``, if there is no input."""
-    y = work.y
-    measure(channels, state, y)
-    if not feedback(problem, time, 0, y, state[channels.rest.size :], work, latch, u):
+    channels, work = fixed.channels, run.work
+    measure(channels, state, work.y)
+    memory = state[channels.rest.size :]
+    if not feedback(fixed.problem, time, 0, work.y, memory, work, latch, u):
         return False
-    storage = agents_functions.stored(channels, state, known)
-    watch.observe(monitor, time, y, work.g, work.demand, u, u, storage)
+    storage = agents_functions.stored(channels, state, run.solver.system.known)
+    watch.observe(run.monitor, run.figures, time, work, u, u, storage)
     return True
 
 
@@ -110,20 +170,20 @@ def magnitude(states, state, solver, a):
 
 
 @kernel
-def try_step(
-    problem, channels, modes, method, states, time, h, state, u, work, solver
-):  # fmt: skip
+def try_step(fixed, run, time, h, state):
     """Fill trial with the flat vector after a step of length h; return its weighted error.
 
-    The error is infinite, and solver.exit says why, if a stage or the new state is not inside.
+    The error is infinite, and run.exit says why, if a stage or the new state is not inside.
     """
-    size, agents = len(u) * states, len(problem.data.offsets) - 1
+    problem, channels, method = fixed.problem, fixed.channels, fixed.method
+    work, solver = run.work, run.solver
+    size, agents = channels.rest.size, len(problem.data.offsets) - 1
     trial, k = solver.trial, solver.k
-    solver.exit[watch.EXIT] = watch.INSIDE
-    if not prepare(problem, channels, modes, states, h, solver.system):
-        watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, np.inf, 1)
+    run.exit.exit = watch.INSIDE
+    if not prepare(fixed, h, solver.system):
+        watch.leave(run.exit, watch.DIVERGED, time, -1, -1, np.inf, 1)
         return np.inf
-    copy(u, solver.u)
+    copy(run.u, solver.u)
     for stage in range(STAGES + 1):
         if stage < ADDING:
             copy(state, trial)
@@ -133,49 +193,46 @@ def try_step(
             add_multiple(1.0, k[stage - 1], trial)
         if stage > 0:
             measure(channels, trial, work.y)
-            if not feedback(
-                problem, time, stage, work.y, trial[size:], work, solver.exit,
-                solver.u,
-            ):  # fmt: skip
+            if not feedback(problem, time, stage, work.y, trial[size:], work, run.exit, solver.u):
                 return np.inf
         if stage < STAGES:
-            solve_stage(
-                problem, channels, modes, method, states, h, stage, trial, solver.u, k,
-                solver.system,
-            )  # fmt: skip
+            solve_stage(fixed, h, stage, trial, solver.u, k, solver.system)
+    states = channels.rest.shape[1]
     error = error_of(channels.output, agents, method, states, trial, solver)
     if not error <= 1.0:  # latched only if the run ends here
-        watch.leave(solver.exit, watch.DIVERGED, time, -1, -1, error, STAGES)
+        watch.leave(run.exit, watch.DIVERGED, time, -1, -1, error, STAGES)
     return error
 
 
 @kernel
-def look_ahead(problem, channels, time, h, state, work, solver):
-    """Tell in solver.exit if the boundary is why even the smallest step has failed.
+def look_ahead(fixed, run, time, h, state):
+    """Tell in run.exit if the boundary is why even the smallest step has failed.
 
     Next to the boundary the demand grows so fast that no step is accurate. The trial vector is
     moved on along the step of length h, until it is outside or a microsecond away.
     """
-    y, trial = work.y, solver.trial
-    size = channels.rest.size
+    problem, channels, work, solver = fixed.problem, fixed.channels, run.work, run.solver
+    y, trial, size = work.y, solver.trial, channels.rest.size
     while h < AHEAD * max(1.0, time):
         h *= 2.0
         for r in range(len(trial)):
             trial[r] += trial[r] - state[r]
         measure(channels, trial, y)
-        why = solver.exit[watch.EXIT]
-        solver.exit[watch.EXIT] = watch.INSIDE
+        why = run.exit.exit
+        run.exit.exit = watch.INSIDE
         if not feedback(
-            problem, time, STAGES, y, trial[size:], work, solver.exit, solver.u
-        ) and solver.exit[watch.EXIT] != watch.DIVERGED:  # fmt: skip
+            problem, time, STAGES, y, trial[size:], work, run.exit, solver.u
+        ) and run.exit.exit != watch.DIVERGED:  # fmt: skip
             return
-        solver.exit[watch.EXIT] = why
+        run.exit.exit = why
 
 
 @kernel
-def accept(problem, modes, method, states, h, progress, state, solver):
+def accept(fixed, run, h, state):
     """Move to the trial state, and keep what the dense output of the step needs."""
-    at = problem.data.offsets
+    problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
+    progress, solver = run.progress, run.solver
+    at, states = problem.data.offsets, channels.rest.shape[1]
     m, agents = len(solver.u), len(at) - 1
     size, n = m * states, solver.dense.shape[1]
     copy(state[:n], solver.dense[0])
@@ -198,63 +255,58 @@ def accept(problem, modes, method, states, h, progress, state, solver):
             add_multiple(method.dense[line, j], solver.k[j], out)
     for a in range(states):
         solver.greatest[a] = magnitude(states, state, solver, a)
-    progress[START] = progress[END]
-    progress[END] += h
-    progress[ACCEPTED] += 1.0
+    progress.start = progress.end
+    progress.end += h
+    progress.accepted += 1.0
 
 
 @kernel
-def step_on(
-    problem, channels, modes, method, states, progress, state, u, monitor, work, solver,
-):  # fmt: skip
-    """Take one accepted step from END; False, with the exit latched, if there is none."""
-    time = progress[END]
-    if not look(
-        problem, channels, time, state, monitor, monitor, work, solver.system.known, u
-    ):  # fmt: skip
+def step_on(fixed, run, state):
+    """Take one accepted step from its end; False, with the exit latched, if there is none."""
+    progress, monitor = run.progress, run.monitor
+    time = progress.end
+    if not look(fixed, run, time, state, monitor, run.u):
         return False
-    monitor[watch.STEPS] = progress[ACCEPTED]
-    linearise(problem, channels, states, state, u, work, solver.system)
-    h, retried = progress[NEXT], False
+    monitor.steps = progress.accepted
+    linearise(fixed, state, run.u, run.work, run.solver.system)
+    h, retried = progress.next, False
     while True:
         smallest = SMALLEST * max(EARLY, time)
         if not h > smallest:
             h = smallest
-        error = try_step(
-            problem, channels, modes, method, states, time, h, state, u, work, solver,
-        )  # fmt: skip
+        error = try_step(fixed, run, time, h, state)
         if error <= 1.0:
             break
         if h == smallest:
-            why = solver.exit
-            if why[watch.EXIT] == watch.DIVERGED:
-                look_ahead(problem, channels, time, h, state, work, solver)
+            why = run.exit
+            if why.exit == watch.DIVERGED:
+                look_ahead(fixed, run, time, h, state)
             watch.leave(
-                monitor, int(why[watch.EXIT]), time, why[watch.EXIT_AGENT],
-                why[watch.EXIT_CONSTRAINT], why[watch.EXIT_VALUE], why[watch.EXIT_STAGE],
+                monitor, int(why.exit), time, why.exit_agent, why.exit_constraint,
+                why.exit_value, why.exit_stage,
             )  # fmt: skip
             return False
-        progress[REJECTED] += 1.0
+        progress.rejected += 1.0
         retried = True
         h *= max(SHRINK, SAFETY * error**-POWER) if error < np.inf else 0.5
-    accept(problem, modes, method, states, h, progress, state, solver)
+    accept(fixed, run, h, state)
     error = max(error, 1e-12)
     factor = min(GROW, SAFETY * error**-POWER)
-    if progress[LAST_STEP] > 0.0:
-        trend = SAFETY * h / progress[LAST_STEP]
-        factor = min(factor, trend * (progress[LAST_ERROR] / error**2) ** POWER)
+    if progress.last_step > 0.0:
+        trend = SAFETY * h / progress.last_step
+        factor = min(factor, trend * (progress.last_error / error**2) ** POWER)
     factor = max(factor, SHRINK)
-    progress[NEXT] = h * (min(factor, 1.0) if retried else factor)
-    progress[LAST_STEP] = h
-    progress[LAST_ERROR] = max(error, 0.01)
+    progress.next = h * (min(factor, 1.0) if retried else factor)
+    progress.last_step = h
+    progress.last_error = max(error, 0.01)
     return True
 
 
 @kernel
 def interpolate(progress, time, dense, out):
     """Fill out (n,) with states and memory at a time in the last accepted step."""
-    length = progress[END] - progress[START]
-    theta = (time - progress[START]) / length if length > 0.0 else 1.0
+    length = progress.end - progress.start
+    theta = (time - progress.start) / length if length > 0.0 else 1.0
     rest = 1.0 - theta
     for r in range(len(out)):
         bend = dense[2, r] + theta * (dense[3, r] + theta * dense[4, r])
@@ -267,44 +319,40 @@ def build() -> tuple[Any, Any]:
     source = source_key()
 
     @compiled
-    def advance(
-        problem, channels, modes, method, clock_step, step, every, progress, state, u, monitor,
-        work, solver, samples_state, samples_u,
-    ):  # fmt: skip
+    def advance(table, room, solver, step, every, state, rows):
+        """Fill rows, each followed by ``every`` sample steps; how many, and the step then."""
         _ = source
-        states, known = channels.rest.shape[1], solver.system.known
-        for sample in range(len(samples_u)):
-            row, time = samples_state[sample], step * clock_step
+        fixed, run = run_in(table, room, solver)
+        progress, monitor, period = run.progress, run.monitor, clock_in(table).h
+        for sample in range(len(rows.u)):
+            row, time = rows.state[sample], step * period
             interpolate(progress, time, solver.dense, row)
             # Outside between two states inside is the interpolation's doing and ends no run.
-            latch = solver.exit if progress[END] > 0.0 else monitor
-            if not look(
-                problem, channels, time, row, monitor, latch, work, known, samples_u[sample],
-            ):  # fmt: skip
-                if progress[END] == 0.0:
+            latch = run.exit if progress.end > 0.0 else monitor
+            if not look(fixed, run, time, row, latch, rows.u[sample]):
+                if progress.end == 0.0:
                     return sample, step
-                for r in range(len(u)):
-                    samples_u[sample, r] = np.nan
-            monitor[watch.STEPS] = progress[ACCEPTED]
-            time = (step + every) * clock_step
-            while progress[END] < time:
-                if not step_on(
-                    problem, channels, modes, method, states, progress, state, u, monitor, work,
-                    solver,
-                ):  # fmt: skip
+                for r in range(len(run.u)):
+                    rows.u[sample, r] = np.nan
+            monitor.steps = progress.accepted
+            time = (step + every) * period
+            while progress.end < time:
+                if not step_on(fixed, run, state):
                     return sample + 1, step
             step += every
-        return len(samples_u), step
+        return len(rows.u), step
 
     @compiled
-    def finish(problem, channels, time, progress, monitor, work, solver, row, row_u):
+    def finish(table, room, solver, time, rows):
         _ = source
+        fixed, run = run_in(table, room, solver)
+        row, u, progress = rows.state[0], rows.u[0], run.progress
         interpolate(progress, time, solver.dense, row)
-        latch = solver.exit if progress[END] > 0.0 else monitor
-        if not look(problem, channels, time, row, monitor, latch, work, solver.system.known, row_u):
-            for r in range(len(row_u)):
-                row_u[r] = np.nan
-        monitor[watch.STEPS] = progress[ACCEPTED]
+        latch = run.exit if progress.end > 0.0 else run.monitor
+        if not look(fixed, run, time, row, latch, u):
+            for r in range(len(u)):
+                u[r] = np.nan
+        run.monitor.steps = progress.accepted
 
     return advance, finish
 
@@ -341,76 +389,74 @@ class RosenbrockLoop(ClosedLoop):
         constraints = len(data.member_pointer) - 1
         modes = modes_of(graph, np.repeat(np.arange(graph.agents), np.diff(data.offsets)))
         self._length, self._estimates = state.size + len(memory), graph.agents * m
-        self._fixed = (*self._parts(setup), modes, method(rtol, atol))
+        self._take(setup)
         self._h = setup.clock.h
         self._step = 0
-        self._state = self._flat(state, memory)
-        self._progress = np.zeros(COUNT)
-        self._u = np.zeros(m)
-        self._work = work(m, constraints, graph.agents)
+        self._state = self._flat(modes, state, memory)
+        sizes = {"m": m, "p": constraints, "agents": graph.agents}
+        self._room = np.zeros(_length(*sizes.values()))
+        room = by_name(self._room, dtype_of(Room, **sizes, **_ROOM))
+        self._progress, self.monitor = room, room.monitor
         self._solver = Solver(
             trial=np.zeros_like(self._state),
             k=np.zeros((STAGES, len(self._state))),
             dense=np.zeros((5, self._length)),
             greatest=np.abs(state).max(axis=0),
-            exit=np.zeros(watch.HEADER),
             u=np.zeros(m),
             system=stage_system(input_columns(agents.kind, agents.parameters), graph.agents),
+            modes=modes,
+            method=method(rtol, atol),
         )
-        self.monitor = np.zeros(watch.length(m, constraints))
         self._begin()
 
-    def _parts(self, setup: Setup) -> tuple[Problem, Channels]:
-        """What the loop reads, and as a table what the law's functions do."""
-        kind = self._agents.kind
+    def _take(self, setup: Setup) -> None:
+        """Let this be what the loop and the law's functions read."""
         memory = self._length - math.prod(self._shape)
-        problem, self._table = problem_and_table(setup, self._agents, memory)
-        addresses = compiled_functions(kind)
-        channels = Channels(self._agents.parameters, setup.rest, addresses, kind.OUTPUT)
-        return problem, channels
+        self._table = ode_table(setup, self._agents, memory)
+        self._epsilon = float(setup.problem.settings[EPSILON])
 
-    def _flat(self, state: NDArray[np.float64], memory: NDArray[np.float64]) -> NDArray[np.float64]:
-        modes = self._fixed[2]
-        return np.concatenate([state.ravel(), memory, to_modes(modes, memory[: self._estimates])])
+    def _flat(
+        self, modes: Modes, state: NDArray[np.float64], memory: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        estimates = to_modes(modes, memory[: self._estimates])
+        return np.concatenate([state.ravel(), memory, estimates])
 
     def _begin(self) -> None:
         """Let the next adaptive step be from this state at the present time."""
-        problem, dense = self._fixed[0], self._solver.dense
+        dense = self._solver.dense
         dense[:2], dense[2:] = self._state[: self._length], 0.0
-        self._progress[:ACCEPTED] = 0.0
-        self._progress[START] = self._progress[END] = self.time
-        self._progress[NEXT] = min(self._h, float(problem.settings[EPSILON]))
+        self._progress.last_step = self._progress.last_error = 0.0
+        self._progress.start = self._progress.end = self.time
+        self._progress.next = min(self._h, self._epsilon)
 
     @property
     def time(self) -> float:
         """Time of the present state in s: of a run that has ended early, its last step's end."""
-        ended = self.monitor[watch.EXIT] != watch.INSIDE
-        return float(self._progress[END]) if ended else self._step * self._h
+        ended = self.monitor.exit != watch.INSIDE
+        return float(self._progress.end) if ended else self._step * self._h
 
     @property
     def steps(self) -> tuple[int, int]:
         """How many steps have been accepted, and how many rejected."""
-        return int(self._progress[ACCEPTED]), int(self._progress[REJECTED])
+        return int(self._progress.accepted), int(self._progress.rejected)
 
     def advance(self, samples: int, every: int) -> Samples:
         """See the base class."""
-        states, inputs = np.empty((samples, self._length)), np.empty((samples, len(self._u)))
-        done = 0
-        if self.monitor[watch.EXIT] == watch.INSIDE:
+        rows, done = self._rows(samples), 0
+        if self.monitor.exit == watch.INSIDE:
             done, self._step = self._advance(
-                *self._fixed, self._h, self._step, every, self._progress, self._state, self._u,
-                self.monitor, self._work, self._solver, states, inputs,
-            )  # fmt: skip
-        return self._samples(states[:done], inputs[:done])
+                self._table.address, self._room, self._solver, self._step, every, self._state, rows
+            )
+        return self._samples(rows.state[:done], rows.u[:done])
 
     def finish(self) -> Samples:
         """See the base class."""
-        row, u = np.empty((1, self._length)), np.empty((1, len(self._u)))
-        self._finish(
-            *self._fixed[:2], self.time, self._progress, self.monitor, self._work, self._solver,
-            row[0], u[0],
-        )  # fmt: skip
-        return self._samples(row, u)
+        rows = self._rows(1)
+        self._finish(self._table.address, self._room, self._solver, self.time, rows)
+        return self._samples(*rows)
+
+    def _rows(self, count: int) -> Rows:
+        return Rows(np.empty((count, self._length)), np.empty((count, self._shape[0])))
 
     def present(self) -> Present:
         """See the base class; the state between two adaptive steps is interpolated."""
@@ -420,8 +466,9 @@ class RosenbrockLoop(ClosedLoop):
 
     def _adopt(self, setup: Setup) -> None:
         state, memory, _ = self.present()
-        self._fixed = (*self._parts(setup), *self._fixed[2:])
-        self._state[:] = self._flat(state, memory)  # the last step's end lies beyond, by the old
+        self._take(setup)
+        # the last step's end lies beyond, by the old
+        self._state[:] = self._flat(self._solver.modes, state, memory)
         self._begin()
 
     def _samples(self, states: NDArray[np.float64], inputs: NDArray[np.float64]) -> Samples:

@@ -20,11 +20,13 @@ import numpy as np
 from gne_mj import banded
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
-from gne_mj.loops.estimate_modes import add_from_modes
+from gne_mj.loops.estimate_modes import Modes, add_from_modes
+from gne_mj.loops.feedback import Problem
 from gne_mj.loops.linear import add_multiple
-from gne_mj.loops.rodas import GAMMA
+from gne_mj.loops.rodas import GAMMA, Method
 from gne_mj.native import copy, kernel
 from gne_mj.plants import functions
+from gne_mj.plants.ode import Channels
 from gne_mj.records import fresh
 
 
@@ -54,6 +56,15 @@ class StageSystem(NamedTuple):
     known: Annotated[np.ndarray, "m"]  # what V and the rates share, see gne_mj.plants.functions
 
 
+class Fixed(NamedTuple):
+    """What does not change in a run."""
+
+    problem: Problem
+    channels: Channels
+    modes: Modes
+    method: Method
+
+
 def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
     """Fresh arrays for N agents; inputs (m, states) is G."""
     m, states = inputs.shape
@@ -62,18 +73,18 @@ def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
 
 
 @kernel
-def linearise(problem, channels, states, state, u, work, system):
+def linearise(fixed, state, u, work, system):
     """Fill the law's and the channels' derivatives at a state.
 
     Args:
-        problem, channels: as the loop has them.
-        states: states of a channel.
+        fixed: of the loop.
         state: the loop's flat vector.
         u: (m,) input there; work.y and work.demand as the law has just left them.
         work: scratch arrays.
         system: its local, own and filtered are filled.
     """
-    data = problem.data
+    problem, channels = fixed.problem, fixed.channels
+    data, states = problem.data, channels.rest.shape[1]
     at = data.offsets
     m, agents = len(u), len(at) - 1
     gain, rho = problem.settings[GAIN], problem.settings[RHO]
@@ -113,10 +124,11 @@ def linearise(problem, channels, states, state, u, work, system):
 
 
 @kernel
-def prepare(problem, channels, modes, states, h, system):
+def prepare(fixed, h, system):
     """Factorise for steps of length h from where the loop was linearised; False if singular."""
+    channels, modes = fixed.channels, fixed.modes
     agents, m = system.spread.shape
-    epsilon = problem.settings[EPSILON]
+    epsilon, states = fixed.problem.settings[EPSILON], channels.rest.shape[1]
     s = 1.0 / (GAMMA * h)
     for a in range(agents - 1):
         for r in range(m):
@@ -167,12 +179,11 @@ def respond(system, r, states, s):
 
 
 @kernel
-def solve_stage(problem, channels, modes, method, states, h, stage, trial, u, k, system):
+def solve_stage(fixed, h, stage, trial, u, k, system):
     """Fill k[stage], given the stages before it.
 
     Args:
-        problem, channels, modes, method: as the loop has them.
-        states: states of a channel.
+        fixed: of the loop.
         h: the step.
         stage: which, from 0.
         trial: the flat vector at which the stage is taken.
@@ -180,7 +191,8 @@ def solve_stage(problem, channels, modes, method, states, h, stage, trial, u, k,
         k: (STAGES, length of the flat vector).
         system: prepared for h.
     """
-    at = problem.data.offsets
+    problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
+    at, states = problem.data.offsets, channels.rest.shape[1]
     agents, m = system.spread.shape
     epsilon = problem.settings[EPSILON]
     s = 1.0 / (GAMMA * h)

@@ -5,33 +5,63 @@ therefore found by stepping a second mjData from the same state; it bears no mar
 callback of a loop acts on it.
 """
 
+from typing import NamedTuple
+
 from gne_mj.native import kernel
+from gne_mj.numbers import Numbers, names_of, numbers_in
+from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import call, call_state, field, timed_step
+from gne_mj.records import in_numbers
 from gne_mj.table import integers
 
-# Of a fleet's table (see gne_mj.plants.mujoco): where the robots' numbers are, and sizes
-PLACES, _, SIZES = range(3)
-NQ, NV, NU = range(3)
-SENSORDATA, TWIN, MJ_STEP, MJ_FORWARD, MJ_COPY, KNOWN = range(7, 13)  # more entries of SIZES
-# Addresses of the functions that sensors of velocities need, in their order
-SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
-FIRST_OF_SENSORS, LAST_OF_SENSORS = 13, 15
 
-# A channel's row of PLACES: the joint's degree of freedom or (negative) the sensor's entry less
-# one, the joint's entry of qpos or -1, the actuator's of ctrl
-OUTPUT_AT, POSITION_AT, ACTUATOR, PLACES_COUNT = range(4)
+class Ahead(NamedTuple):
+    """What such fleets need besides, behind :class:`gne_mj.plants.mujoco.Sizes` in SIZES."""
+
+    nsensordata: int
+    twin: int  # address of the second mjData
+    known: int  # bits of mjtState that it is given
+    # addresses of MuJoCo's functions
+    step: int
+    copy: int
+    forward: int  # 0 if no sensor needs those that follow
+    position: int
+    velocity: int
+    sensors: int
+
+
+# Functions of MuJoCo's that bring sensors of velocities up to date, in their order
+SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
+
+
+class ChannelPlace(Numbers):
+    """Where a channel's numbers lie: what PLACES has of each."""
+
+    output: int  # the joint's degree of freedom, or (negative) the sensor's entry less one
+    position: int  # the joint's entry of qpos, or -1
+    actuator: int  # entry of ctrl
+
+
+PLACE = len(names_of(ChannelPlace))
+ahead_in, _place_in = in_numbers(Ahead, SIZES, len(Sizes._fields)), numbers_in(ChannelPlace)
+
+
+@kernel
+def place_of(places, r):
+    """Where the numbers of channel r lie."""
+    return _place_in(places, r * PLACE)
 
 
 @kernel
 def gather(at, data, table, state):
     """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
-    sizes = integers(table, SIZES)
-    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
-    sensordata = field(data, at.sensordata, sizes[SENSORDATA])
+    sizes = sizes_in(table)
+    qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
+    sensordata = field(data, at.sensordata, ahead_in(table).nsensordata)
     places = integers(table, PLACES)
-    for r in range(len(places) // PLACES_COUNT):
-        source = places[r * PLACES_COUNT + OUTPUT_AT]
-        position = places[r * PLACES_COUNT + POSITION_AT]
+    for r in range(len(places) // PLACE):
+        place = place_of(places, r)
+        source, position = place.output, place.position
         state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
         state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
 
@@ -39,16 +69,17 @@ def gather(at, data, table, state):
 @kernel
 def refresh(model, data, table):
     """Bring sensors of velocities up to date, which are of the last step's start."""
-    sizes = integers(table, SIZES)
-    if sizes[MJ_FORWARD] != 0:
-        for function in range(FIRST_OF_SENSORS, LAST_OF_SENSORS + 1):
-            call(sizes[function], model, data)
+    ahead = ahead_in(table)
+    if ahead.forward != 0:
+        call(ahead.position, model, data)
+        call(ahead.velocity, model, data)
+        call(ahead.sensors, model, data)
 
 
 @kernel
 def actuator_of(places, r):
     """Which entry of ctrl is the input of channel r."""
-    return places[r * PLACES_COUNT + ACTUATOR]
+    return place_of(places, r).actuator
 
 
 @kernel
@@ -64,16 +95,16 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     the simulation itself and not from ``state``.
     """
     at, model, data, table = context
-    sizes, places = integers(table, SIZES), integers(table, PLACES)
-    twin = sizes[TWIN]
-    call_state(sizes[MJ_COPY], model, data, twin, sizes[KNOWN])
-    ctrl = field(twin, at.ctrl, sizes[NU])
+    ahead, places = ahead_in(table), integers(table, PLACES)
+    twin = ahead.twin
+    call_state(ahead.copy, model, data, twin, ahead.known)
+    ctrl = field(twin, at.ctrl, sizes_in(table).nu)
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]
     for _ in range(clock.period):
-        timed_step(at, sizes[MJ_STEP], model, twin)
-    if sizes[MJ_FORWARD] != 0:  # sensors are of the last step's start
-        call(sizes[MJ_FORWARD], model, twin)
+        timed_step(at, ahead.step, model, twin)
+    if ahead.forward != 0:  # sensors are of the last step's start
+        call(ahead.forward, model, twin)
     gather(at, twin, table, trial)
     for r in range(len(u)):
         out[r] = trial[2 * r]

@@ -9,23 +9,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, nearest
 from gne_mj.native import kernel
+from gne_mj.numbers import dtype_in
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_ahead import (
-    ACTUATOR,
-    OUTPUT_AT,
-    POSITION_AT,
     SENSOR_FUNCTIONS,
+    Ahead,
+    ChannelPlace,
     actuator_of,
     gather,
     refresh,
 )
 from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
-from gne_mj.plants.mujoco import INTEGRATORS, run_steps
+from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
     PLANT_MARK,
@@ -35,6 +35,7 @@ from gne_mj.plants.native_mujoco import (
     quiet,
     step_address,
 )
+from gne_mj.records import by_name
 from gne_mj.table import Table
 
 __all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
@@ -105,19 +106,24 @@ class MjcfPlant(FleetPlant):
             mujoco.mj_fwdPosition(self.model, self.data)
         self._owners = owners_of(self.model, sizes_of_robots)
         share_floors(self.model, self.data, self._owners)
-        self.places = np.array(
+        flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
+        self.places = by_name(flat, dtype_in(ChannelPlace))
         model = self.model
         self._twin = mujoco.MjData(model)  # where mode implicit looks ahead
-        sizes = (
+        self.sizes = Sizes(
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
-            model.na - memory, model.nsensordata, self._twin._address, step_address(),
+            model.na - memory,
+        )  # fmt: skip
+        ahead = Ahead(
+            model.nsensordata, self._twin._address, KNOWN_STATE, step_address(),
+            step_address("mj_copyState"),
             0 if self.measures_every_stage else step_address("mj_forward"),
-            step_address("mj_copyState"), KNOWN_STATE,
             *(step_address(name) for name in SENSOR_FUNCTIONS),
         )  # fmt: skip
-        self.table_arrays = [self.places, np.zeros(0), np.array(sizes, dtype=np.int64)]
+        sizes = np.array([*self.sizes, *ahead], dtype=np.int64)
+        self.table_arrays = [flat, np.zeros(0), sizes]
         self._table = Table(self.table_arrays)
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
@@ -138,7 +144,7 @@ class MjcfPlant(FleetPlant):
     @property
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
-        return bool(np.all(self.places[:, OUTPUT_AT] >= 0))
+        return bool(np.all(self.places.output >= 0))
 
     def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
         model, prefix = self.model, f"robot_{i + 1}/"
@@ -197,22 +203,22 @@ class MjcfPlant(FleetPlant):
     @property
     def output_joints(self) -> NDArray[np.int64]:
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
-        return np.maximum(self.places[:, OUTPUT_AT], -1)
+        return np.maximum(self.places.output, -1)
 
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, 2), a copy: outputs and positions."""
         self.refresh()
-        at, sensor = self.places[:, OUTPUT_AT], self.data.sensordata
+        at, sensor = self.places.output, self.data.sensordata
         output = [self.data.qvel[a] if a >= 0 else sensor[-1 - a] for a in at]
-        position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places[:, POSITION_AT]]
+        position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places.position]
         return np.column_stack([output, position])
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class; of all joint velocities with these outputs the smallest are taken."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        for at, position in zip(self.places[:, POSITION_AT], state[:, 1], strict=True):
+        for at, position in zip(self.places.position, state[:, 1], strict=True):
             if at >= 0:
                 self.data.qpos[at] = position
         slopes = np.empty((len(state), self.model.nv))
@@ -236,7 +242,7 @@ class MjcfPlant(FleetPlant):
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
         self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
-        self.data.ctrl[self.places[:, ACTUATOR]] = u
+        self.data.ctrl[self.places.actuator] = u
         with callbacks():
             run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)

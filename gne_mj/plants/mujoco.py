@@ -2,7 +2,7 @@
 
 import sys
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.native import callback, compiled, kernel, source_key
+from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, compose, element_names
@@ -27,6 +28,7 @@ from gne_mj.plants.native_mujoco import (
     table_of,
     timed_step,
 )
+from gne_mj.records import by_name, in_numbers
 from gne_mj.table import Table, floats, integers
 
 INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
@@ -35,12 +37,31 @@ STAGES = {"euler": 1, "rk4": 4}  # evaluations of the dynamics in one step
 # A fleet's arrays at the start of every table
 PLACES, ATAN, SIZES = range(3)
 
-# A robot's row of PLACES: where its numbers lie in qpos, qvel and ctrl
-MAIN_Q, APPENDAGE_Q, MAIN_V, APPENDAGE_V, ACTUATOR, PLACES_COUNT = range(6)
 
-# Entries of SIZES: lengths of mjData's arrays, and where a loop's part of userdata and the
-# memory's part of act begin
-NQ, NV, NU, NUSERDATA, NA, ROOM, MEMORY = range(7)
+class RobotPlace(Numbers):
+    """Where a robot's numbers lie in qpos, qvel and ctrl: what PLACES has of each."""
+
+    main_q: int
+    appendage_q: int
+    main_v: int
+    appendage_v: int
+    actuator: int
+
+
+class Sizes(NamedTuple):
+    """Lengths of mjData's arrays, and where parts of them begin."""
+
+    nq: int
+    nv: int
+    nu: int
+    nuserdata: int
+    na: int
+    room: int  # a loop's, in userdata
+    memory: int  # in act
+
+
+PLACE = len(names_of(RobotPlace))
+sizes_in, _place_in = in_numbers(Sizes, SIZES), numbers_in(RobotPlace)
 
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
@@ -50,17 +71,23 @@ AGENT = flexible_robot
 
 
 @kernel
+def place_of(places, r):
+    """Where the numbers of channel r lie."""
+    return _place_in(places, r * PLACE)
+
+
+@kernel
 def gather(at, data, table, state):
     """Fill the flat state (m channels of flexible_robot.STATES) from mjData."""
-    sizes = integers(table, SIZES)
-    qpos, qvel = field(data, at.qpos, sizes[NQ]), field(data, at.qvel, sizes[NV])
+    sizes = sizes_in(table)
+    qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
     places = integers(table, PLACES)
-    for r in range(len(places) // PLACES_COUNT):
-        row = r * PLACES_COUNT
-        position = qpos[places[row + MAIN_Q]]
-        state[4 * r] = position - qpos[places[row + APPENDAGE_Q]]
-        state[4 * r + 1] = qvel[places[row + MAIN_V]]
-        state[4 * r + 2] = qvel[places[row + APPENDAGE_V]]
+    for r in range(len(places) // PLACE):
+        place = place_of(places, r)
+        position = qpos[place.main_q]
+        state[4 * r] = position - qpos[place.appendage_q]
+        state[4 * r + 1] = qvel[place.main_v]
+        state[4 * r + 2] = qvel[place.appendage_v]
         state[4 * r + 3] = position
 
 
@@ -72,7 +99,7 @@ def refresh(model, data, table):
 @kernel
 def actuator_of(places, r):
     """Which entry of ctrl is the input of channel r."""
-    return places[r * PLACES_COUNT + ACTUATOR]
+    return place_of(places, r).actuator
 
 
 @kernel
@@ -98,19 +125,19 @@ def passive_callback(at: Offsets) -> Any:
         table = abs(table_of(at, address_of(model), struct))
         if table == 0:
             return
-        sizes = integers(table, SIZES)
-        qpos = field(struct, at.qpos, sizes[NQ])
-        force = field(struct, at.qfrc_passive, sizes[NV])
+        sizes = sizes_in(table)
+        qpos = field(struct, at.qpos, sizes.nq)
+        force = field(struct, at.qfrc_passive, sizes.nv)
         places, coefficient = integers(table, PLACES), floats(table, ATAN)
         kept = field(struct, at.userdata, ARCTANGENTS + len(coefficient))
         for r in range(len(coefficient)):
-            row = r * PLACES_COUNT
-            extension = qpos[places[row + MAIN_Q]] - qpos[places[row + APPENDAGE_Q]]
+            place = place_of(places, r)
+            extension = qpos[place.main_q] - qpos[place.appendage_q]
             arctangent = np.arctan(extension)
             kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
             pull = coefficient[r] * arctangent
-            force[places[row + MAIN_V]] -= pull
-            force[places[row + APPENDAGE_V]] += pull
+            force[place.main_v] -= pull
+            force[place.appendage_v] += pull
 
     return callback(CALLBACK, passive)
 
@@ -183,19 +210,20 @@ class MujocoPlant(FleetPlant):
             return [self.model.joint(name) for name in names(what)]
 
         main, appendage = joints("position"), joints("appendage_position")
-        self.places = np.empty((self.agents.channels, PLACES_COUNT), dtype=np.int64)
-        self.places[:, MAIN_Q] = [joint.qposadr[0] for joint in main]
-        self.places[:, APPENDAGE_Q] = [joint.qposadr[0] for joint in appendage]
-        self.places[:, MAIN_V] = [joint.dofadr[0] for joint in main]
-        self.places[:, APPENDAGE_V] = [joint.dofadr[0] for joint in appendage]
-        self.places[:, ACTUATOR] = [self.model.actuator(name).id for name in names("force")]
+        flat = np.empty((self.agents.channels, PLACE), dtype=np.int64)
+        self.places = by_name(flat, dtype_in(RobotPlace))
+        self.places.main_q = [joint.qposadr[0] for joint in main]
+        self.places.appendage_q = [joint.qposadr[0] for joint in appendage]
+        self.places.main_v = [joint.dofadr[0] for joint in main]
+        self.places.appendage_v = [joint.dofadr[0] for joint in appendage]
+        self.places.actuator = [self.model.actuator(name).id for name in names("force")]
         model = self.model
         room = ARCTANGENTS + self.agents.channels
-        sizes = (model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)
+        self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)
         return [
-            self.places,
+            flat,
             np.ascontiguousarray(self.agents.parameters[:, 3]),
-            np.array(sizes, dtype=np.int64),
+            np.array(self.sizes, dtype=np.int64),
         ]
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
@@ -237,32 +265,32 @@ class MujocoPlant(FleetPlant):
     @property
     def output_joints(self) -> NDArray[np.int64]:
         """(m,) the degree of freedom whose velocity is each output."""
-        return self.places[:, MAIN_V]
+        found: NDArray[np.int64] = self.places.main_v
+        return found
 
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, states), a copy."""
-        at = self.places.T
-        qpos, qvel = self.data.qpos, self.data.qvel
-        position = qpos[at[MAIN_Q]]
-        extension = position - qpos[at[APPENDAGE_Q]]
-        columns = (extension, qvel[at[MAIN_V]], qvel[at[APPENDAGE_V]], position)
+        at, qpos, qvel = self.places, self.data.qpos, self.data.qvel
+        position = qpos[at.main_q]
+        extension = position - qpos[at.appendage_q]
+        columns = (extension, qvel[at.main_v], qvel[at.appendage_v], position)
         return np.stack(columns, axis=-1)
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        at = self.places.T
-        self.data.qpos[at[MAIN_Q]] = state[:, 3]
-        self.data.qpos[at[APPENDAGE_Q]] = state[:, 3] - state[:, 0]
-        self.data.qvel[at[MAIN_V]] = state[:, 1]
-        self.data.qvel[at[APPENDAGE_V]] = state[:, 2]
+        at = self.places
+        self.data.qpos[at.main_q] = state[:, 3]
+        self.data.qpos[at.appendage_q] = state[:, 3] - state[:, 0]
+        self.data.qvel[at.main_v] = state[:, 1]
+        self.data.qvel[at.appendage_v] = state[:, 2]
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
         self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
-        self.data.ctrl[self.places[:, ACTUATOR]] = u
+        self.data.ctrl[self.places.actuator] = u
         with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
 

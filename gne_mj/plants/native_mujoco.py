@@ -24,6 +24,7 @@ from numba.extending import intrinsic
 
 from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word
+from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.plants.c_layout import arrays, block_of, unknown_layout, word_of
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
@@ -42,8 +43,16 @@ KNOWN_STATE = int(_BITS.mjSTATE_INTEGRATION) & ~int(
     _BITS.mjSTATE_QFRC_APPLIED | _BITS.mjSTATE_XFRC_APPLIED | _BITS.mjSTATE_USERDATA
 )
 
-# What userdata begins with. All zero, as after a reset, means "not started".
-MARK, TABLE_ADDRESS, USERDATA_HEADER = range(3)
+
+class Header(Numbers):
+    """What userdata begins with. All zero, as after a reset, means "not started"."""
+
+    mark: float  # whose simulation this is
+    table: float  # its address
+
+
+USERDATA_HEADER = len(names_of(Header))
+_header_in = numbers_in(Header)
 # Marks: numbers that nobody else would write there by chance.
 PLANT_MARK, LOOP_MARK = 7.390125461e173, 5.870193424e191
 
@@ -288,11 +297,11 @@ def table_of(at, model, data):
     """
     if word(model, at.nuserdata) < USERDATA_HEADER:
         return np.int64(0)
-    userdata = field(data, at.userdata, USERDATA_HEADER)
-    if userdata[MARK] == LOOP_MARK:
-        return np.int64(userdata[TABLE_ADDRESS])
-    if userdata[MARK] == PLANT_MARK:
-        return -np.int64(userdata[TABLE_ADDRESS])
+    header = _header_in(field(data, at.userdata, USERDATA_HEADER), 0)
+    if header.mark == LOOP_MARK:
+        return np.int64(header.table)
+    if header.mark == PLANT_MARK:
+        return -np.int64(header.table)
     return np.int64(0)
 
 

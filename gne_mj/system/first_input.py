@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.controllers.settings import LINKS, PENALTY, RHO
+from gne_mj.controllers.settings import LINKS, RHO
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Saturation, strikes_messages
 from gne_mj.loops import functions
@@ -29,7 +29,7 @@ def law_at_start(system: System) -> Array:
     problem, _table = problem_and_table(setup, system.agents, len(memory))
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
-    scratch.now[PENALTY] = rho
+    scratch.now.penalty = rho
     weights = rho / -(game.constraints(system.start) + game.margins)
     u = np.full(game.actions, np.nan)
     y = system.start.copy()
@@ -61,17 +61,17 @@ def first_input(system: System, clock: Clock) -> Array:
     Unlike :func:`law_at_start` that is what a run solves for in mode implicit, faults included.
     Not a number where there is none.
     """
-    m, p = system.game.actions, system.game.constraints_count
+    m = system.game.actions
     try:
         loop = system.closed_loop(clock)
     except InvalidInput:  # a period that no run may have
         return np.full(m, np.nan)
     loop.finish()
     raise_pending()
-    if loop.monitor[watch.EXIT] != watch.INSIDE:
+    if loop.monitor.exit != watch.INSIDE:
         return np.full(m, np.nan)
-    at = int(watch.inputs_at(p))
-    return loop.monitor[at : at + m].copy()
+    peak: Array = loop.monitor.peak.copy()
+    return peak
 
 
 def limits_at(system: System, time: float) -> Array:

@@ -52,7 +52,7 @@ def _at_start(system: System, clock: Clock) -> tuple[int | None, str | None]:
     loop = system.closed_loop(clock)
     loop.advance(1, 1)
     raise_pending()
-    if loop.monitor[watch.EXIT] != watch.INSIDE:
-        return None, EXITS[int(loop.monitor[watch.EXIT])]
-    smallest = loop.monitor[watch.SMALLEST_STEP]
+    if loop.monitor.exit != watch.INSIDE:
+        return None, EXITS[int(loop.monitor.exit)]
+    smallest = loop.monitor.smallest_step
     return 1 if smallest == 0.0 else round(clock.timestep / float(smallest)), None

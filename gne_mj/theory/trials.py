@@ -62,7 +62,7 @@ def stays_inside(system: System, clock: Clock) -> bool:
     loop.pass_over(clock.steps(clock.duration))
     loop.finish()
     raise_pending()
-    return bool(loop.monitor[watch.EXIT] == watch.INSIDE)
+    return bool(loop.monitor.exit == watch.INSIDE)
 
 
 def held_for(system: System, timestep: float, steps: int) -> System:

@@ -12,7 +12,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.plants.agent_type import has_ode, in_mujoco
 from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mujoco import APPENDAGE_Q, MAIN_Q, MujocoPlant
+from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.system import Clock, System
 from gne_mj.view.mirror import Mirror
 
@@ -61,8 +61,8 @@ class Fleet:
         state, at = values["state"], self.plant.places
         extension, position = state[:, :, 0], state[:, :, 3]
         found = np.zeros((len(state), self.plant.model.nq))
-        found[:, at[:, MAIN_Q]] = position
-        found[:, at[:, APPENDAGE_Q]] = position - extension
+        found[:, at.main_q] = position
+        found[:, at.appendage_q] = position - extension
         return found
 
     @property

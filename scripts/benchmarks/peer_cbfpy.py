@@ -33,9 +33,17 @@ from turns import in_turns, row
 
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.feedback import Problem, feedback, work
+from gne_mj.loops.feedback import Problem, feedback
 from gne_mj.loops.layout import Clock as Steps
-from gne_mj.loops.layout import Setup, problem_and_table
+from gne_mj.loops.layout import (
+    Setup,
+    loop_room_in,
+    loop_room_length,
+    ode_table,
+    parts_in,
+    steps_in,
+    steps_of,
+)
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.plants.functions import EULER
 from gne_mj.system import Clock
@@ -115,22 +123,25 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         one.equilibrium.action, no_propagator(), functions=one.functions,
     )  # fmt: skip
     setup = Setup(problem, one.state, Steps(1.0, 1, CONTINUOUS, EULER))
-    problem, table = problem_and_table(setup, one.agents, 0)
-    scratch, monitor, memory = work(n, n, n), np.zeros(watch.length(n, n)), np.zeros(0)
+    table = ode_table(setup, one.agents, 0)
+    address, memory = table.address, np.zeros(0)
+    room = np.zeros(loop_room_length(steps_of(table)))
     start, u = np.ascontiguousarray(_some_state()[1::3]), np.zeros(n)
 
-    @njit(error_model="numpy")
-    def control(problem, y, memory, scratch, monitor, u):
-        return feedback(problem, 0.0, 0, y, memory, scratch, monitor, u)
+    @njit(error_model="numpy", _nrt=False)
+    def control(table, room, y, memory, u):
+        parts = parts_in(table, loop_room_in(room, steps_in(table)))
+        return feedback(parts.problem, 0.0, 0, y, memory, parts.work, parts.monitor, u)
 
-    @njit(error_model="numpy")
-    def loop(problem, y, memory, scratch, monitor, u, count):
+    @njit(error_model="numpy", _nrt=False)
+    def loop(table, room, y, memory, u, count):
+        parts = parts_in(table, loop_room_in(room, steps_in(table)))
         for _ in range(count):
-            feedback(problem, 0.0, 0, y, memory, scratch, monitor, u)
+            feedback(parts.problem, 0.0, 0, y, memory, parts.work, parts.monitor, u)
             for r in range(len(y)):
                 y[r] += NUDGE * u[r]
 
-    control(problem, start, memory, scratch, monitor, u)
+    control(address, room, start, memory, u)
     gap = np.diff(start, prepend=common.V0)
     slope = 2.0 * common.RHO * gap / (common.DELTA**2 - gap**2)
     if not np.allclose(u, -2.0 * gap - slope + np.append(slope[1:], 0.0), rtol=1e-12, atol=1e-12):
@@ -140,14 +151,14 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         assert table.arrays
         began = time.perf_counter()
         for _ in range(CALLS):
-            control(problem, start, memory, scratch, monitor, u)
+            control(address, room, start, memory, u)
         return (time.perf_counter() - began) / CALLS
 
     def in_loop() -> float:
         assert table.arrays  # which the problem knows by address
         y, count = start.copy(), 50 * EVALUATIONS
         began = time.perf_counter()
-        loop(problem, y, memory, scratch, monitor, u, count)
+        loop(address, room, y, memory, u, count)
         return (time.perf_counter() - began) / count
 
     return from_python, in_loop
@@ -194,15 +205,15 @@ def filtered(
 def ours(states: np.ndarray, period: float, mode: str, end: float = END) -> np.ndarray:
     """The same under our law; a run ends when it leaves, so that its margin is the first one."""
     one = common.system("ode", "rk4", mode)
-    least, worst = [], watch.worst_at(common.N)
+    least = []
     for state in states:
         loop = replace(one, state=state).closed_loop(Clock(end, H, period, end))
         loop.advance(1, round(end / H))
         loop.finish()
-        margin = -float(np.max(loop.monitor[worst : worst + common.N]))
-        if loop.monitor[watch.EXIT] != watch.INSIDE:
-            margin = min(margin, -float(loop.monitor[watch.EXIT_VALUE]))
-            if mode == "implicit" and not loop.monitor[watch.EXIT_BETWEEN]:
+        margin = -float(np.max(loop.monitor.worst))
+        if loop.monitor.exit != watch.INSIDE:
+            margin = min(margin, -float(loop.monitor.exit_value))
+            if mode == "implicit" and not loop.monitor.exit_between:
                 raise ArithmeticError("mode implicit left the set at a control instant")
         least.append(margin)
     return np.array(least)

@@ -84,7 +84,7 @@ def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[fl
         began = time.perf_counter()
         outcome = structure.loop.run(cases, span, lambda: False)
         spent = time.perf_counter() - began
-        if outcome is None or np.any(outcome.monitors[:, watch.EXIT] != watch.INSIDE):
+        if outcome is None or np.any(outcome.monitors.exit != watch.INSIDE):
             raise ArithmeticError("a run left the set, where the law has no value to compare")
         return spent, outcome.samples.state[:, -1]
 

@@ -79,11 +79,11 @@ def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) 
     y = np.concatenate([recorded.state, last.state])[:, :, system.agents.kind.OUTPUT]
     with np.errstate(invalid="ignore"):
         outside = ~np.all(system.game.constraints(y) < 0, axis=1)
-    code = int(monitor[watch.EXIT])
+    code = int(monitor.exit)
     if code == watch.INSIDE:
         found.append("silent" if np.any(outside) else "inside")
     else:
-        step = round(monitor[watch.EXIT_TIME] / clock.timestep)
+        step = round(monitor.exit_time / clock.timestep)
         # every step before the exit was inside, and the exit is told of the very next one
         if np.any(outside[:-1]) or step > len(recorded.state):
             found.append("misdated")
@@ -93,9 +93,9 @@ def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) 
             found.append(f"left at an instant, {'promised' if promised else 'not promised'}")
         else:
             found.append("left between instants")
-    if monitor[watch.UNSOLVED] > 0:
+    if monitor.unsolved > 0:
         found.append("not accurate")
-    if monitor[watch.NOT_MONOTONE] > 0:
+    if monitor.not_monotone > 0:
         found.append("not monotone")
     if not promised:
         found.append("slope not certified")

@@ -64,15 +64,15 @@ def _job(key: tuple[int, int]) -> Counter[str]:
             plant = loop.plant  # type: ignore[attr-defined]
         loop.advance(1, clock.steps(clock.duration))
         loop.finish()
-        code, between = loop.monitor[watch.EXIT], loop.monitor[watch.EXIT_BETWEEN] > 0
+        code, between = loop.monitor.exit, loop.monitor.exit_between > 0
         how = "inside"
         if code == watch.LEFT_SET:
             how = "left between instants only" if between else BROKEN
         elif code != watch.INSIDE:
             how = "ended without an action"
         if how.endswith(BROKEN_BY):
-            where = int(loop.monitor[watch.EXIT_CONSTRAINT]), loop.monitor[watch.EXIT_VALUE]
-            print(key, sum(counts.values()), kind, how, code, loop.monitor[watch.EXIT_TIME], where)
+            where = int(loop.monitor.exit_constraint), loop.monitor.exit_value
+            print(key, sum(counts.values()), kind, how, code, loop.monitor.exit_time, where)
         counts[f"{kind}, {how}"] += 1
     return counts
 

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.loops import monitor as watch
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.system.data import SystemData
 from gne_mj.system.modes.mode import Array, Figure, Mode, entry
 
 
-def _smallest(monitors: Array) -> Array:
-    shortest = monitors[:, watch.SMALLEST_STEP]
+def _smallest(monitors: Any) -> Array:
+    shortest = monitors.smallest_step
     return np.where(shortest > 0, shortest, np.nan)
 
 
@@ -28,7 +27,7 @@ class Continuous(Mode):
     section = "division"
     figures = (
         Figure(
-            "divided_steps", entry(watch.DIVIDED),
+            "divided_steps", entry("divided"),
             long_name="integration steps divided near the boundary",
         ),
         Figure("smallest_step", _smallest, "s", "shortest piece of a divided step"),
@@ -54,9 +53,9 @@ class Continuous(Mode):
         """With fixed steps."""
         return self.divides(system)
 
-    def report(self, system: SystemData, monitor: Array) -> dict[str, Any]:
+    def report(self, system: SystemData, monitor: Any) -> dict[str, Any]:
         """How many steps were divided, and the shortest piece in s, None if none was."""
         return {
-            "divided_steps": int(monitor[watch.DIVIDED]),
-            "smallest_step": float(monitor[watch.SMALLEST_STEP]) or None,
+            "divided_steps": int(monitor.divided),
+            "smallest_step": float(monitor.smallest_step) or None,
         }

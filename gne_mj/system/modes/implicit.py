@@ -18,7 +18,6 @@ from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
 from gne_mj.loops import functions, joint, link, local
-from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import IMPLICIT
@@ -40,11 +39,11 @@ class Implicit(Mode):
     promises = True
     section = "implicit"
     figures = (
-        Figure("solutions", entry(watch.SOLUTIONS)),
-        Figure("newton_steps", entry(watch.SOLVER_STEPS)),
-        Figure("not_accurate", entry(watch.UNSOLVED)),
-        Figure("prediction_error", entry(watch.PREDICTION)),
-        Figure("periods_not_monotone", entry(watch.NOT_MONOTONE)),
+        Figure("solutions", entry("solutions")),
+        Figure("newton_steps", entry("solver_steps")),
+        Figure("not_accurate", entry("unsolved")),
+        Figure("prediction_error", entry("prediction")),
+        Figure("periods_not_monotone", entry("not_monotone")),
     )
 
     def equation(self, system: SystemData) -> ModuleType:
@@ -59,9 +58,11 @@ class Implicit(Mode):
             from gne_mj.plants import mjcf_ahead, native_mujoco  # late: MuJoCo is slow to import
 
             plant, at = mjcf_ahead, native_mujoco.offsets()
+        equation = self.equation(system)
+        alone = equation.ALONE
         return {
-            **link.of_implicit(system.law.kernels, system.game.kernels),
-            functions.SOLVE: link.solve(self.equation(system)),
+            **link.of_implicit(system.law.kernels, system.game.kernels, alone),
+            functions.SOLVE: link.solve(equation),
             functions.ACT: link.act(plant, system.fault_kernels, at),
         }
 
@@ -145,25 +146,21 @@ class Implicit(Mode):
         """None: what is solved is stable whatever the barrier's slope is."""
         return None
 
-    def report(self, system: SystemData, monitor: Array) -> dict[str, Any]:
+    def report(self, system: SystemData, monitor: Any) -> dict[str, Any]:
         """How inputs were solved for, and how far outputs were from what was expected."""
-        solutions, unsolved = int(monitor[watch.SOLUTIONS]), int(monitor[watch.UNSOLVED])
+        solutions, unsolved = int(monitor.solutions), int(monitor.unsolved)
         return {
             "decentralised": system.decentralised,
             "solutions": solutions,
-            "mean_newton_steps": float(monitor[watch.SOLVER_STEPS]) / max(solutions, 1),
-            "most_newton_steps": int(monitor[watch.MOST_STEPS]),
+            "mean_newton_steps": float(monitor.solver_steps) / max(solutions, 1),
+            "most_newton_steps": int(monitor.most_steps),
             "not_accurate": unsolved,
             "covered": solutions - unsolved,
-            "first_not_accurate": seen_or_none(monitor, watch.UNSOLVED, watch.UNSOLVED_TIME),
-            "largest_prediction_error": float(monitor[watch.PREDICTION]),
-            "largest_prediction_error_time": seen_or_none(
-                monitor, watch.PREDICTION, watch.PREDICTION_TIME
-            ),
-            "periods_not_monotone": int(monitor[watch.NOT_MONOTONE]),
-            "first_not_monotone": seen_or_none(
-                monitor, watch.NOT_MONOTONE, watch.NOT_MONOTONE_TIME
-            ),
+            "first_not_accurate": seen_or_none(monitor, "unsolved"),
+            "largest_prediction_error": float(monitor.prediction),
+            "largest_prediction_error_time": seen_or_none(monitor, "prediction"),
+            "periods_not_monotone": int(monitor.not_monotone),
+            "first_not_monotone": seen_or_none(monitor, "not_monotone"),
         }
 
 

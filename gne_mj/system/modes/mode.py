@@ -27,12 +27,12 @@ class Figure(NamedTuple):
 
     Attributes:
         name: of the variable.
-        of: (runs,) its values, from the monitors (runs, :func:`gne_mj.loops.monitor.length`).
+        of: (runs,) its values, from the monitors (runs,), see :func:`gne_mj.loops.monitor.fresh`.
         unit, long_name: for readers; None for none.
     """
 
     name: str
-    of: Callable[[Array], Array]
+    of: Callable[[Any], Array]
     unit: str | None = None
     long_name: str | None = None
 
@@ -146,19 +146,19 @@ class Mode:
         """Whether a run of the system has the section and the figures."""
         return True
 
-    def report(self, system: SystemData, monitor: Array) -> dict[str, Any]:
+    def report(self, system: SystemData, monitor: Any) -> dict[str, Any]:
         """The section of a run's report, from what was seen at every step."""
         return {}
 
 
-def entry(index: int) -> Callable[[Array], Array]:
-    """A :class:`Figure`'s values: an entry of the monitors."""
-    return lambda monitors: monitors[:, index].copy()
+def entry(name: str) -> Callable[[Any], Array]:
+    """A :class:`Figure`'s values: a number of the monitors."""
+    return lambda monitors: monitors[name].copy()
 
 
-def seen_or_none(monitor: Array, amount: int, time: int) -> float | None:
+def seen_or_none(monitor: Any, name: str) -> float | None:
     """When something was seen first, in s; None if its amount says that it never was."""
-    return float(monitor[time]) if monitor[amount] > 0 else None
+    return float(monitor[f"{name}_time"]) if monitor[name] > 0 else None
 
 
 def mode_of(system: SystemData) -> Mode:
