@@ -183,7 +183,8 @@ class _Alone:
 def _seeded(setup: Setup, seed: int) -> Setup:
     """The same run with other random numbers in its faults."""
     faults = setup.problem.faults
-    numbers = faults.numbers.copy()
+    kept: Any = faults.numbers
+    numbers = kept.copy()
     numbers.seed = seed
     return setup._replace(problem=setup.problem._replace(faults=faults._replace(numbers=numbers)))
 
