@@ -150,7 +150,7 @@ def _status(runs: Runs) -> Array:
     return verdicts.status(runs.monitors, tail, runs.tolerance)
 
 
-def _of_monitor(name: str, entry: int, **about: Any) -> Variable:
+def _of_monitor(name: str, entry: str, **about: Any) -> Variable:
     return Variable(name, ("run",), lambda runs: runs.seen(entry), **about)
 
 

@@ -68,7 +68,7 @@ def dtype_in(record: type[Numbers]) -> np.dtype[Any]:
 
 def numbers(record: type[Numbers], **values: float) -> Any:
     """Numbers of one's own; those not given are 0."""
-    made = np.zeros((), dtype_in(record))[()]
+    made = np.zeros((), dtype_in(record))[()]  # type: ignore[arg-type]
     for name, value in values.items():
         made[name] = value
     return made
@@ -90,14 +90,14 @@ class _Place(types.Type):
 
 
 @register_model(_Place)
-class _PlaceModel(models.PrimitiveModel):  # type: ignore[misc]
+class _PlaceModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         item = manager.lookup(kind.item).get_value_type()
         super().__init__(manager, kind, item.as_pointer())
 
 
 @infer_getattr
-class _PlaceNames(AttributeTemplate):  # type: ignore[misc]
+class _PlaceNames(AttributeTemplate):
     key = _Place
 
     def generic_resolve(self, place: Any, name: str) -> Any:
@@ -123,7 +123,7 @@ def _set(context: Any, builder: Any, signature: Any, arguments: Any, name: str) 
 @cache
 def numbers_in(record: type[Numbers]) -> Callable[..., Any]:
     """The kernel ``found(flat, at)``: numbers that begin at an entry of a flat array, by name."""
-    kind, count, dtype = _Place(record), len(names_of(record)), dtype_in(record)
+    kind, count, dtype = _Place(record), len(names_of(record)), dtype_in(record)  # type: ignore[arg-type]
 
     def found(flat, at):
         return flat[at : at + count].view(dtype)[0]

@@ -4,6 +4,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,7 +184,8 @@ class _Alone:
 def _seeded(setup: Setup, seed: int) -> Setup:
     """The same run with other random numbers in its faults."""
     faults = setup.problem.faults
-    numbers = faults.numbers.copy()
+    kept: Any = faults.numbers
+    numbers = kept.copy()
     numbers.seed = seed
     return setup._replace(problem=setup.problem._replace(faults=faults._replace(numbers=numbers)))
 

@@ -196,8 +196,8 @@ class Instant(NamedTuple):
     """When something is evaluated."""
 
     time: float  # in s
-    step: int
-    stage: int  # of the step; of a piece of it in mode continuous
+    step: Any
+    stage: Any  # of the step; of a piece of it in mode continuous
 
 
 @kernel

@@ -57,8 +57,7 @@ def look(faults, place, parts, at, storage, state, memory):
     At the end of a piece of a step, mode continuous, what the next piece begins with is evaluated
     and kept: outputs and slacks, and the law where its action does not depend on the step.
 
-    One kernel for all stages keeps loops and MuJoCo's callback small, which is most of their speed
-    and of the time to compile them.
+    One kernel for all stages keeps loops small: that is most of their speed, and of compile time.
 
     Args:
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.

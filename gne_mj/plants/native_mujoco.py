@@ -263,7 +263,7 @@ def _call(builder: Any, function: Any, pointers: Any, *more: Any) -> None:
 
 
 @cache
-def state_functions() -> tuple[int, ...]:
+def state_functions() -> tuple[int, int, int]:
     """What loops take steps back with: addresses of mj_getState and mj_setState, and STATE."""
     return step_address("mj_getState"), step_address("mj_setState"), STATE
 
