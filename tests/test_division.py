@@ -341,7 +341,7 @@ def test_sizes_are_those_that_the_start_shows():
     for y in ([0.5, -7.0, 2.0], [90.0, 0.0, 0.0]):  # the start, and what comes later
         work.y[:], work.g[:] = y, [-3.0, -1.5]
         division.note(0, problem, work)
-        assert list(division.stages_of(work.division, 3, 2).size) == [7.0, 3.0, 4.0]
+        assert list(work.stages.size) == [7.0, 3.0, 4.0]
 
 
 def piece_of(rate, g, y, h):

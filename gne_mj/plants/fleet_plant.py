@@ -13,6 +13,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.plants.agent_type import fleet_module
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
+from gne_mj.plants.mujoco import Sizes
 
 
 class FleetPlant(Plant):
@@ -22,7 +23,8 @@ class FleetPlant(Plant):
         kernels: the module that says how a loop reads and drives the fleet.
         passive: the C callback of its passive forces; None without.
         model, data: MuJoCo's own.
-        places: (m, ...) where native code finds each channel's numbers.
+        places: where native code finds each channel's numbers, (m,) by name.
+        sizes: of MuJoCo's arrays.
         table_arrays: the fleet's arrays at the start of every table.
     """
 
@@ -30,7 +32,8 @@ class FleetPlant(Plant):
     passive: Any
     model: mujoco.MjModel
     data: mujoco.MjData
-    places: NDArray[np.int64]
+    places: Any
+    sizes: Sizes
     table_arrays: list[NDArray[Any]]
 
     @property
