@@ -3,7 +3,7 @@
 import copy
 from abc import abstractmethod
 from types import ModuleType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import mujoco
 import numpy as np
@@ -13,7 +13,9 @@ from gne_mj.errors import InvalidInput
 from gne_mj.plants.agent_type import fleet_module
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
-from gne_mj.plants.mujoco import Sizes
+
+if TYPE_CHECKING:
+    from gne_mj.plants.mujoco import Sizes
 
 
 class FleetPlant(Plant):
@@ -33,7 +35,7 @@ class FleetPlant(Plant):
     model: mujoco.MjModel
     data: mujoco.MjData
     places: Any
-    sizes: Sizes
+    sizes: "Sizes"
     table_arrays: list[NDArray[Any]]
 
     @property
