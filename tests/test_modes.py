@@ -12,7 +12,6 @@ from gne_mj.barrier import Fall, Schedule, reciprocal
 from gne_mj.batch_variables import declared_figures, figures
 from gne_mj.errors import InvalidInput
 from gne_mj.exit_map import held_modes
-from gne_mj.loops import monitor as watch
 from gne_mj.native import kernel
 from gne_mj.registry import MODES, SCHEDULES, Names
 from gne_mj.scenario import load_scenario
@@ -33,10 +32,10 @@ class Counted(Sampled):
 
     name = "counted"
     section = "counted"
-    figures = (Figure("counted_steps", entry(watch.STEPS), "1", "steps taken"),)
+    figures = (Figure("counted_steps", entry("steps"), "1", "steps taken"),)
 
     def report(self, system, monitor):
-        return {"steps": int(monitor[watch.STEPS])}
+        return {"steps": int(monitor.steps)}
 
 
 @kernel

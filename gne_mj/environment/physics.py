@@ -136,8 +136,7 @@ class FleetPhysics(control.Physics):
         self._advance = build(at, kernels)
         self._table = Table(plant.table_arrays)
         m, model = game.actions, plant.model
-        places = plant.places.ravel()
-        self._actuators = np.array([kernels.actuator_of(places, r) for r in range(m)])
+        self._actuators = np.array(plant.places.actuator)
         self._inputs = np.zeros(m)
         self._before = np.zeros(mujoco.mj_stateSize(model, STATE))
         self._state = np.zeros(m * plant.agents.states)
