@@ -21,7 +21,10 @@ from gne_mj.faults import (
     for_native,
 )
 from gne_mj.loops import faults as native
+from gne_mj.loops.feedback import Fault
+from gne_mj.numbers import dtype_in
 from gne_mj.plants.ode import OdePlant
+from gne_mj.records import by_name
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
 
@@ -333,14 +336,20 @@ def test_robots_of_ones_own_can_be_pushed():
     assert np.allclose(pushed.sel(agent=1), 0.5)
 
 
+def rows_of(faults):
+    """What native code has of each fault, by name."""
+    dtype = dtype_in(Fault)
+    return by_name(faults.rows.reshape(-1, len(dtype)), dtype)
+
+
 def test_a_push_along_one_axis():
     from gne_mj.faults import steady_push
     from gne_mj.games import velocity_consensus_game
 
     game = velocity_consensus_game([(0, 1)], [1.0, 0.0], [0.0, 0.0], 1.0, 1.0)
     pushes = steady_push(game, np.array([1.0, 0.0, -2.0, 3.0]))
-    rows = for_native(pushes, game, None, 0).rows
-    assert {(int(r[0]), r[3]) for r in rows} == {(0, 1.0), (2, -2.0), (3, 3.0)}
+    rows = rows_of(for_native(pushes, game, None, 0))
+    assert set(zip(rows.target, rows.amount, strict=True)) == {(0, 1.0), (2, -2.0), (3, 3.0)}
     with pytest.raises(InvalidInput, match=r"^axis"):
         for_native((Push(force=1.0, axis=2),), game, None, 0)
 
@@ -350,10 +359,10 @@ def test_links_of_agents_and_edges():
     graph = graphs.ring(5)
 
     def targets(**options):
-        rows = for_native((Silence(**options),), game, graph, 0).rows
+        rows = rows_of(for_native((Silence(**options),), game, graph, 0))
         pointer, neighbour = graph.data
         pairs = [(i, int(j)) for i in range(5) for j in neighbour[pointer[i] : pointer[i + 1]]]
-        return {pairs[int(row[0])] for row in rows}
+        return {pairs[int(target)] for target in rows.target}
 
     assert targets(edges=((1, 0),)) == {(0, 1), (1, 0)}
     assert targets(agents=(2,)) == {(1, 2), (2, 1), (2, 3), (3, 2)}

@@ -276,7 +276,7 @@ def test_all_joints_of_own_robots_are_recorded():
     data = simulation.run()[run.system.name]
     assert data["configuration"].shape == (len(data["time"]), model.nq)
     assert np.array_equal(data["configuration"][-1], run.loop.plant.data.qpos)
-    at = run.loop.plant.places[:, 1]
+    at = run.loop.plant.places.position
     known = at >= 0
     assert np.array_equal(
         data["configuration"].to_numpy()[:, at[known]], data["position"].to_numpy()[:, known]

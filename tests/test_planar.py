@@ -125,7 +125,10 @@ def test_any_fleet_over_any_graph_stays_inside(seed):
     worst = loop.monitor.worst
     g = np.array([reference.constraints(draw.oracle, row) for row in states[:, :, 1]])
     assert np.all(worst < 0)
-    assert np.allclose(worst, np.max(g, axis=0), rtol=0, atol=1e-13)
+    sampled = np.max(g, axis=0)
+    assert np.all(worst >= sampled - 1e-13)
+    if loop.monitor.divided == 0:  # else pieces of steps were seen too
+        assert np.allclose(worst, sampled, rtol=0, atol=1e-13)
     assert loop.monitor.storage_rise <= 1e-9 * max(1.0, loop.monitor.storage_start)
 
 
@@ -153,11 +156,11 @@ def test_right_hand_sides_at_random_interior_states(count):
         running = system(state, "mujoco", integrator="euler").closed_loop(clock(0.001))
         recorded = running.advance(1, 1)
         plant = running.plant
-        places = plant.places.T
+        places = plant.places
         got = np.empty((8, 3))
         got[:, 0] = state[:, 1] - state[:, 2]
-        got[:, 1] = plant.data.qacc[places[2]]
-        got[:, 2] = plant.data.qacc[places[3]]
+        got[:, 1] = plant.data.qacc[places.main_v]
+        got[:, 2] = plant.data.qacc[places.appendage_v]
         assert relative_error(got, expected) < 1e-12
         u = reference.full_information(oracle(), RHO, state[:, 1])
         assert relative_error(recorded.input[0], u) < 1e-12
@@ -197,9 +200,9 @@ def test_channels_are_the_models_elements():
     for r in range(8):
         robot, axis = r // 2 + 1, "xy"[r % 2]
         joint = model.joint(f"robot_{robot}/position_{axis}")
-        assert plant.places[r, 0] == joint.qposadr[0]
+        assert plant.places.main_q[r] == joint.qposadr[0]
         assert joint.axis.tolist() == [float(axis == "x"), float(axis == "y"), 0.0]
-        assert plant.places[r, 4] == model.actuator(f"robot_{robot}/force_{axis}").id
+        assert plant.places.actuator[r] == model.actuator(f"robot_{robot}/force_{axis}").id
         spring = model.tendon(f"robot_{robot}/spring_{axis}")
         assert model.tendon_stiffness[spring.id].ravel()[0] == table[r, 2]
         assert model.tendon_damping[spring.id].ravel()[0] == table[r, 4]
