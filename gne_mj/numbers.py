@@ -144,7 +144,7 @@ def numbers_in(record: type[Numbers]) -> Callable[..., Any]:
 
 
 @overload(address_in, jit_options=KERNEL)
-def _address_in(numbers: Any) -> Any:
+def _address_in(numbers):
     return (lambda numbers: _address(numbers)) if isinstance(numbers, _Place) else None
 
 

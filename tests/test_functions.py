@@ -106,7 +106,7 @@ def untyped(source):
                 if isinstance(owner, ast.ClassDef) and "staticmethod" not in decorators:
                     given = given[1:]
                 missing = node.returns is None or any(each.annotation is None for each in given)
-                if missing and not decorators & {"kernel", "compiled", "intrinsic"}:
+                if missing and not decorators & {"kernel", "compiled", "intrinsic", "overload"}:
                     yield node.name
 
 
