@@ -21,7 +21,9 @@ knows it, and :func:`by_name` the view of flat arrays by it.
 """
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cache
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -57,8 +59,13 @@ class Field(NamedTuple):
         return found
 
 
-def fields(record: Any) -> dict[str, Any]:
+def fields(record: Any) -> Mapping[str, Any]:
     """By name: a :class:`Field`, another record or class of numbers, None for a plain number."""
+    return _fields(record)
+
+
+@cache  # asked for whenever rows are recorded
+def _fields(record: Any) -> Mapping[str, Any]:
     found: dict[str, Any] = {}
     for name, kind in get_type_hints(record, include_extras=True).items():
         if get_origin(kind) is Annotated:
@@ -66,7 +73,7 @@ def fields(record: Any) -> dict[str, Any]:
             found[name] = Field(name, shape, int in more)
         else:
             found[name] = kind if hasattr(kind, "_fields") or _are_numbers(kind) else None
-    return found
+    return MappingProxyType(found)
 
 
 def _are_numbers(kind: Any) -> bool:
@@ -154,7 +161,12 @@ def fresh(record: Any, **names: Any) -> Any:
 
 def shapes(record: Any, **names: Any) -> list[tuple[int, ...]]:
     """The shapes of a record's arrays, ``names`` being what the names in them stand for."""
-    return [field.evaluated(names) for field in fields(record).values()]
+    return list(_shapes(record, *names.items()))
+
+
+@cache
+def _shapes(record: Any, *names: tuple[str, Any]) -> tuple[tuple[int, ...], ...]:
+    return tuple(field.evaluated(dict(names)) for field in fields(record).values())
 
 
 def in_array(

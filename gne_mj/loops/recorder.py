@@ -4,6 +4,8 @@ A loop knows a block by its address; 0 stands for none. The block begins with th
 :class:`Head`, and has a pair (address, length) for each column of :class:`Samples`.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -99,12 +101,12 @@ class Recorder:
         self._columns = Samples(*(np.empty((runs, rows, *shape)) for shape in of_columns))
         self._blocks = np.zeros((runs, WORDS), dtype=np.int64)
         self.heads = by_name(self._blocks, dtype_in(Head))
-        self.heads.first, self.heads.every, self.heads.rows = first, every, rows
-        for at, column in enumerate(self._columns):
-            size = column[0].size if runs else 0
-            pairs = self._blocks[:, HEADER + 2 * at :]
-            pairs[:, 0] = column.ctypes.data + 8 * size * np.arange(runs)
-            pairs[:, 1] = size
+        self.heads[:] = (first, every, rows, 0)  # a Head
+        sizes = np.array([math.prod(column.shape[1:]) for column in self._columns])
+        begin = np.array([column.ctypes.data for column in self._columns])
+        pairs = self._blocks[:, HEADER:].reshape(runs, len(sizes), 2)
+        pairs[:, :, 0] = begin + 8 * sizes * np.arange(runs)[:, None]
+        pairs[:, :, 1] = sizes
 
     @property
     def addresses(self) -> NDArray[np.int64]:
@@ -120,7 +122,8 @@ class Recorder:
 
     def samples(self, run: int) -> Samples:
         """The rows of one run."""
-        return Samples(*(column[run, : self.done[run]] for column in self._columns))
+        done = self.done[run]
+        return Samples(*(column[run, :done] for column in self._columns))
 
     def all(self) -> Samples:
         """The rows of all runs, (runs, rows, ...); those not written are not numbers."""
