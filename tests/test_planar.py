@@ -126,7 +126,10 @@ def test_any_fleet_over_any_graph_stays_inside(seed):
     worst = loop.monitor[watch.worst_at(p) : watch.worst_at(p) + p]
     g = np.array([reference.constraints(draw.oracle, row) for row in states[:, :, 1]])
     assert np.all(worst < 0)
-    assert np.allclose(worst, np.max(g, axis=0), rtol=0, atol=1e-13)
+    sampled = np.max(g, axis=0)
+    assert np.all(worst >= sampled - 1e-13)
+    if loop.monitor[watch.DIVIDED] == 0:  # else pieces of steps were seen too
+        assert np.allclose(worst, sampled, rtol=0, atol=1e-13)
     assert loop.monitor[watch.STORAGE_RISE] <= 1e-9 * max(1.0, loop.monitor[watch.STORAGE_START])
 
 
