@@ -240,11 +240,11 @@ def test_mode_implicit_tells_when_it_was_not_accurate():
         "largest_prediction_error_time": 0.75, "periods_not_monotone": 1,
         "first_not_monotone": 1.25,
     }  # fmt: skip
-    assert expected.items() <= certificate._implicit(system, monitor).items()
-    fresh = certificate._implicit(system, np.zeros_like(monitor))
+    assert expected.items() <= certificate._of_modes(system, monitor)["implicit"].items()
+    fresh = certificate._of_modes(system, np.zeros_like(monitor))["implicit"]
     assert fresh["first_not_accurate"] is fresh["first_not_monotone"] is None
     assert fresh["mean_newton_steps"] == 0.0
-    assert certificate._implicit(line(mode="sampled"), monitor) is None
+    assert certificate._of_modes(line(mode="sampled"), monitor)["implicit"] is None
 
 
 def test_planar_agents_are_told_by_agent_and_not_by_entry():
