@@ -145,6 +145,7 @@ def test_values_that_no_scenario_can_hold_are_refused(values, words):
         ({"record": 1.5}, "^record: got 1.5"),
         ({"spread": "0.5"}, "^spread"),
         ({"threads": -1}, "^threads: got -1"),
+        ({"seed": -1, "cluster": "tcp://nobody.invalid"}, "^seed: got -1"),  # nobody is asked
     ],
 )
 def test_options_that_make_no_sense_are_refused(options, words, tmp_path):

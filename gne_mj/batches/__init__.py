@@ -74,21 +74,15 @@ def run_batch(
         ClusterError: the cluster's scheduler no longer answers; likewise.
     """
     own = named(starts="runs", sweeps="sweep", given="record", folder="out", address="cluster")
-    with own, named(plan=""), connected(cluster) as client:
+    with own, named(plan=""):
         plan = make_plan(
-            source,
-            changes,
-            system=system,
-            sweeps=_sweeps(sweep or {}),
-            starts=runs,
-            seed=seed,
-            spread=spread,
-            record=parse_record(record),
-            chunk=chunk,
-        )
-        begin = Store.resume if resume and Path(out).exists() else Store.create
-        store = begin(Path(out), plan)
-        execute(store, threads=threads, cluster=client, progress=progress)
+            source, changes, system=system, sweeps=_sweeps(sweep or {}), starts=runs, seed=seed,
+            spread=spread, record=parse_record(record), chunk=chunk,
+        )  # fmt: skip
+        with connected(cluster) as client:
+            begin = Store.resume if resume and Path(out).exists() else Store.create
+            store = begin(Path(out), plan)
+            execute(store, threads=threads, cluster=client, progress=progress)
         return store.dataset()
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from gne_mj.loops.batch import BatchLoop, EachLoop
 from gne_mj.loops.layout import Setup, ode_table
 from gne_mj.loops.ode_batch import OdeBatch
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
 from gne_mj.table import Table
@@ -44,7 +45,7 @@ class Structure:
 
             self._plant = system.mujoco_plant(clock, decorated=False)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
-            alone = isinstance(system.agents, MjcfRobots) and system.equation is not None
+            alone = not has_ode(system.agents.kind) and system.equation is not None
             self.loop = MujocoBatch(
                 self._plant, system.fault_kernels, faulty, 1 if alone else threads
             )
