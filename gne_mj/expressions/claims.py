@@ -207,8 +207,6 @@ def values(roots: list[Node], y: NDArray[np.float64]) -> NDArray[np.float64]:
                 found[id(node)] = y[:, node.args[0]]
             elif not node.varies:
                 found[id(node)] = node.tape.value(node)
-            elif node.op == "sum":
-                found[id(node)] = sum(found[id(arg)] for arg in node.args)
             else:
                 found[id(node)] = evaluate(node.op, [found[id(arg)] for arg in node.args])
     columns = [np.broadcast_to(found[id(root)], len(y)) for root in roots]

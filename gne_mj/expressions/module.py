@@ -2,6 +2,7 @@
 
 import hashlib
 import linecache
+import sys
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -122,6 +123,7 @@ def _module(text: str) -> ModuleType:
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         module = ModuleType(name, "Kernels made of a game's expressions.")
         module.__file__ = file
+        sys.modules[name] = module  # where numba looks for it
         exec(compile(text, file, "exec"), module.__dict__)
         _modules[digest] = module
     return _modules[digest]

@@ -5,7 +5,6 @@ A :class:`Tape` makes each of them once, so that equal expressions are the same 
 often they are written: sums over all are formed once.
 """
 
-import math
 import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
@@ -61,7 +60,7 @@ class Tape:
         """A number as a node."""
         if isinstance(value, Node):
             return value
-        if isinstance(value, str | bytes) or isinstance(value, complex | np.complexfloating):
+        if isinstance(value, str | bytes | complex | np.complexfloating):
             raise Untraceable(f"{value!r:.40} is not a real number")
         try:
             return self.node("c", float(value))
@@ -211,7 +210,7 @@ class Array:
         return self.nodes.ndim
 
     @property
-    def T(self) -> "Array":  # noqa: N802
+    def T(self) -> "Array":
         """The transpose."""
         return self._once(("T",), lambda: Array(self.tape, self.nodes.T))
 
@@ -271,14 +270,14 @@ def apply(tape: Tape, op: str, *inputs: Any) -> Any:
     return _shared(tape, op, inputs, lambda a: tape.unary(op, a), given)
 
 
-def evaluate(op: str, values: list[float]) -> float:
-    """What an operator or function makes of numbers."""
+def evaluate(op: str, values: list[Any]) -> Any:
+    """What an operator or function makes of numbers, or of arrays of them."""
     if op == "sum":
-        return math.fsum(values)
+        return sum(values)
     if op == "neg":
         return -values[0]
     if op in OPERATORS:
-        return float(OPERATORS[op](*map(np.float64, values)))
+        return OPERATORS[op](*map(np.float64, values))
     return FUNCTIONS[op](values[0])
 
 

@@ -1,5 +1,6 @@
 """A user's two functions, called once each with numbers that are not known yet."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -151,10 +152,9 @@ def _bounds(tape: Tape, function: Callable[..., Any], y: Any, p: Parameters) -> 
         pair = isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[0], str)
         name, relation = entry if pair else (f"constraint {len(found) + 1}", entry)
         found += _named(tape, name, relation)
-    names = [bound.name for bound in found]
-    for name in names:
-        if names.count(name) > 1 and len(names) < 1000:
-            raise Untraceable(f"two constraints are named '{name}'")
+    for name, times in Counter(bound.name for bound in found).items():
+        if times > 1:
+            raise Untraceable(f"{times} constraints are named '{name}'")
     return found
 
 
