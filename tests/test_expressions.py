@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from expression_games import PAIRS
+from random_expressions import RandomGame, hyper_dual
+
+from gne_mj.expressions import fixed, game
 
 
 def _interior(game, rng):
@@ -33,3 +36,42 @@ def test_the_same_numbers_as_hand_written_kernels(name):
             own.weighted_constraint_hessian(y, weights),
             shipped.weighted_constraint_hessian(y, weights),
         )
+
+
+def random_error(seed):
+    """The worst relative error of a random game's six functions against hyper-dual numbers."""
+    drawn = RandomGame(seed)
+    made = game(drawn.count, drawn.cost, drawn.constraints, near=fixed(drawn.near), **drawn.numbers)
+    q, y, p, kernels = made.parameters, drawn.y, drawn.plain(), made.kernels
+    errors = []
+
+    def compare(got, expected):
+        errors.append(abs(got - expected) / (1.0 + abs(expected)))
+
+    for i in range(drawn.count):
+        row = np.zeros(drawn.count)
+        kernels.add_cost_hessian(q, i, i, y, 1.0, row)
+        compare(kernels.cost(q, i, y), drawn.cost(i, y, p))
+        for b in range(drawn.count):
+            _, first, second = hyper_dual(lambda z, i=i: drawn.cost(i, z, p), y, i, b)
+            compare(row[b], second)
+        compare(kernels.cost_gradient(q, i, i, y), first)
+        for a in made.in_constraint[i]:
+            for b in made.in_constraint[i]:
+                f, first, second = hyper_dual(lambda z, i=i: drawn.g(i, z, p), y, a, b)
+                compare(kernels.constraint_hessian(q, i, a, b, y), second)
+            compare(kernels.constraint(q, i, y), f)
+            compare(kernels.constraint_gradient(q, i, a, y), first)
+        for a in set(range(drawn.count)) - set(made.in_constraint[i]):
+            compare(hyper_dual(lambda z, i=i: drawn.g(i, z, p), y, a, a)[1], 0.0)
+    return max(errors)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_games_have_the_derivatives_of_hyper_dual_numbers(seed):
+    assert random_error(seed) < 1e-11
+
+
+@pytest.mark.slow
+def test_two_hundred_random_games():
+    assert max(random_error(seed) for seed in range(200)) < 1e-11
