@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from energy_kernels import energy_game
 
 from gne_mj.expressions import fixed, game
 from gne_mj.game import Game
@@ -15,7 +16,7 @@ from gne_mj.games import (
 )
 
 
-def energy(count: int = 6) -> Game:
+def energy(count: int = 6) -> tuple[Game, Game]:
     def cost(i, y, p):
         return 0.5 * p.weight[i] * (y[i] - p.wanted[i]) ** 2 + p.price * y[i] * y.mean()
 
@@ -25,8 +26,10 @@ def energy(count: int = 6) -> Game:
             yield f"gap {i}", abs(y[i] - y[i - 1]) <= p.gap
 
     wanted = np.linspace(1.0, 3.0, count)
-    return game(
-        count, cost, constraints, weight=1.0, wanted=wanted, price=0.2, budget=5.0 * count, gap=2.0
+    numbers = {"price": 0.2, "budget": 5.0 * count, "gap": 2.0}
+    return (
+        game(count, cost, constraints, weight=1.0, wanted=wanted, **numbers),
+        energy_game(np.ones(count), wanted, **numbers),
     )
 
 
@@ -97,4 +100,10 @@ def consensus() -> tuple[Game, Game]:
     )
 
 
-PAIRS = {"velocity": velocity, "cournot": cournot, "osnr": osnr, "consensus": consensus}
+PAIRS = {
+    "energy": energy,
+    "velocity": velocity,
+    "cournot": cournot,
+    "osnr": osnr,
+    "consensus": consensus,
+}

@@ -1,4 +1,4 @@
-"""Random games of expressions, and hyper-dual numbers as an independent way to their derivatives."""
+"""Random games of expressions, and hyper-dual numbers: another way to their derivatives."""
 
 from types import SimpleNamespace
 
@@ -70,12 +70,12 @@ class RandomGame:
     def cost(self, i, y, p):
         return 0.3 * y[i] ** 2 + value(self.trees[i % 2], i, y, p)
 
-    def g(self, l, y, p):
-        return value(self.rows[l % 2], l, y, p) + 0.1 * y[l] - 5.0
+    def g(self, k, y, p):
+        return value(self.rows[k % 2], k, y, p) + 0.1 * y[k] - 5.0
 
     def constraints(self, y, p):
-        for l in range(self.count):
-            yield self.g(l, y, p) <= 0.0
+        for k in range(self.count):
+            yield self.g(k, y, p) <= 0.0
 
     def plain(self):
         """The parameters as plain numbers."""

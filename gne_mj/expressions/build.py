@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.expressions.claims import Claims, box, values
-from gne_mj.expressions.module import make
+from gne_mj.expressions.intervals import jacobian_bounds
 from gne_mj.expressions.nodes import Node
 from gne_mj.expressions.tracing import Bound, Fixed, Trace, sizes_of, trace
 from gne_mj.game import Game
@@ -49,7 +49,7 @@ def game(
         constraints: ``constraints(y, p)`` yields comparisons (``a <= b``, ``abs(a) <= b``), each
             alone or behind its name: ``yield "energy", (y**2).sum() <= p.budget``.
         dimension: m_i, one number for all or one each.
-        name: what the game is called; the name of the cost's file or function if left out.
+        name: what the game is called; "own game" if left out.
         action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game.Game`.
         **parameters: numbers, or arrays of them, which may be changed without compiling anew;
             anything else, and what :func:`fixed` holds, is given to the functions as it is.
@@ -63,36 +63,46 @@ def game(
         raise InvalidInput("count", count, "it must be a positive whole number")
     sizes = sizes_of(int(count), dimension)
     check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
+    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
+
     traced = trace(sizes, cost, constraints, parameters)
-    made = make(traced)
-    claims = Claims(_roots(traced))
-    owner = np.repeat(np.arange(len(sizes)), sizes)
-    limits = _gap_bounds(traced, claims)
-    one_entry = limits is not None and all(
-        bound.gap is not None and claims.degree[id(bound.gap)] < 2 for bound in traced.bounds
-    )
+    made, claims = make(traced), Claims(_roots(traced))
+    q = np.array(made.q, dtype=np.float64)
+    found = _found(traced, claims)
     return Game(
-        name=name or getattr(cost, "__name__", "expressions").replace("cost", "own"),
+        name=name or "own game",
         kernels=made.kernels,
-        parameters=np.array(made.q, dtype=np.float64),
+        parameters=q,
         sizes=sizes,
-        in_cost=[[i, *(j for j in _agents(claims, node, owner) if j != i)]
-                 for i, node in enumerate(traced.costs)],
-        in_constraint=[_members(claims, bound, owner) for bound in traced.bounds],
         constraint_names=tuple(bound.name for bound in traced.bounds),
         action_name=action_name,
         action_unit=action_unit,
         agent_name=agent_name,
         axes=axes,
-        affine=claims.affine(traced.costs),
-        box=box(traced.bounds, claims, sum(sizes)),
-        gap_bounds=limits,
-        affine_constraints=2 * len(traced.bounds) if one_entry else None,
         quantities=_quantities(traced, len(sizes)),
-        constraint_class=claims.constraint_class(traced.bounds),
-        smooth=claims.smooth,
         tested=True,
-    )  # fmt: skip
+        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, q, sizes),
+        **found,
+    )
+
+
+def _found(traced: Trace, claims: Claims) -> dict[str, Any]:
+    """What follows from the expressions, by the names of a game's fields."""
+    owner = np.repeat(np.arange(len(traced.sizes)), traced.sizes)
+    limits = [claims.gap_bound(bound) for bound in traced.bounds]
+    gaps = all(limit is not None for limit in limits)
+    single = gaps and all(bound.gap is not None for bound in traced.bounds)
+    costs = [_agents(claims, node, owner) for node in traced.costs]
+    return {
+        "in_cost": [[i, *(j for j in agents if j != i)] for i, agents in enumerate(costs)],
+        "in_constraint": [_members(claims, bound, owner) for bound in traced.bounds],
+        "affine": claims.affine(traced.costs),
+        "box": box(traced.bounds, claims, len(owner)),
+        "gap_bounds": np.array(limits, dtype=np.float64) if gaps else None,
+        "affine_constraints": 2 * len(limits) if single else None,
+        "constraint_class": claims.constraint_class(traced.bounds),
+        "smooth": claims.smooth,
+    }
 
 
 def _roots(traced: Trace) -> list[Node]:
@@ -111,30 +121,21 @@ def _members(claims: Claims, bound: Bound, owner: NDArray[np.int64]) -> list[int
     return members
 
 
-def _gap_bounds(traced: Trace, claims: Claims) -> NDArray[np.float64] | None:
-    """Where all constraints read |gap| <= limit with an affine gap."""
-    limits = []
-    for bound in traced.bounds:
-        if bound.limit is None or bound.gap is None or claims.degree[id(bound.gap)] > 1:
-            return None
-        limits.append(traced.tape.value(bound.limit))
-    return np.array(limits)
-
-
 def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     """What constraints bound, recorded and drawn: families of one name, numbers left out."""
     families: dict[str, list[Bound]] = {}
     for bound in traced.bounds:
         families.setdefault(re.sub(r"[\d\s(,)]+", " ", bound.name).strip(), []).append(bound)
-    found, taken = [], set()
+    found: list[Quantity] = []
+    taken: set[str] = set()
     for stem, bounds in families.items():
-        kinds = {(): 1, "agent": agents, "constraint": len(traced.bounds)}
+        kinds = {"": 1, "agent": agents, "constraint": len(traced.bounds)}
         each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
         name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
         if each is None or name in taken or not name.isidentifier():
             continue
         taken.add(name)
-        found.append(_quantity(name, stem or "constraint", each or "", bounds))
+        found.append(_quantity(name, stem or "constraint", each, bounds))
     return tuple(found)
 
 
@@ -146,7 +147,7 @@ def _quantity(name: str, long_name: str, each: str, bounds: list[Bound]) -> Quan
         columns = values(entries, y)
         return columns[:, 0] if one else columns
 
-    limits = {
+    limits: dict[str, Any] = {
         key: np.array(side) if each else side[0]
         for key, side in (("bound", upper), ("lower_bound", lower))
         if None not in side

@@ -113,6 +113,42 @@ class Claims:
         bend = _CONVEX.get(node.op)
         return bend if bend is not None and inner[0] in (0, bend) else None
 
+    def squares(self, node: Node) -> list[tuple[float, Node]] | None:
+        """(c, e) with the expression sum c e^2, c > 0 and all e affine; None if it is none."""
+        found, waiting = [], [(node, 1.0)]
+        while waiting:
+            each, factor = waiting.pop()
+            if each.op in ("+", "sum"):
+                waiting += [(arg, factor) for arg in each.args]
+                continue
+            if each.op in "*/" and not each.args[1].varies:
+                by = each.tape.value(each.args[1])
+                waiting.append((each.args[0], factor * by if each.op == "*" else factor / by))
+                continue
+            if each.op == "*" and not each.args[0].varies:
+                waiting.append((each.args[1], factor * each.tape.value(each.args[0])))
+                continue
+            power = each.op == "**" and not each.args[1].varies
+            square = (power and each.tape.value(each.args[1]) == 2.0) or (
+                each.op == "*" and each.args[0] is each.args[1]
+            )
+            if not square or not factor > 0.0 or self.degree[id(each.args[0])] != 1:
+                return None
+            found.append((factor, each.args[0]))
+        return found
+
+    def gap_bound(self, bound: Bound) -> float | None:
+        """delta of a constraint |gap| <= delta whose gap is affine, of one or more entries."""
+        if bound.gap is not None and bound.limit is not None:
+            limit = bound.limit.tape.value(bound.limit)
+            return limit if self.degree[id(bound.gap)] == 1 else None
+        assert bound.sides is not None
+        less, more = bound.sides
+        squares = None if more.varies else self.squares(less)
+        if squares is None or any(factor != 1.0 for factor, _ in squares):
+            return None
+        return float(np.sqrt(more.tape.value(more)))
+
 
 def _scaled(curvature: int | None, factor: float) -> int | None:
     if curvature is None:
@@ -120,27 +156,32 @@ def _scaled(curvature: int | None, factor: float) -> int | None:
     return curvature * int(np.sign(factor))
 
 
-def sides(bounds: list[Bound]) -> list[tuple[Node, float, Node | None]]:
-    """(e, sign, limit) for each side e sign <= limit of affine bounds; limit None for 0."""
-    found: list[tuple[Node, float, Node | None]] = []
+def _sides(bounds: list[Bound], claims: Claims) -> list[tuple[Node, float, float]]:
+    """(e, sign, limit) for what follows of affine e: e sign <= limit."""
+    found = []
     for bound in bounds:
-        if bound.gap is not None:
-            found += [(bound.gap, 1.0, bound.limit), (bound.gap, -1.0, bound.limit)]
-        else:
-            found.append((bound.g, 1.0, None))
-    return found
+        value = bound.g.tape.value
+        if bound.gap is not None and bound.limit is not None:
+            found += [(bound.gap, sign, value(bound.limit)) for sign in (1.0, -1.0)]
+            continue
+        found.append((bound.g, 1.0, 0.0))
+        assert bound.sides is not None
+        less, more = bound.sides
+        if not more.varies and value(more) > 0.0:
+            for factor, gap in claims.squares(less) or ():
+                most = float(np.sqrt(value(more) / factor))
+                found += [(gap, 1.0, most), (gap, -1.0, most)]
+    return [each for each in found if claims.degree[id(each[0])] == 1]
 
 
 def box(bounds: list[Bound], claims: Claims, actions: int) -> Box | None:
     """Bounds of all actions that follow from affine constraints, each from the others'; None if
     an action has none."""
     rows = []
-    for node, sign, limit in sides(bounds):
-        if claims.degree.get(id(node), _ABOVE) == 1:
-            slopes, offset = _affine_parts(node)
-            more = 0.0 if limit is None else node.tape.value(limit)
-            rows.append((np.array([*slopes]), sign * np.array([*slopes.values()]),
-                         more - sign * offset))  # fmt: skip
+    for node, sign, limit in _sides(bounds, claims):
+        slopes, offset = _affine_parts(node)
+        which, by = np.array([*slopes]), sign * np.array([*slopes.values()])
+        rows.append((which, by, limit - sign * offset))
     lower, upper = np.full(actions, -np.inf), np.full(actions, np.inf)
     for _ in range(_SWEEPS):
         before = (lower.copy(), upper.copy())

@@ -11,7 +11,7 @@ import numpy as np
 
 from gne_mj.expressions import source
 from gne_mj.expressions.nodes import Node
-from gne_mj.expressions.structure import Analysis, Instance, Layout, Program, Tables
+from gne_mj.expressions.structure import Analysis, Instance, Program, Tables
 from gne_mj.expressions.tracing import Trace
 
 _modules: dict[str, ModuleType] = {}
@@ -37,61 +37,56 @@ class Made(NamedTuple):
     Attributes:
         kernels: the module.
         q: its numbers.
-        in_cost, in_constraint: which actions appear in each cost and constraint.
     """
 
     kernels: ModuleType
     q: list[float]
-    costs: list[Kind]
-    bounds: list[Kind]
+
+
+class Part:
+    """Costs, or constraints: their kinds, and the text of a function of each.
+
+    Args:
+        tables: where their numbers go.
+        kinds: which.
+        place: what the number of an agent, or constraint, is called in the text.
+    """
+
+    def __init__(self, tables: Tables, kinds: list[Kind], place: str) -> None:
+        self.kinds, self.place = kinds, place
+        self.layouts = [tables.layout(kind.program, kind.members) for kind in kinds]
+        self.conditions = _conditions(tables, kinds, place)
+
+    def function(self, head: str, body: Callable[[source.Scope, int], None]) -> str:
+        """The text of a kernel; ``body`` writes what it does for one kind."""
+        writer = source.Writer()
+        writer.add("\n\n@kernel")
+        with writer.block(f"def {head}:"):
+            for n, kind in enumerate(self.kinds):
+                scope = source.Scope(writer, kind.program, self.layouts[n], [self.place], {}, {})
+                with writer.block(f"if {self.conditions[n]}:"):
+                    body(scope, kind.size)
+        return "\n".join(writer.lines)
 
 
 def make(trace: Trace) -> Made:
     """The kernels of traced expressions."""
     analysis, at = Analysis(), np.concatenate([[0], np.cumsum(trace.sizes)]).tolist()
     own = [range(at[i], at[i + 1]) for i in range(len(trace.sizes))]
-    costs = _kinds(analysis, trace.costs, own)
-    bounds = _kinds(analysis, [bound.g for bound in trace.bounds], [()] * len(trace.bounds))
     tables = Tables(trace.tape.q)
-    of_costs = [tables.layout(kind.program, kind.members) for kind in costs]
-    of_bounds = [tables.layout(kind.program, kind.members) for kind in bounds]
-    cost_kind, bound_kind = _dispatch(tables, costs), _dispatch(tables, bounds)
-    text = [_HEAD]
-
-    def write(head: str, place: str, kinds: list[Kind], layouts: list[Layout],
-              dispatch: Callable[[int], str], body: Callable[..., None]) -> None:  # fmt: skip
-        writer = source.Writer()
-        writer.add("\n\n@kernel")
-        with writer.block(f"def {head}:"):
-            for n, (kind, layout) in enumerate(zip(kinds, layouts, strict=True)):
-                scope = source.Scope(writer, kind.program, layout, [place], {}, {})
-                more = (kind.size, scope.index(0)) if kind.size and body in _OWN else ()
-                if n < len(kinds) - 1:
-                    with writer.block(f"if {dispatch(n)}:"):
-                        scope = source.Scope(writer, kind.program, layout, [place], {}, {})
-                        body(scope, *more)
-                        if body is source.own_row:
-                            writer.add("return")
-                else:
-                    scope = source.Scope(writer, kind.program, layout, [place], {}, {})
-                    body(scope, *more)
-                    if writer.lines[-1].endswith(":"):
-                        writer.add("pass")
-            writer.add("pass" if body is source.own_row else "")
-        text.append("\n".join(writer.lines))
-
-    shared = (bounds, of_bounds, bound_kind)
-    write("cost(q, i, y)", "i", costs, of_costs, cost_kind, source.value)
-    write("cost_gradient(q, i, a, y)", "i", costs, of_costs, cost_kind, source.own_gradient)
-    write("add_cost_hessian(q, i, a, y, scale, out)", "i", costs, of_costs, cost_kind,
-          source.own_row)  # fmt: skip
-    write("constraint(q, l, y)", "l", *shared, source.value)
-    write("constraint_gradient(q, l, a, y)", "l", *shared, source.shared_gradient)
-    write("constraint_hessian(q, l, a, b, y)", "l", *shared, source.shared_hessian)
-    return Made(_module("\n".join(text) + "\n"), tables.q, costs, bounds)
-
-
-_OWN = (source.own_gradient, source.own_row)
+    costs = Part(tables, _kinds(analysis, trace.costs, own), "i")
+    nodes = [bound.g for bound in trace.bounds]
+    bounds = Part(tables, _kinds(analysis, nodes, [()] * len(nodes)), "l")
+    text = [
+        _HEAD,
+        costs.function("cost(q, i, y)", source.value),
+        costs.function("cost_gradient(q, i, a, y)", source.own_gradient),
+        costs.function("add_cost_hessian(q, i, a, y, scale, out)", source.own_row),
+        bounds.function("constraint(q, l, y)", source.value),
+        bounds.function("constraint_gradient(q, l, a, y)", source.shared_gradient),
+        bounds.function("constraint_hessian(q, l, a, b, y)", source.shared_hessian),
+    ]
+    return Made(_module("\n".join(text) + "\n"), tables.q)
 
 
 def _kinds(analysis: Analysis, nodes: list[Node], own: Any) -> list[Kind]:
@@ -103,16 +98,15 @@ def _kinds(analysis: Analysis, nodes: list[Node], own: Any) -> list[Kind]:
     return list(found.values())
 
 
-def _dispatch(tables: Tables, kinds: list[Kind]) -> Callable[[int], str]:
-    """The condition under which a number is one of the n-th kind's and of none before."""
-    place = "i" if kinds[0].size else "l"
+def _conditions(tables: Tables, kinds: list[Kind], place: str) -> list[str]:
+    """Under which a number is one of each kind's, if it is none of those before; last "True"."""
     ends = [max(kind.members) for kind in kinds]
     if all(min(kind.members) > end for kind, end in zip(kinds[1:], ends, strict=False)):
-        return lambda n: f"{place} < {ends[n] + 1}"
+        return [*(f"{place} <= {end}" for end in ends[:-1]), "True"]
     which = {member: n for n, kind in enumerate(kinds) for member in kind.members}
     at = len(tables.q)
     tables.q += [float(which[member]) for member in sorted(which)]
-    return lambda n: f"q[{at} + {place}] == {float(n)}"
+    return [*(f"q[{at} + {place}] == {float(n)}" for n in range(len(kinds) - 1)), "True"]
 
 
 def _module(text: str) -> ModuleType:

@@ -49,7 +49,7 @@ class Tape:
         self.actions = [self.node("y", a) for a in range(actions)]
 
     def node(self, op: str, *args: Any) -> "Node":
-        """The one node of an operator and its arguments, which are nodes or, of leaves, a number."""
+        """The one node of an operator and its arguments: nodes or, of leaves, a number."""
         key = (op, *(id(arg) if isinstance(arg, Node) else repr(arg) for arg in args))
         found = self.nodes.get(key)
         if found is None:
@@ -72,7 +72,7 @@ class Tape:
         first = len(self.q)
         self.q += values.ravel().tolist()
         nodes = [self.node("q", first + k) for k in range(values.size)]
-        return nodes[0] if values.shape == () else Array(self, _objects(nodes, values.shape))
+        return nodes[0] if values.shape == () else Array(self, objects(nodes, values.shape))
 
     def binary(self, op: str, left: Any, right: Any) -> "Node":
         """left op right, of numbers or nodes; what is plainly 0, 1 or constant is folded."""
@@ -117,7 +117,82 @@ class Tape:
             return float(evaluate(node.op, values))
 
 
-class Node:
+class Arithmetic:
+    """Python's operators, of a node or an array of them."""
+
+    __slots__ = ()
+    tape: Tape
+
+    def __add__(self, other: Any) -> Any:
+        return apply(self.tape, "+", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return apply(self.tape, "+", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return apply(self.tape, "-", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return apply(self.tape, "-", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return apply(self.tape, "*", self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return apply(self.tape, "*", other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return apply(self.tape, "/", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return apply(self.tape, "/", other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        return apply(self.tape, "**", self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return apply(self.tape, "**", other, self)
+
+    def __matmul__(self, other: Any) -> Any:
+        return apply(self.tape, "@", self, other)
+
+    def __rmatmul__(self, other: Any) -> Any:
+        return apply(self.tape, "@", other, self)
+
+    def __le__(self, other: Any) -> Any:
+        return apply(self.tape, "<=", self, other)
+
+    def __lt__(self, other: Any) -> Any:
+        return apply(self.tape, "<=", self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return apply(self.tape, ">=", self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return apply(self.tape, ">=", self, other)
+
+    def __eq__(self, other: Any) -> Any:
+        return _equal(self, other)
+
+    def __ne__(self, other: Any) -> Any:
+        return not _equal(self, other)
+
+    __hash__ = object.__hash__
+
+    def __neg__(self) -> Any:
+        return apply(self.tape, "neg", self)
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __abs__(self) -> Any:
+        return apply(self.tape, "abs", self)
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        return _of_numpy(self.tape, ufunc, method, inputs, options)
+
+
+class Node(Arithmetic):
     """One number of a traced function.
 
     Attributes:
@@ -139,9 +214,6 @@ class Node:
             return self
         raise Untraceable("one number has no entries")
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        return _of_numpy(self.tape, ufunc, method, inputs, options)
-
     def _known(self, what: str) -> float:
         if self.varies:
             raise Untraceable(f"{what} depends on the actions, whose values are not known here")
@@ -162,8 +234,6 @@ class Node:
     def __int__(self) -> int:
         return int(self._known("a whole number"))
 
-    __hash__ = object.__hash__
-
     def __repr__(self) -> str:
         return f"<expression {words(self)}>"
 
@@ -181,7 +251,7 @@ class Relation:
         )
 
 
-class Array:
+class Array(Arithmetic):
     """Several such numbers: what indexing, arithmetic, sum, mean and @ give, as of NumPy's arrays.
 
     Args:
@@ -189,7 +259,6 @@ class Array:
     """
 
     __slots__ = ("nodes", "tape")
-    __hash__ = object.__hash__
 
     def __init__(self, tape: Tape, nodes: NDArray[Any]) -> None:
         self.tape, self.nodes = tape, nodes
@@ -246,9 +315,6 @@ class Array:
     def dot(self, other: Any) -> Any:
         """The product @."""
         return self @ other
-
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        return _of_numpy(self.tape, ufunc, method, inputs, options)
 
     def __bool__(self) -> NoReturn:
         raise Untraceable("a condition on several numbers, whose values are not known here")
@@ -311,15 +377,12 @@ def _equal(self: Any, other: Any) -> Any:
     )
 
 
-def _unequal(self: Any, other: Any) -> Any:
-    return not _equal(self, other)
-
-
 def _value(node: Node) -> float | None:
     return node.args[0] if node.op == "c" else None
 
 
-def _objects(items: list[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def objects(items: list[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """An array of things that NumPy does not know."""
     out = np.empty(len(items), dtype=object)
     out[:] = items
     return out.reshape(shape)
@@ -334,9 +397,9 @@ def _nodes_of(value: Any) -> Any:
 def _each(tape: Tape, function: Callable[..., Any], *given: Any) -> Any:
     if all(isinstance(each, Node) or each.ndim == 0 for each in given):
         return function(*(each if isinstance(each, Node) else each[()] for each in given))
-    arrays = [_objects([each], ()) if isinstance(each, Node) else each for each in given]
+    arrays = [objects([each], ()) if isinstance(each, Node) else each for each in given]
     grids = np.broadcast_arrays(*arrays)
-    return Array(tape, _objects([*map(function, *(g.ravel() for g in grids))], grids[0].shape))
+    return Array(tape, objects([*map(function, *(g.ravel() for g in grids))], grids[0].shape))
 
 
 def _shared(
@@ -360,7 +423,7 @@ def _once(tape: Tape, key: tuple[Any, ...], keep: tuple[Any, ...], make: Callabl
 
 def _along(tape: Tape, rows: NDArray[Any]) -> Array:
     flat = rows.reshape(-1, rows.shape[-1])
-    return Array(tape, _objects([tape.total(row) for row in flat], rows.shape[:-1]))
+    return Array(tape, objects([tape.total(row) for row in flat], rows.shape[:-1]))
 
 
 def _matmul(tape: Tape, left: Any, right: Any) -> Any:
@@ -377,7 +440,7 @@ def _matmul(tape: Tape, left: Any, right: Any) -> Any:
             for row in rows for column in columns
         ]  # fmt: skip
         shape = a.shape[:-1] + (b.shape[1:] if b.ndim == 2 else ())
-        return products[0] if shape == () else Array(tape, _objects(products, shape))
+        return products[0] if shape == () else Array(tape, objects(products, shape))
 
     return _once(tape, ("@", id(left), id(right)), (left, right), make)
 
@@ -395,24 +458,3 @@ def _of_numpy(tape: Tape, ufunc: Any, method: str, inputs: Any, options: Any) ->
     if name in FUNCTIONS or name == "neg" or name in _UFUNCS:
         return apply(tape, _UFUNCS.get(name, name), *inputs)
     raise Untraceable(f"np.{ufunc.__name__} is not known here")
-
-
-def _operator(op: str, *, turned: bool = False) -> Callable[[Any, Any], Any]:
-    def method(self: Any, other: Any) -> Any:
-        return apply(self.tape, op, *((other, self) if turned else (self, other)))
-
-    return method
-
-
-for _kind in (Node, Array):
-    for _name, _op in (("add", "+"), ("sub", "-"), ("mul", "*"), ("truediv", "/"), ("pow", "**"),
-                       ("matmul", "@")):  # fmt: skip
-        setattr(_kind, f"__{_name}__", _operator(_op))
-        setattr(_kind, f"__r{_name}__", _operator(_op, turned=True))
-    for _name, _op in (("le", "<="), ("lt", "<="), ("ge", ">="), ("gt", ">=")):
-        setattr(_kind, f"__{_name}__", _operator(_op))
-    _kind.__eq__ = _equal  # type: ignore[assignment]
-    _kind.__ne__ = _unequal  # type: ignore[assignment]
-    _kind.__neg__ = lambda self: apply(self.tape, "neg", self)  # type: ignore[attr-defined]
-    _kind.__pos__ = lambda self: self  # type: ignore[attr-defined]
-    _kind.__abs__ = lambda self: apply(self.tape, "abs", self)  # type: ignore[attr-defined]

@@ -5,7 +5,8 @@ program in its own variables by :mod:`gne_mj.expressions.derivatives`, of its ro
 rule, in loops again. That a term's own action is ``a`` is known only when the kernel runs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from gne_mj.expressions.derivatives import calculus, text
@@ -27,15 +28,18 @@ class Writer:
         """Write a line."""
         self.lines.append("    " * self.depth + line)
 
-    def block(self, head: str) -> "Writer":
-        """Write a line, and what follows behind it (``with``)."""
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Write a line, and what follows within it; what is always true needs none."""
+        if head == "if True:":
+            yield
+            return
         self.add(head)
-        return self
-
-    def __enter__(self) -> None:
         self.depth += 1
-
-    def __exit__(self, *_: object) -> None:
+        length = len(self.lines)
+        yield
+        if len(self.lines) == length:
+            self.add("pass")
         self.depth -= 1
 
     def name(self, kind: str) -> str:
@@ -279,37 +283,37 @@ def _only(parts: Parts) -> str:
 # Kernels
 
 
-def value(scope: Scope) -> None:
+def value(scope: Scope, size: int) -> None:
     """Of ``cost`` and ``constraint``."""
     scope.writer.add(f"return {scope.text(scope.calculus.f)}")
 
 
-def own_gradient(scope: Scope, size: int, offset: str) -> None:
+def own_gradient(scope: Scope, size: int) -> None:
     """Of ``cost_gradient``: by one of the agent's own ``size`` actions, its first slots."""
+    for branch in _own(scope, size):
+        _returned(branch)
+
+
+def own_row(scope: Scope, size: int) -> None:
+    """Of ``add_cost_hessian``."""
+    for branch in _own(scope, size):
+        _row(branch, "0.0", "scale")
+        scope.writer.add("return")
+
+
+def _own(scope: Scope, size: int) -> Iterator[Scope]:
+    """A scope for each of the agent's own actions that the direction a can be."""
+    first = scope.index(0)
     for own in range(size):
-        seed = ("a", {s: s == own for s in range(scope.program.slots[0])})
-        if own < size - 1:
-            with scope.writer.block(f"if a == {_plus(offset, str(own))}:"):
-                _returned(scope.branch(a=seed))
-        else:
-            _returned(scope.branch(a=seed))
+        seeds = {s: s == own for s in range(scope.program.slots[0])}
+        condition = f"a == {_plus(first, str(own))}" if own < size - 1 else "True"
+        with scope.writer.block(f"if {condition}:"):
+            yield scope.branch(a=("a", seeds))
 
 
 def _returned(scope: Scope) -> None:
     parts = scope.tangent("a")
     scope.writer.add(f"return {_only(parts)}")
-
-
-def own_row(scope: Scope, size: int, offset: str) -> None:
-    """Of ``add_cost_hessian``."""
-    for own in range(size):
-        seed = ("a", {s: s == own for s in range(scope.program.slots[0])})
-        if size > 1:
-            with scope.writer.block(f"if a == {_plus(offset, str(own))}:"):
-                _row(scope.branch(a=seed), "0.0", "scale")
-                scope.writer.add("return")
-        else:
-            _row(scope.branch(a=seed), "0.0", "scale")
 
 
 def _row(scope: Scope, beta: str, gamma: str) -> None:
@@ -342,10 +346,7 @@ def _row(scope: Scope, beta: str, gamma: str) -> None:
             writer.add(f"{place} = {_minus(*found)}")
         head = f"if 0 <= {place} < " if found else f"for {place} in range("
         with writer.block(f"{head}{scope.count(r)}{':' if found else '):'}"):
-            length = len(writer.lines)
             _row(scope.enter(r, place), inner_beta, inner_gamma)
-            if len(writer.lines) == length:
-                writer.add("pass")
 
 
 def _kept(writer: Writer, made: str) -> str:
@@ -360,13 +361,13 @@ def _times(factor: str, parts: Parts) -> Parts:
     return [] if factor == "0.0" else [(when, _product(factor, part)) for when, part in parts]
 
 
-def shared_gradient(scope: Scope) -> None:
+def shared_gradient(scope: Scope, size: int) -> None:
     """Of ``constraint_gradient``: by any of its actions."""
     for branch in _branches(scope, "a"):
         _returned(branch)
 
 
-def shared_hessian(scope: Scope) -> None:
+def shared_hessian(scope: Scope, size: int) -> None:
     """Of ``constraint_hessian``."""
     if not scope.calculus.bends:
         scope.writer.add("return 0.0")
@@ -377,15 +378,12 @@ def shared_hessian(scope: Scope) -> None:
             scope.writer.add(f"return {_only(parts)}")
 
 
-def _branches(scope: Scope, direction: str) -> Any:
+def _branches(scope: Scope, direction: str) -> Iterator[Scope]:
     """A scope for each of the slots that the direction can be, the last one for what remains."""
     slots = range(scope.program.slots[0])
     for s in slots:
-        seed = (direction, {n: n == s for n in slots})
-        if s == len(slots) - 1 and not scope.program.rolls:
-            yield scope.branch(**{direction: seed})
-        else:
-            with scope.writer.block(f"if {direction} == {scope.index(s)}:"):
-                yield scope.branch(**{direction: seed})
+        last = s == len(slots) - 1 and not scope.program.rolls
+        with scope.writer.block(f"if {'True' if last else f'{direction} == {scope.index(s)}'}:"):
+            yield scope.branch(**{direction: (direction, {n: n == s for n in slots})})
     if scope.program.rolls:
         yield scope.branch(**{direction: (direction, dict.fromkeys(slots, False))})

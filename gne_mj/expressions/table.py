@@ -1,4 +1,4 @@
-"""The table ``[systems.NAME.game]`` of a game of expressions: texts, or a file with two functions."""
+"""The table ``[systems.NAME.game]`` of a game of expressions: texts, or a file of functions."""
 
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gne_mj.errors import GneError, InvalidInput, UserCodeError, nearest
-from gne_mj.expressions.nodes import Array, Node, Relation, Tape, Untraceable, _objects, words
+from gne_mj.expressions.nodes import Array, Node, Relation, Tape, Untraceable, objects, words
 
 
 @dataclass(frozen=True)
@@ -100,10 +100,10 @@ def _profile(tape: Tape, sizes: tuple[int, ...]) -> Any:
     nodes: list[Any] = tape.actions
     if len(set(sizes)) == 1:
         shape = (len(sizes),) if sizes[0] == 1 else (len(sizes), sizes[0])
-        return Array(tape, _objects(nodes, shape))
+        return Array(tape, objects(nodes, shape))
     at = np.concatenate([[0], np.cumsum(sizes)])
     parts = [nodes[at[i] : at[i + 1]] for i in range(len(sizes))]
-    return tuple(part[0] if len(part) == 1 else Array(tape, _objects(part, (len(part),)))
+    return tuple(part[0] if len(part) == 1 else Array(tape, objects(part, (len(part),)))
                  for part in parts)  # fmt: skip
 
 
