@@ -251,3 +251,50 @@ def test_bounds_of_slopes_of_osnr_are_those_that_its_author_found():
         own.jacobian_bounds(shipped.box), shipped.jacobian_bounds(shipped.box), strict=True
     ):
         np.testing.assert_allclose(got, expected, rtol=1e-9)
+
+
+def test_a_constraint_on_one_entry_of_an_action_has_no_slope_in_the_others():
+    made = game(
+        2,
+        lambda i, y, p: (y[i] ** 2).sum() + y[0, 1] * y[1, 0],
+        lambda y, p: [y[1] <= p.most, y[0, 0] ** 2 * y[1, 1] <= 5.0],
+        dimension=2,
+        most=[1.0, 2.0],
+    )
+    y = np.array([0.3, 0.4, -0.2, 0.6])
+    slopes = made.constraint_jacobian(y)
+    np.testing.assert_array_equal(slopes[:2], [[0, 0, 1, 0], [0, 0, 0, 1]])
+    np.testing.assert_allclose(slopes[2], [2 * 0.3 * 0.6, 0.0, 0.0, 0.09])
+    bend = np.zeros((4, 4))
+    bend[0, 0], bend[0, 3], bend[3, 0] = 1.2, 0.6, 0.6
+    np.testing.assert_allclose(made.constraint_hessian(2, y), bend)
+    np.testing.assert_allclose(
+        made.pseudo_gradient_jacobian(y), 2 * np.eye(4) + np.diag([0, 1, 0], 1)
+        + np.diag([0, 1, 0], -1)
+    )  # fmt: skip
+
+
+def test_actions_of_different_sizes():
+    made = game(
+        3,
+        lambda i, y, p: np.sum((y[i] - 1.0) ** 2) + y[0] * y[2].sum(),
+        lambda y, p: {"one": y[0] + y[1].sum() <= 3.0, "two": y[2] <= p.most},
+        dimension=[1, 2, 3],
+        most=2.0,
+    )
+    y = np.linspace(0.1, 0.6, 6)
+    expected = 2.0 * (y - 1.0) + np.array([y[3:].sum(), 0, 0, y[0], y[0], y[0]])
+    np.testing.assert_allclose(made.pseudo_gradient(y), expected)
+    np.testing.assert_array_equal(made.constraint_jacobian(y)[2], [0, 0, 0, 0, 1, 0])
+    assert made.constraint_names == ("one", "two 1", "two 2", "two 3")
+
+
+def test_what_nests_too_deeply_is_refused():
+    def cost(i, y, p):
+        value = y[i]
+        for _ in range(3000):
+            value = np.sin(value) + 1.0
+        return value
+
+    with pytest.raises(InvalidInput, match="must not nest"):
+        game(2, cost, lambda y, p: [y <= 1.0])

@@ -66,7 +66,11 @@ def game(
     from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
 
     traced = trace(sizes, cost, constraints, parameters)
-    made, claims = make(traced), Claims(_roots(traced))
+    try:
+        made, claims = make(traced), Claims(_roots(traced))
+    except RecursionError:
+        deep = "its expressions must not nest some hundred operations deep"
+        raise InvalidInput("cost", cost, deep) from None
     q = np.array(made.q, dtype=np.float64)
     found = _found(traced, claims)
     return Game(

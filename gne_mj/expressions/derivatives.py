@@ -87,6 +87,8 @@ def _derivative(expression: Any, by: Any) -> Any:
     found = found.replace(sp.DiracDelta, lambda *_: sp.S.Zero)  # of sign, almost everywhere
     if any(not power.exp.is_number for power in found.atoms(sp.Pow)):
         found = sp.powsimp(found)  # x**p / x
+    if any(power.exp.is_negative and power.base.is_Add for power in found.atoms(sp.Pow)):
+        found = sp.together(found)  # fewer divisions, and closer bounds over intervals
     return found
 
 

@@ -1,4 +1,4 @@
-"""Bounds of dF/dy over a box: a game's kernels, as plain Python, on intervals in place of numbers."""
+"""Bounds of dF/dy over a box: a game's kernels as plain Python, given intervals for numbers."""
 
 from collections.abc import Callable
 from types import ModuleType

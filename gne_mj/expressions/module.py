@@ -27,7 +27,7 @@ class Kind(NamedTuple):
     """What agents, or constraints, of one program are."""
 
     program: Program
-    size: int  # of the agent's action; 0 of constraints
+    size: int  # of the agent's action; of constraints the greatest of any agent's
     members: dict[int, Instance]
 
 
@@ -76,7 +76,8 @@ def make(trace: Trace) -> Made:
     tables = Tables(trace.tape.q)
     costs = Part(tables, _kinds(analysis, trace.costs, own), "i")
     nodes = [bound.g for bound in trace.bounds]
-    bounds = Part(tables, _kinds(analysis, nodes, [()] * len(nodes)), "l")
+    most = max(trace.sizes)
+    bounds = Part(tables, _kinds(analysis, nodes, [()] * len(nodes), most), "l")
     text = [
         _HEAD,
         costs.function("cost(q, i, y)", source.value),
@@ -89,12 +90,12 @@ def make(trace: Trace) -> Made:
     return Made(_module("\n".join(text) + "\n"), tables.q)
 
 
-def _kinds(analysis: Analysis, nodes: list[Node], own: Any) -> list[Kind]:
+def _kinds(analysis: Analysis, nodes: list[Node], own: Any, size: int = 0) -> list[Kind]:
     found: dict[Any, Kind] = {}
     for n, node in enumerate(nodes):
         program, instance = analysis.program(node, own[n])
-        kind = found.setdefault((program, len(own[n])), Kind(program, len(own[n]), {}))
-        kind.members[n] = instance
+        key = (program, size or len(own[n]))
+        found.setdefault(key, Kind(*key, {})).members[n] = instance
     return list(found.values())
 
 

@@ -214,6 +214,12 @@ class Node(Arithmetic):
             return self
         raise Untraceable("one number has no entries")
 
+    def sum(self, axis: None = None, dtype: None = None, out: None = None) -> "Node":
+        """Itself, as of NumPy's numbers."""
+        return self
+
+    mean = sum
+
     def _known(self, what: str) -> float:
         if self.varies:
             raise Untraceable(f"{what} depends on the actions, whose values are not known here")

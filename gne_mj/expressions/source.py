@@ -362,8 +362,8 @@ def _times(factor: str, parts: Parts) -> Parts:
 
 
 def shared_gradient(scope: Scope, size: int) -> None:
-    """Of ``constraint_gradient``: by any of its actions."""
-    for branch in _branches(scope, "a"):
+    """Of ``constraint_gradient``: by any action of an agent in it, of at most ``size`` entries."""
+    for branch in _branches(scope, "a", size):
         _returned(branch)
 
 
@@ -372,18 +372,20 @@ def shared_hessian(scope: Scope, size: int) -> None:
     if not scope.calculus.bends:
         scope.writer.add("return 0.0")
         return
-    for first in _branches(scope, "a"):
-        for second in _branches(first, "b"):
+    for first in _branches(scope, "a", size):
+        for second in _branches(first, "b", size):
             parts = second.twice()
             scope.writer.add(f"return {_only(parts)}")
 
 
-def _branches(scope: Scope, direction: str) -> Iterator[Scope]:
-    """A scope for each of the slots that the direction can be, the last one for what remains."""
+def _branches(scope: Scope, direction: str, size: int) -> Iterator[Scope]:
+    """A scope for each of the slots that the direction can be, the last one for what remains: in
+    rolls, or an entry of an agent's action that is not in the constraint."""
     slots = range(scope.program.slots[0])
+    rest = bool(scope.program.rolls) or size > 1
     for s in slots:
-        last = s == len(slots) - 1 and not scope.program.rolls
+        last = s == len(slots) - 1 and not rest
         with scope.writer.block(f"if {'True' if last else f'{direction} == {scope.index(s)}'}:"):
             yield scope.branch(**{direction: (direction, {n: n == s for n in slots})})
-    if scope.program.rolls:
+    if rest:
         yield scope.branch(**{direction: (direction, dict.fromkeys(slots, False))})
