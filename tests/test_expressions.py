@@ -298,3 +298,10 @@ def test_what_nests_too_deeply_is_refused():
 
     with pytest.raises(InvalidInput, match="must not nest"):
         game(2, cost, lambda y, p: [y <= 1.0])
+
+
+def test_little_is_lost_close_to_a_bound():
+    made = game(2, lambda i, y, p: y[i] ** 2, lambda y, p: [abs(y[0] - y[1]) <= p.gap], gap=0.1)
+    y = np.array([1000.1 - 1e-11, 1000.0])
+    gap = y[0] - y[1]  # exact
+    assert made.kernels.constraint(made.parameters, 0, y) == (gap - 0.1) * (gap + 0.1)

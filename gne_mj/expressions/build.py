@@ -38,25 +38,22 @@ def game(
 ) -> Game:
     """The game of ``count`` agents with these costs and shared constraints.
 
-    The functions are called once with numbers that are not known yet: y, the actions, and p, whose
-    attributes are the parameters. From what they compute follow exact derivatives, who is in which
-    cost and constraint, and what can be proved of them.
+    The functions are called with numbers that are not known yet: y, the actions, and p, whose
+    attributes are the parameters. Everything else that a game has follows from what they compute.
 
     Args:
         count: N.
-        cost: ``cost(i, y, p)``, J_i of agent i = 0..N-1; y[i] is its action, a number, or an
-            array of m_i where ``dimension`` is above 1.
-        constraints: ``constraints(y, p)`` yields comparisons (``a <= b``, ``abs(a) <= b``), each
-            alone or behind its name: ``yield "energy", (y**2).sum() <= p.budget``.
+        cost: ``cost(i, y, p)``, J_i of agent i = 0..N-1; y[i] is its action, (m_i,) or a number.
+        constraints: ``constraints(y, p)`` yields comparisons, each alone or behind its name:
+            ``yield "energy", (y**2).sum() <= p.budget``.
         dimension: m_i, one number for all or one each.
         name: what the game is called; "own game" if left out.
         action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game.Game`.
-        **parameters: numbers, or arrays of them, which may be changed without compiling anew;
-            anything else, and what :func:`fixed` holds, is given to the functions as it is.
+        **parameters: numbers, or arrays of them; anything else, and what :func:`fixed` holds, is
+            given to the functions as it is.
 
     Raises:
-        UserCodeError: a function raises, or does what cannot be traced, such as a branch on y:
-            names file and line.
+        UserCodeError: a function raises, or branches on y; names file and line.
         InvalidInput: a parameter is not finite, or a number does not fit.
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
@@ -69,14 +66,12 @@ def game(
     try:
         made, claims = make(traced), Claims(_roots(traced))
     except RecursionError:
-        deep = "its expressions must not nest some hundred operations deep"
-        raise InvalidInput("cost", cost, deep) from None
-    q = np.array(made.q, dtype=np.float64)
+        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
     found = _found(traced, claims)
     return Game(
         name=name or "own game",
         kernels=made.kernels,
-        parameters=q,
+        parameters=made.q,
         sizes=sizes,
         constraint_names=tuple(bound.name for bound in traced.bounds),
         action_name=action_name,
@@ -85,7 +80,7 @@ def game(
         axes=axes,
         quantities=_quantities(traced, len(sizes)),
         tested=True,
-        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, q, sizes),
+        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, made.q, sizes),
         **found,
     )
 

@@ -109,6 +109,15 @@ class _Printer(StrPrinter):
     def _print_Symbol(self, symbol: Any) -> str:
         return self.texts[symbol.name]
 
+    def _print_Add(self, total: Any, order: Any = None) -> str:
+        """Actions before numbers: a gap of two that are close is exact, and little is lost of its
+        distance to a bound."""
+        terms = self._as_ordered_terms(total, order=order)
+        terms.sort(key=lambda term: not any(s.name[0] in "xr" for s in term.free_symbols))
+        first, *others = (self._print(term) for term in terms)
+        signed = (f" - {t[1:]}" if t.startswith("-") else f" + {t}" for t in others)
+        return str(first) + "".join(signed)
+
     def _print_Float(self, number: Any) -> str:
         return repr(float(number))
 

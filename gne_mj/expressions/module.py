@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gne_mj.expressions import source
 from gne_mj.expressions.nodes import Node
@@ -40,7 +41,7 @@ class Made(NamedTuple):
     """
 
     kernels: ModuleType
-    q: list[float]
+    q: NDArray[np.float64]
 
 
 class Part:
@@ -87,7 +88,7 @@ def make(trace: Trace) -> Made:
         bounds.function("constraint_gradient(q, l, a, y)", source.shared_gradient),
         bounds.function("constraint_hessian(q, l, a, b, y)", source.shared_hessian),
     ]
-    return Made(_module("\n".join(text) + "\n"), tables.q)
+    return Made(_module("\n".join(text) + "\n"), np.array(tables.q, dtype=np.float64))
 
 
 def _kinds(analysis: Analysis, nodes: list[Node], own: Any, size: int = 0) -> list[Kind]:
