@@ -82,18 +82,28 @@ class Analysis:
         """A sum's single terms, and its alike ones."""
         found = self._sums.get(id(node))
         if found is None:
-            groups: dict[Program, list[tuple[Node, Instance]]] = {}
-            for term in _terms(node):
-                program, instance = self.term(term)
-                groups.setdefault(program, []).append((term, instance))
-            single, alike = [], []
-            for program, members in groups.items():
-                if len(members) < ALIKE or program.slots[0] == 0:
-                    single += [term for term, _ in members]
-                else:
-                    alike.append((program, [instance for _, instance in members]))
-            found = self._sums[id(node)] = (single, alike)
+            single, alike = self._grouped(_terms(node, whole=True))
+            parts = [part for term in single for part in _terms(term)]
+            single, more = self._grouped(parts) if len(parts) > len(single) else (single, [])
+            found = self._sums[id(node)] = (single, alike + more)
         return found
+
+    def _grouped(
+        self, terms: list[Node]
+    ) -> tuple[list[Node], list[tuple[Program, list[Instance]]]]:
+        """Terms that are few of a kind, and those that are many; sums within only if short."""
+        groups: dict[Program, list[tuple[Node, Instance]]] = {}
+        for term in terms:
+            program, instance = self.term(term)
+            groups.setdefault(program, []).append((term, instance))
+        single, alike = [], []
+        for program, members in groups.items():
+            long = program.rolls and _inner(members[0][0]).op == "sum"
+            if len(members) < ALIKE or program.slots[0] == 0 or long:
+                single += [term for term, _ in members]
+            else:
+                alike.append((program, [instance for _, instance in members]))
+        return single, alike
 
 
 class _Builder:
@@ -157,12 +167,12 @@ class _Builder:
         return slots.index(number)
 
 
-def _terms(node: Node) -> list[Node]:
-    """What a sum adds up, sums in it and signs resolved."""
+def _terms(node: Node, whole: bool = False) -> list[Node]:
+    """What a sum adds up, sums in it and signs resolved; ``whole`` leaves what NumPy summed."""
     found, waiting = [], [(node, False)]
     while waiting:
         each, negative = waiting.pop()
-        if each.op in ("+", "sum"):
+        if each.op == "+" or (each.op == "sum" and not (whole and each is not node)):
             waiting += [(arg, negative) for arg in reversed(each.args)]
         elif each.op == "-":
             waiting += [(each.args[1], not negative), (each.args[0], negative)]
@@ -171,6 +181,10 @@ def _terms(node: Node) -> list[Node]:
         else:
             found.append(each.tape.unary("neg", each) if negative else each)
     return found
+
+
+def _inner(node: Node) -> Node:
+    return node.args[0] if node.op == "neg" else node
 
 
 class Access(NamedTuple):
