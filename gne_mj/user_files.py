@@ -60,7 +60,7 @@ def load_game(path: str | Path, count: int, parameters: Mapping[str, Any]) -> Ga
     Raises:
         InvalidInput: the file cannot be read or run, or makes no game for these parameters.
     """
-    module = _load(path)
+    module = load_module(path)
     if not callable(getattr(module, "game", None)):
         raise InvalidInput("path", str(path), "it must define a function game(count, ...)")
     game = _make(parameters, partial(module.game, count, **parameters))
@@ -81,7 +81,7 @@ def load_law(
     Raises:
         InvalidInput: the file cannot be read or run, or makes no law for these parameters.
     """
-    module = _load(path)
+    module = load_module(path)
     if callable(getattr(module, "law", None)):
         law = _make(parameters, partial(module.law, game, graph, **parameters))
         if not isinstance(law, Law):
@@ -106,7 +106,7 @@ def load_agent_type(path: str | Path) -> ModuleType:
     Raises:
         InvalidInput: the file cannot be read or run, or is no agent type.
     """
-    return complete(_load(path), "path", Path(path).name)
+    return complete(load_module(path), "path", Path(path).name)
 
 
 def _check_law(law: Law, file: str) -> None:
@@ -158,7 +158,8 @@ def _make(parameters: Mapping[str, Any], function: Any) -> Any:
         ) from error
 
 
-def _load(path: str | Path) -> ModuleType:
+def load_module(path: str | Path) -> ModuleType:
+    """The module of a user's file; one text at one place is one module."""
     try:
         path = Path(path).resolve()
         text = read_file(path)

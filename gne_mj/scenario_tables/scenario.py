@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+import gne_mj.expressions.table  # registers games of expressions
 import gne_mj.user_files  # noqa: F401  registers games and laws of the user's own
 from gne_mj.barrier import BarrierTable
 from gne_mj.controllers import Law

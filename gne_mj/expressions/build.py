@@ -1,0 +1,170 @@
+"""A game from two Python functions (see docs/expressions.md)."""
+
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.bounds import MOST_ACTIONS, check_count
+from gne_mj.errors import InvalidInput
+from gne_mj.expressions.claims import Claims, box, values
+from gne_mj.expressions.intervals import jacobian_bounds
+from gne_mj.expressions.nodes import Node
+from gne_mj.expressions.tracing import Bound, Fixed, Trace, sizes_of, trace
+from gne_mj.game import Game
+from gne_mj.quantity import Quantity
+
+
+def fixed(value: Any) -> Fixed:
+    """A parameter that functions get as it is, such as a list of edges or a switch."""
+    return Fixed(value)
+
+
+def game(
+    count: int,
+    cost: Callable[..., Any],
+    constraints: Callable[..., Any],
+    *,
+    dimension: int | Sequence[int] = 1,
+    name: str = "",
+    action_name: str = "action",
+    action_unit: str = "",
+    agent_name: str = "agent",
+    axes: tuple[str, ...] = (),
+    **parameters: Any,
+) -> Game:
+    """The game of ``count`` agents with these costs and shared constraints.
+
+    The functions are called with numbers that are not known yet: y, the actions, and p, whose
+    attributes are the parameters. Everything else that a game has follows from what they compute.
+
+    Args:
+        count: N.
+        cost: ``cost(i, y, p)``, J_i of agent i = 0..N-1; y[i] is its action, (m_i,) or a number.
+        constraints: ``constraints(y, p)`` yields comparisons, each alone or behind its name:
+            ``yield "energy", (y**2).sum() <= p.budget``.
+        dimension: m_i, one number for all or one each.
+        name: what the game is called; "own game" if left out.
+        action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game.Game`.
+        **parameters: numbers, or arrays of them; anything else, and what :func:`fixed` holds, is
+            given to the functions as it is.
+
+    Raises:
+        UserCodeError: a function raises, or branches on y; names file and line.
+        InvalidInput: a parameter is not finite, or a number does not fit.
+    """
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InvalidInput("count", count, "it must be a positive whole number")
+    sizes = sizes_of(int(count), dimension)
+    check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
+    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
+
+    traced = trace(sizes, cost, constraints, parameters)
+    try:
+        made, claims = make(traced), Claims(_roots(traced))
+    except RecursionError:
+        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
+    found = _found(traced, claims)
+    return Game(
+        name=name or "own game",
+        kernels=made.kernels,
+        parameters=made.q,
+        sizes=sizes,
+        constraint_names=tuple(bound.name for bound in traced.bounds),
+        action_name=action_name,
+        action_unit=action_unit,
+        agent_name=agent_name,
+        axes=axes,
+        quantities=_quantities(traced, len(sizes)),
+        tested=True,
+        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, made.q, sizes),
+        **found,
+    )
+
+
+def _found(traced: Trace, claims: Claims) -> dict[str, Any]:
+    """What follows from the expressions, by the names of a game's fields."""
+    owner = np.repeat(np.arange(len(traced.sizes)), traced.sizes)
+    limits = [claims.gap_bound(bound) for bound in traced.bounds]
+    gaps = all(limit is not None for limit in limits)
+    single = gaps and all(bound.gap is not None for bound in traced.bounds)
+    costs = [_agents(claims, node, owner) for node in traced.costs]
+    return {
+        "in_cost": [[i, *(j for j in agents if j != i)] for i, agents in enumerate(costs)],
+        "in_constraint": [_members(claims, bound, owner) for bound in traced.bounds],
+        "affine": claims.affine(traced.costs),
+        "box": box(traced.bounds, claims, len(owner)),
+        "gap_bounds": np.array(limits, dtype=np.float64) if gaps else None,
+        "affine_constraints": 2 * len(limits) if single else None,
+        "constraint_class": claims.constraint_class(traced.bounds),
+        "smooth": claims.smooth,
+    }
+
+
+def _roots(traced: Trace) -> list[Node]:
+    gaps = [bound.gap for bound in traced.bounds if bound.gap is not None]
+    return [*traced.costs, *(bound.g for bound in traced.bounds), *gaps]
+
+
+def _agents(claims: Claims, node: Node, owner: NDArray[np.int64]) -> list[int]:
+    return sorted({int(owner[a]) for a in claims.actions[id(node)]})
+
+
+def _members(claims: Claims, bound: Bound, owner: NDArray[np.int64]) -> list[int]:
+    members = _agents(claims, bound.g, owner)
+    if not members:
+        raise InvalidInput("constraints", bound.name, "every constraint contains an action")
+    return members
+
+
+def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
+    """What constraints bound, recorded and drawn: families of one name, numbers left out."""
+    families: dict[str, list[Bound]] = {}
+    for bound in traced.bounds:
+        families.setdefault(re.sub(r"[\d\s(,)]+", " ", bound.name).strip(), []).append(bound)
+    found: list[Quantity] = []
+    taken: set[str] = set()
+    for stem, bounds in families.items():
+        kinds = {"": 1, "agent": agents, "constraint": len(traced.bounds)}
+        each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
+        name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
+        if each is None or name in taken or not name.isidentifier():
+            continue
+        taken.add(name)
+        found.append(_quantity(name, stem or "constraint", each, bounds))
+    return tuple(found)
+
+
+def _quantity(name: str, long_name: str, each: str, bounds: list[Bound]) -> Quantity:
+    nodes, lower, upper = zip(*map(_shown, bounds), strict=True)
+    entries = list(nodes)
+
+    def found(y: NDArray[np.float64], one: bool) -> NDArray[np.float64]:
+        columns = values(entries, y)
+        return columns[:, 0] if one else columns
+
+    limits: dict[str, Any] = {
+        key: np.array(side) if each else side[0]
+        for key, side in (("bound", upper), ("lower_bound", lower))
+        if None not in side
+    }
+    return Quantity(name=f"{name}_value", long_name=long_name, unit="",
+                    values=partial(found, one=not each), each=each, **limits)  # fmt: skip
+
+
+def _shown(bound: Bound) -> tuple[Node, float | None, float | None]:
+    """What a constraint bounds, from below and above."""
+    tape = bound.g.tape
+    if bound.gap is not None and bound.limit is not None:
+        limit = tape.value(bound.limit)
+        return bound.gap, -limit, limit
+    assert bound.sides is not None
+    less, more = bound.sides
+    if not more.varies:
+        return less, None, tape.value(more)
+    if not less.varies:
+        return more, tape.value(less), None
+    return bound.g, None, 0.0
