@@ -236,7 +236,7 @@ def test_an_agent_without_an_action_says_at_which_constraint():
     residual, parts = equation_of(local, system, 3)
     good, _ = residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
     assert not good
-    assert parts.work.now.shell == 0.0
+    assert parts.work.now.tightened == 0.0
     # the ball's three members: looked at three times as far from the anchor
     look = system.start.copy()
     look[:2] += 3.0 * (np.array([1.95, 1.2]) - system.start[:2])
@@ -250,7 +250,7 @@ def test_all_agents_without_actions_say_at_which_constraint():
     residual, parts = equation_of(joint, coupled_system(), 3)
     outside = np.array([1.95, 1.2, 0.5, -0.2])
     assert not residual(0, 3, outside)[0]
-    assert parts.work.now.shell == 0.0
+    assert parts.work.now.tightened == 0.0
     assert parts.work.now.shell_value == pytest.approx(outside @ outside - 4.0)
 
 

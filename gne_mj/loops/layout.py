@@ -204,6 +204,6 @@ class Instant(NamedTuple):
 def parts_in(table, room):
     """The parts of a run, from its table and room."""
     return Parts(
-        problem_in(table), channels_in(table), clock_in(table), room.monitor.seen, room.monitor,
+        problem_in(table), channels_in(table), clock_in(table), room.monitor.numbers, room.monitor,
         room.u, room.work,
     )  # fmt: skip

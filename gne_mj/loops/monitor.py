@@ -51,7 +51,7 @@ class Seen(Numbers):
 class Monitor(NamedTuple):
     """A monitor in native code; in Python the numbers are beside the arrays (:func:`fresh`)."""
 
-    seen: Seen
+    numbers: Seen
     worst: Annotated[np.ndarray, "p"]  # each constraint's greatest value
     worst_time: Annotated[np.ndarray, "p"]
     peak: Annotated[np.ndarray, "m"]  # of |u| that was asked for

@@ -114,8 +114,8 @@ def run_in(table, flat, solver):
     data = fixed.problem.data
     m, p, agents = len(data.owner), len(data.member_pointer) - 1, len(data.offsets) - 1
     room = _room_in(flat, 0, m, p, agents)
-    seen, figures = room.monitor.seen, room.monitor
-    return fixed, Run(room.progress, seen, figures, room.exit, room.u, room.work, solver)
+    watched, figures = room.monitor.numbers, room.monitor
+    return fixed, Run(room.progress, watched, figures, room.exit, room.u, room.work, solver)
 
 
 @kernel
