@@ -39,7 +39,7 @@ def action(game, problem, y, weights, memory, work, u):
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
             barrier = weighted_gradient(game, data, i, a, y, weights)
-            u[a] = -pull(game, problem, i, a, y, memory) - barrier
+            u[a] = -barrier_free(game, problem, i, a, y, memory) - barrier
     return -1
 
 
@@ -49,13 +49,13 @@ def prepare(problem, first, last, y, memory):
 
 
 @kernel
-def pull(game, problem, i, a, y, memory):
+def barrier_free(game, problem, i, a, y, memory):
     """What entry a of agent i's action is driven by besides the barrier, at y (m,)."""
     return game.cost_gradient(problem.data.parameters, i, a, y)
 
 
 @kernel
-def add_pull_slope(game, problem, i, a, y, memory, out):
+def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     """Add dpull/dy to out (m,), which is touched for agents in the cost only."""
     game.add_cost_hessian(problem.data.parameters, i, a, y, 1.0, out)
 
@@ -71,7 +71,7 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
-def settle(ahead, held):
+def memory_outputs(prediction, held):
     """In mode implicit too the memory moves with the outputs of the period's start."""
 
 

@@ -161,7 +161,7 @@ def agent_action(game, data, settings, i, own_filter, own_row, work, u):
 
 
 @kernel
-def pull(game, problem, i, a, y, memory):
+def barrier_free(game, problem, i, a, y, memory):
     """What drives entry a of agent i's action besides the barrier, its row having y_i."""
     m = len(y)
     row = memory[i * m : (i + 1) * m]
@@ -169,7 +169,7 @@ def pull(game, problem, i, a, y, memory):
 
 
 @kernel
-def add_pull_slope(game, problem, i, a, y, memory, out):
+def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     """Add dpull/dy to out (m,): the estimates stay, so that only own actions count."""
     m = len(y)
     row = memory[i * m : (i + 1) * m]
@@ -194,9 +194,9 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
-def settle(ahead, held):
+def memory_outputs(prediction, held):
     """In mode implicit the memory moves with the outputs of the period's end, as solved for."""
-    copy(ahead, held)
+    copy(prediction, held)
 
 
 @kernel

@@ -12,16 +12,16 @@ and ``now`` (:mod:`gne_mj.controllers.settings`).
 ``storage(problem, memory)``                            the memory's part of the Lyapunov function
 =====================================================  =======================================
 
-and, for mode implicit, in which u = -pull - gain * (gradient of the barrier),
+and, for mode implicit, in which u = -barrier_free - gain * (gradient of the barrier),
 
 ===================================================  =========================================
-``pull(game, problem, i, a, y, memory)``              entry a of agent i's action, but the barrier
-``add_pull_slope(game, problem, i, a, y, memory,      adds dpull/dy to out (m,), in entries of
-out)``                                                agents in J_i only; its symmetric part >= 0
-``prepare(problem, first, last, y, memory)``          puts these agents' actions where pull reads
+``barrier_free(game, problem, i, a, y, memory)``      entry a of agent i's action, but the barrier
+``add_barrier_free_slope(game, problem, i, a, y,     adds its dy to out (m,), in entries of
+memory, out)``                                        agents in J_i only; its symmetric part >= 0
+``prepare(problem, first, last, y, memory)``          puts these agents' actions where that reads
 ``own_profile(problem, i, y, memory, profile)``       what agent i's barrier reads, and how much
                                                       its own block moves with its own action
-``settle(ahead, held)``                               may set the outputs (m,) that the memory
+``memory_outputs(prediction, held)``                  may set the outputs (m,) that the memory
                                                       moves with to those of the period's end
 ===================================================  =========================================
 """
@@ -109,7 +109,7 @@ class Law(ABC):
     @property
     def implicit(self) -> bool:
         """Whether its kernels have what mode implicit solves with."""
-        return hasattr(self.kernels, "add_pull_slope")
+        return hasattr(self.kernels, "add_barrier_free_slope")
 
     @property
     @abstractmethod

@@ -104,12 +104,12 @@ def action(game, problem, y, weights, memory, work, u):
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
             barrier = weighted_gradient(game, data, i, a, y, weights)
-            u[a] = -pull(game, problem, i, a, y, memory) - barrier
+            u[a] = -barrier_free(game, problem, i, a, y, memory) - barrier
     return -1
 
 
 @kernel
-def pull(game, problem, i, a, y, memory):
+def barrier_free(game, problem, i, a, y, memory):
     """What drives entry a of agent i's action besides the barrier, its row having y_i (m,)."""
     m = len(y)
     row = memory[i * m : (i + 1) * m]
@@ -127,7 +127,7 @@ def heard(problem, y, memory, i, a):
 
 
 @kernel
-def add_pull_slope(game, problem, i, a, y, memory, out):
+def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     """Add dpull/dy to out (m,): the estimates stay, so that only own actions count."""
     data, graph, m = problem.data, problem.graph, len(y)
     game.add_cost_hessian(data.parameters, i, a, memory[i * m : (i + 1) * m], 1.0, out)
@@ -143,7 +143,7 @@ def own_profile(problem, i, y, memory, profile):
 
 
 @kernel
-def settle(ahead, held):
+def memory_outputs(prediction, held):
     """In mode implicit too the memory moves with the outputs of the period's start."""
 
 

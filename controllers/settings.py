@@ -17,10 +17,10 @@ class Now(Numbers):
     """What holds at an instant: a loop's ``work.now``."""
 
     penalty: float  # rho at this time
-    shell: float  # the first constraint whose g + t is not negative at what the law sees, or -1
-    shell_value: float  # that value
-    dealt: float  # the step up to which faults were dealt with
-    stands: float  # the step that the law's memory belongs to, held modes
+    tightened: float  # the first constraint whose g + t is not negative at what the law sees, or -1
+    tightened_value: float  # that value
+    faults_step: float  # the step up to which faults were dealt with
+    memory_step: float  # the step that the law's memory belongs to, held modes
 
 
 LENGTH_OF_NOW = len(names_of(Now))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import variables, verdicts
+from gne_mj import run_metrics, variables
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.registry import MODES
@@ -87,7 +87,7 @@ class Runs:
     @cached_property
     def worst(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(runs, p) each constraint's greatest g, and when in s."""
-        return verdicts.worst_constraints(self.monitors)
+        return run_metrics.worst_constraints(self.monitors)
 
     @cached_property
     def tightest(self) -> NDArray[np.int64]:
@@ -95,9 +95,9 @@ class Runs:
         return np.argmax(self.worst[0], axis=1)
 
     @cached_property
-    def inputs(self) -> verdicts.Inputs:
+    def inputs(self) -> run_metrics.Inputs:
         """What actuators had to deliver."""
-        return verdicts.inputs(self.monitors)
+        return run_metrics.inputs(self.monitors)
 
     def seen(self, name: str) -> NDArray[np.float64]:
         """(runs,) a number of the monitors."""
@@ -146,8 +146,8 @@ def _rise(runs: Runs) -> Array:
 
 
 def _status(runs: Runs) -> Array:
-    tail = verdicts.tail_distance(runs.time, runs.distance, runs.duration)
-    return verdicts.status(runs.monitors, tail, runs.tolerance)
+    tail = run_metrics.tail_distance(runs.time, runs.distance, runs.duration)
+    return run_metrics.status(runs.monitors, tail, runs.tolerance)
 
 
 def _of_monitor(name: str, entry: str, **about: Any) -> Variable:
@@ -179,7 +179,7 @@ JUDGED = (
         long_name="least -g of each constraint",
     ),
     Variable(
-        "settling_time", ("run",), lambda runs: verdicts.settling_time(runs.time, runs.distance),
+        "settling_time", ("run",), lambda runs: run_metrics.settling_time(runs.time, runs.distance),
         unit="s", long_name="until max |y - y*| stays within 2% of its start",
         panel=Panel("settling time", log=False, worst="max"),
         columns=(  # a run that never settled took longer than any that did

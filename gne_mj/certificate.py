@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import verdicts
+from gne_mj import run_metrics
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
@@ -15,10 +15,10 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
 from gne_mj.registry import MODES
+from gne_mj.run_metrics import EXITS, SUCCESSES, TAIL
 from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
-from gne_mj.verdicts import EXITS, SUCCESSES, TAIL
 
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
@@ -107,7 +107,7 @@ def certify_run(
     known = system.known_equilibrium
     middle = np.nan if known is None else known.action
     distance = np.max(np.abs(action - middle), axis=1)
-    (settled,) = verdicts.settling_time(time, distance[None])
+    (settled,) = run_metrics.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
     if between and monitor.exit == watch.INSIDE:
@@ -171,8 +171,8 @@ def _status(
     end = float(time[-1])
     if interrupted:
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
-    (tail,) = verdicts.tail_distance(time, distance[None], duration)
-    (word,) = verdicts.status(watch.together([monitor]), np.array([tail]), tolerance)
+    (tail,) = run_metrics.tail_distance(time, distance[None], duration)
+    (word,) = run_metrics.status(watch.together([monitor]), np.array([tail]), tolerance)
     if word == "converged":
         return (
             "converged",
@@ -202,9 +202,9 @@ def _exit(system: System, monitor: Any) -> tuple[str, str]:
     if code == watch.DIVERGED:
         return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
     if code == watch.FORCES_LOST:
-        from gne_mj.plants.native_mujoco import lost_words  # late: MuJoCo is slow to import
+        from gne_mj.plants.native_mujoco import lost_text  # late: MuJoCo is slow to import
 
-        return EXITS[code], f"{at} {lost_words(int(value))}"
+        return EXITS[code], f"{at} {lost_text(int(value))}"
     constraint = game.constraint_names[int(monitor.exit_constraint)]
     if code == watch.STEP_TOO_SMALL:
         return (
@@ -285,7 +285,7 @@ def _of_modes(system: System, monitor: Any) -> dict[str, Any]:
 
 def _worst(system: System, monitor: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each constraint's greatest value and when, that at an exit included."""
-    worst, when = verdicts.worst_constraints(watch.together([monitor]))
+    worst, when = run_metrics.worst_constraints(watch.together([monitor]))
     return worst[0], when[0]
 
 
@@ -375,7 +375,7 @@ def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:
 
 
 def _actuators(system: System, monitor: Any) -> dict[str, Any]:
-    peak, when, rms, energy = (each[0] for each in verdicts.inputs(watch.together([monitor])))
+    peak, when, rms, energy = (each[0] for each in run_metrics.inputs(watch.together([monitor])))
     agent = system.game.agent_of_action
     largest = int(np.argmax(peak))
     limits = system.agents.input_limit
@@ -394,7 +394,7 @@ def _actuators(system: System, monitor: Any) -> dict[str, Any]:
         result["saturated"] = {
             "agent": int(agent[index]) + 1,
             "time": float(monitor.saturated_time),
-            "demand": float(monitor.saturated_demand),
+            "demand": float(monitor.saturated_command),
             "limit": float(limits_at(system, float(monitor.saturated_time))[index]),
         }
     return result

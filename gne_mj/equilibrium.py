@@ -20,7 +20,7 @@ from gne_mj import interior_point as method
 from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game import Game
-from gne_mj.interior_point import Free, Iterate, Path, Work
+from gne_mj.interior_point import Free, Iterate, NewtonScratch, Path
 from gne_mj.plain import forgive_pending, raise_pending
 
 TOLERANCE = 1e-12
@@ -139,17 +139,17 @@ def middle(game: Game, y: ArrayLike) -> NDArray[np.float64]:
     return _solver(game).middle(y)
 
 
-_SOLVERS: WeakKeyDictionary[Game, "Solver"] = WeakKeyDictionary()
+_SOLVERS: WeakKeyDictionary[Game, "EquilibriumSolver"] = WeakKeyDictionary()
 
 
-def _solver(game: Game) -> "Solver":
+def _solver(game: Game) -> "EquilibriumSolver":
     found = _SOLVERS.get(game)
     if found is None:
-        found = _SOLVERS.setdefault(game, Solver(game))
+        found = _SOLVERS.setdefault(game, EquilibriumSolver(game))
     return found
 
 
-class Solver:
+class EquilibriumSolver:
     """The interior-point method prepared for one game: its unknowns' order, and memory to work in.
 
     The functions of this module keep one for each game. Threads may share it: a lock lets one in
@@ -179,7 +179,7 @@ class Solver:
         self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
         self._direction, self._found = np.zeros(m), np.zeros(lines.COUNT)
         entries = len(game.actions_in_constraints[1])
-        self._work = Work(
+        self._work = NewtonScratch(
             trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
             g=np.zeros(p),
             size=np.zeros(p),

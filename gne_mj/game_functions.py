@@ -15,7 +15,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gne_mj.native import address_in, call_integer, call_number, callback, kernel, source_key
-from gne_mj.table import floats_at, integers_at
+from gne_mj.parameter_block import floats_at, integers_at
 
 _COST, _GRADIENT, _ROW, _CONSTRAINT, _SLOPE, _CURVATURE = range(6)
 _EVALUATE, _VALUES, _GRADIENTS, _SLOPES = range(6, 10)

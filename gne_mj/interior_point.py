@@ -80,7 +80,7 @@ class Iterate(NamedTuple):
     multipliers: np.ndarray  # (q,) lambda > 0
 
 
-class Work(NamedTuple):
+class NewtonScratch(NamedTuple):
     """Arrays that the method works on; n is the number of free actions."""
 
     trial: Iterate

@@ -14,10 +14,11 @@ single numbers that change are declared together (:mod:`gne_mj.numbers`):
         index: Annotated[np.ndarray, "m", int]
 
 A field that is a record itself stands for its arrays; one that is a plain number is given by
-whoever reads. :func:`in_array` lays a record of floats out in one flat array, :func:`in_table`
-finds one in a table (:mod:`gne_mj.table`). Both write the kernels that a hand would write, so that
-neither compiling nor running costs more. For Python :func:`dtype_of` is the same layout as NumPy
-knows it, and :func:`by_name` the view of flat arrays by it.
+whoever reads. :func:`in_array` lays a record of floats out in one flat array,
+:func:`in_parameter_block` finds one in a parameter block (:mod:`gne_mj.parameter_block`). Both
+write the kernels that a hand would write, so that neither compiling nor running costs more. For
+Python :func:`dtype_of` is the same layout as NumPy knows it, and :func:`by_name` the view of flat
+arrays by it.
 """
 
 import ast
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 
 from gne_mj.native import kernel, shaped
 from gne_mj.numbers import Numbers, are_whole, flat, names_of, numbers, numbers_in
-from gne_mj.table import floats, integers
+from gne_mj.parameter_block import floats, integers
 
 
 class Field(NamedTuple):
@@ -221,47 +222,52 @@ def _laid(
 
 
 def columns_in(record: Any, first: int) -> Callable[..., Any]:
-    """The kernel ``read(table)`` of a record's arrays, flat whatever their shapes."""
-    given = ", ".join(f"floats(table, {first + at})" for at in range(count(record)))
+    """The kernel ``read(parameter block)`` of a record's arrays, flat whatever their shapes."""
+    given = ", ".join(f"floats(parameter_block, {first + at})" for at in range(count(record)))
     read: Callable[..., Any] = _define(
-        record, ["def read(table):", f"    return record({given})"], {}
+        record, ["def read(parameter_block):", f"    return record({given})"], {}
     )["read"]
     return read
 
 
-def in_table(record: Any, first: int = 0, **known: Any) -> Callable[..., Any]:
-    """The kernel that reads a record from a table.
+def in_parameter_block(record: Any, first: int = 0, **known: Any) -> Callable[..., Any]:
+    """The kernel that reads a record from a parameter block.
 
     Args:
         record: which; in its arrays' shapes ``n`` is the number of entries of the array itself.
-        first: the place of its first array in the table.
+        first: the place of its first array in the parameter block.
         known: constants that its shapes use.
 
     Returns:
-        ``read(table, *numbers)``, the numbers being the record's fields that are no arrays, and
-        those that its shapes depend on, by name in alphabetical order.
+        ``read(parameter block, *numbers)``, the numbers being the record's fields that are no
+        arrays, and those that its shapes depend on, by name in alphabetical order.
     """
     lines: list[str] = []
     asked: set[str] = set()
     names = dict(known)
     result = _read(record, first, lines, asked, names)
     given = "".join(f", {name}" for name in sorted(asked - set(known)))
-    head = f"def read(table{given}):"
+    head = f"def read(parameter_block{given}):"
     made = _define(record, [head, *lines, f"    return {result}"], names)
     read: Callable[..., Any] = made["read"]
     return read
 
 
 def in_numbers(record: Any, at: int, first: int = 0) -> Callable[..., Any]:
-    """The kernel ``read(table)`` of a record of whole numbers, in one array of a table.
+    """The kernel ``read(parameter block)`` of a record of whole numbers, in one array of a
+    parameter block.
 
     Args:
         record: which.
-        at: the array's place in the table.
+        at: the array's place in the parameter block.
         first: the entry that it begins with.
     """
     given = ", ".join(f"n[{first + entry}]" for entry in range(len(record._fields)))
-    lines = ["def read(table):", f"    n = integers(table, {at})", f"    return record({given})"]
+    lines = [
+        "def read(parameter_block):",
+        f"    n = integers(parameter_block, {at})",
+        f"    return record({given})",
+    ]
     read: Callable[..., Any] = _define(record, lines, {})["read"]
     return read
 
@@ -274,7 +280,9 @@ def _read(record: Any, first: int, lines: list[str], asked: set[str], names: dic
     for name, field in fields(record).items():
         if isinstance(field, Field):
             variable = f"array_{at}"
-            lines.append(f"    {variable} = {'integers' if field.whole else 'floats'}(table, {at})")
+            lines.append(
+                f"    {variable} = {'integers' if field.whole else 'floats'}(parameter_block, {at})"
+            )
             if len(field.extents) > 1:
                 lines.append(f"    n = len({variable})")
                 lines.append(f"    {variable}_ = shaped({variable}, ({field.shape}))")
@@ -285,7 +293,7 @@ def _read(record: Any, first: int, lines: list[str], asked: set[str], names: dic
         elif _are_numbers(field):
             names[f"numbers_{at}"] = numbers_in(field)
             item = "integers" if are_whole(field) else "floats"
-            given.append(f"numbers_{at}({item}(table, {at}), 0)")
+            given.append(f"numbers_{at}({item}(parameter_block, {at}), 0)")
             at += 1
         elif field is None:
             asked.add(name)
@@ -293,7 +301,7 @@ def _read(record: Any, first: int, lines: list[str], asked: set[str], names: dic
         else:
             given.append(_read(field, at, lines, asked, names))
             at += count(field)
-    asked.discard("table")
+    asked.discard("parameter_block")
     return f"{kind}({', '.join(given)})"
 
 

@@ -17,10 +17,10 @@ from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
+from gne_mj.run_metrics import check_numbers
 from gne_mj.system import Clock, System
-from gne_mj.trajectory import Part, Trajectory, joined, variables_of_parts
+from gne_mj.trajectory import SystemRecord, Trajectory, joined, variables_of_parts
 from gne_mj.variables import Rows, Variable, changed, check_names, declared
-from gne_mj.verdicts import check_numbers
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
 _CHUNK, _FIRST = 0.1, 10_000
@@ -236,7 +236,7 @@ class SystemRun:
         self.wall_time = 0.0
         self._due: int | None = None  # the step at which the next row is recorded; None: at once
         self._pushes: list[tuple[int, float, int]] = []  # output, force, until which step
-        self._recorded: list[Part] = []
+        self._recorded: list[SystemRecord] = []
 
     @property
     def inside(self) -> bool:
@@ -285,7 +285,7 @@ class SystemRun:
         rows = self.loop.advance(samples, stride)
         raise_pending()
         steps = now + stride * np.arange(len(rows.input), dtype=np.float64)
-        self._recorded.append(Part(self.system, steps * self.clock.timestep, rows))
+        self._recorded.append(SystemRecord(self.system, steps * self.clock.timestep, rows))
         self._due = now + samples * every
         return now + samples * stride
 
@@ -335,7 +335,7 @@ class SystemRun:
     def change(self, system: System) -> None:
         """See :meth:`Simulation.change`."""
         self.loop.adopt(system.setup(self.clock))
-        self.loop.keeps = system
+        self.loop.kept_alive = system
         self.system = system
         self._shown = _shown(system)
 
@@ -355,10 +355,10 @@ class SystemRun:
 
     def part(
         self, tolerance: float, interrupted: bool, intervened: bool
-    ) -> tuple[list[Part], Certificate]:
+    ) -> tuple[list[SystemRecord], Certificate]:
         """What was recorded, the present state being the last row, and what it shows."""
         self._forget_last()
-        last = Part(self.system, np.array([self.loop.time]), self.loop.finish())
+        last = SystemRecord(self.system, np.array([self.loop.time]), self.loop.finish())
         raise_pending()
         self._recorded.append(last)
         self._due = None
@@ -389,7 +389,7 @@ class SystemRun:
             return
         last = self._recorded[-1]
         if len(last.time) and last.time[-1] >= self.loop.time:
-            self._recorded[-1] = Part(last.system, last.time[:-1], last.samples.first(-1))
+            self._recorded[-1] = SystemRecord(last.system, last.time[:-1], last.samples.first(-1))
 
 
 def _shown(system: System) -> list[Variable]:

@@ -22,7 +22,7 @@ from gne_mj.errors import InvalidInput, part_of
 from gne_mj.game import Game
 from gne_mj.margins import of_the_set
 from gne_mj.optimality import FLAT, Optimality, examine
-from gne_mj.summary import bounds_in_words
+from gne_mj.summary import bounds_text
 from gne_mj.system import System
 
 # A gain up to so many times the variational equilibrium's own rho is one by rounding.
@@ -242,7 +242,7 @@ def summary(solution: Solution) -> list[str]:
             f"    {'multipliers':16} {_listed(point.equilibrium.multipliers)}",
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
-            f" {bounds_in_words(epsilon)}",
+            f" {bounds_text(epsilon)}",
             f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
         ]
     active = [

@@ -31,7 +31,7 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
     if epsilon["measured"] is not None:
         rows["epsilon"] = (
             f"{epsilon['measured']:.3g} measured at the penalised equilibrium;"
-            f" {bounds_in_words(epsilon)}"
+            f" {bounds_text(epsilon)}"
         )
     return rows
 
@@ -85,7 +85,7 @@ def _held_inputs(implicit: dict[str, Any]) -> str:
     return text
 
 
-def bounds_in_words(bounds: dict[str, Any]) -> str:
+def bounds_text(bounds: dict[str, Any]) -> str:
     """:func:`gne_mj.epsilon.epsilon_bounds` as part of a sentence on epsilon."""
     if bounds["refuted"] is not None:
         return f"no bound, since the lemma does not hold: {bounds['refuted']}"

@@ -22,9 +22,9 @@ from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
 from gne_mj.files import written
 from gne_mj.loops.base import Samples
+from gne_mj.run_metrics import SUCCESSES
 from gne_mj.system import System
 from gne_mj.variables import Labelled, coordinates_of, declared, variables_of
-from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray
@@ -43,7 +43,7 @@ _ORDER = (
 
 
 @dataclass(frozen=True)
-class Part:
+class SystemRecord:
     """What a system recorded while its numbers stayed the same.
 
     Attributes:
@@ -56,21 +56,21 @@ class Part:
     time: NDArray[np.float64]
     samples: Samples
 
-    def thinned(self, every: int) -> "Part":
+    def thinned(self, every: int) -> "SystemRecord":
         """Every so many-th sample."""
-        return Part(self.system, self.time[::every], self.samples.thinned(every))
+        return SystemRecord(self.system, self.time[::every], self.samples.thinned(every))
 
 
-def joined(parts: Sequence[Part]) -> list[Part]:
+def joined(parts: Sequence[SystemRecord]) -> list[SystemRecord]:
     """Parts of one system that follow each other made one."""
-    groups: list[list[Part]] = []
+    groups: list[list[SystemRecord]] = []
     for part in parts:
         if groups and groups[-1][-1].system is part.system:
             groups[-1].append(part)
         else:
             groups.append([part])
     return [
-        Part(
+        SystemRecord(
             group[0].system,
             np.concatenate([part.time for part in group]),
             Samples.join([part.samples for part in group]),
@@ -99,7 +99,7 @@ class Trajectory:
     @classmethod
     def from_parts(
         cls,
-        parts: dict[str, tuple[list[Part], Certificate]],
+        parts: dict[str, tuple[list[SystemRecord], Certificate]],
         *,
         seed: int,
         source: str,
@@ -223,7 +223,7 @@ def _worst(statuses: Iterable[str]) -> str:
     return min(statuses, key=_ORDER.index)
 
 
-def variables_of_parts(parts: Sequence[Part]) -> Labelled:
+def variables_of_parts(parts: Sequence[SystemRecord]) -> Labelled:
     """The same of parts one after the other; what has no time is that of the last numbers."""
     found = [variables_of(part.system, part.time, part.samples) for part in parts]
     variables = found[-1]
@@ -234,7 +234,7 @@ def variables_of_parts(parts: Sequence[Part]) -> Labelled:
     return variables
 
 
-def _dataset(parts: list[Part], certificate: Certificate) -> "xarray.Dataset":
+def _dataset(parts: list[SystemRecord], certificate: Certificate) -> "xarray.Dataset":
     """The dataset of a system."""
     import xarray
 

@@ -351,12 +351,12 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     _quantities,
     _memory,
     Variable(
-        "measurement", ("time", AXIS), lambda rows: rows.samples.seen, there=_is_faulty,
+        "measurement", ("time", AXIS), lambda rows: rows.samples.measurement, there=_is_faulty,
         unit=_action_unit, long_name="outputs as the law read them for the input of that time",
         instant=False,
     ),
     Variable(
-        "acting_input", ("time", AXIS), lambda rows: rows.samples.acts, there=_is_faulty,
+        "acting_input", ("time", AXIS), lambda rows: rows.samples.applied, there=_is_faulty,
         unit=input_unit, long_name="input with the faults' pushes, as it moved the plant",
         instant=False,
     ),

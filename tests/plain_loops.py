@@ -12,7 +12,7 @@ from gne_mj.loops import functions, implicit, layout
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import inside, work
 from gne_mj.loops.newton import solver_in
-from gne_mj.plants import held_map
+from gne_mj.plants import zero_order_hold
 from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
 
@@ -21,7 +21,7 @@ class Parts(NamedTuple):
     """What the kernels of a system are given."""
 
     problem: Any
-    table: Any  # which the problem knows by its address
+    parameter_block: Any  # which the problem knows by its address
     channels: Any
     clock: Any
     work: Any
@@ -36,7 +36,7 @@ class Instants(NamedTuple):
     y: np.ndarray
     u: np.ndarray
     memory: np.ndarray
-    seen: np.ndarray
+    measurement: np.ndarray
     monitor: np.ndarray
 
 
@@ -48,16 +48,18 @@ def parts_of(system, timing):
     solver = solver_in(scratch.solver, setup.problem.order, p, states)
     kind = system.agents.kind
     channels = Channels(system.agents.parameters, setup.rest, compiled_functions(kind), kind.OUTPUT)
-    problem, table = layout.problem_and_table(setup, system.agents, len(system.loop_memory))
+    problem, parameter_block = layout.problem_and_parameter_block(
+        setup, system.agents, len(system.loop_memory)
+    )
     monitor, clock = watch.fresh(m, p), setup.clock
     loop = layout.Parts(problem, channels, clock, monitor, monitor, np.zeros(m), scratch)
-    return Parts(problem, table, channels, clock, scratch, monitor, solver, loop)
+    return Parts(problem, parameter_block, channels, clock, scratch, monitor, solver, loop)
 
 
-def run_plain(system, timing, periods, plant=held_map):
+def run_plain(system, timing, periods, plant=zero_order_hold):
     """So many control periods in mode implicit, from the start on, ``plant`` predicting."""
     parts, faults = parts_of(system, timing), system.fault_kernels
-    problem, _table, channels, clock, scratch, monitor, _solver, loop = parts
+    problem, _parameter_block, channels, clock, scratch, monitor, _solver, loop = parts
     state, memory = system.state.ravel().copy(), system.loop_memory.copy()
     rows = []
     for k in range(periods):
@@ -72,7 +74,7 @@ def run_plain(system, timing, periods, plant=held_map):
         before = memory.copy()
         assert implicit.act(faults, plant, (), loop, at, state, memory)
         faults.deliver(problem, clock, step, scratch)
-        row = (scratch.y, scratch.u, before, scratch.seen)
+        row = (scratch.y, scratch.u, before, scratch.measurement)
         rows.append([array.copy() for array in row])
         plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))
     return Instants(*map(np.array, zip(*rows, strict=True)), monitor)

@@ -2,15 +2,22 @@
 
 from gne_mj.controllers.full_information import (
     action,
-    add_pull_slope,
+    add_barrier_free_slope,
+    barrier_free,
+    memory_outputs,
     prepare,
     propagate,
-    pull,
     rate,
-    settle,
     storage,
 )
 
 __all__ = [
-    "action", "add_pull_slope", "prepare", "propagate", "pull", "rate", "settle", "storage",
-]  # fmt: skip
+    "action",
+    "add_barrier_free_slope",
+    "barrier_free",
+    "memory_outputs",
+    "prepare",
+    "propagate",
+    "rate",
+    "storage",
+]

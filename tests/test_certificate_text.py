@@ -4,10 +4,10 @@ from importlib import import_module
 
 import pytest
 
-from gne_mj.summary import bounds_in_words
+from gne_mj.summary import bounds_text
 from gne_mj.theory.theorem import CONDITIONAL
 
-words = import_module("gne_mj.theory.words")  # the function of this name hides the module
+words = import_module("gne_mj.theory.report_text")  # the function of this name hides the module
 
 
 def constants(**changes):
@@ -278,4 +278,4 @@ def test_a_search_for_periods_says_what_it_found(inside, outside, text):
 )
 def test_bounds_on_epsilon_are_told(changes, text):
     bounds = {"refuted": None, "bound": 0.5, "of_margin": 0.0, "largest_own_bound": 0.25}
-    assert bounds_in_words(bounds | changes).startswith(text)
+    assert bounds_text(bounds | changes).startswith(text)

@@ -15,7 +15,7 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.system import System
-from gne_mj.theory import Slopes, Theorem, certify, words
+from gne_mj.theory import Slopes, Theorem, certify, report_text
 from gne_mj.theory.constants import told
 from gne_mj.theory.convexity import convex_constraints, counterexample
 
@@ -244,13 +244,13 @@ def test_sampled_constants_are_told_as_what_they_are():
     assert (theta["label"], theta["told"]) == ("sampled", "at least")
     assert 10.0 < theta["value"] <= 13.0 + 1e-6
     assert report.to_dict()["constants"]["c_lambda_2_needed"] == {"printed": None, "rigorous": None}
-    text = "\n".join(words(report))
+    text = "\n".join(report_text(report))
     assert "if partial" not in text
     assert re.search(r"mu +1[.\d]* \(sampled, at most\)", text)
     assert re.search(r"theta_1 +1\d[.\d]* \(sampled, at least\)", text)
     bounded = certify(osnr_system(integrators(10), FullInformation(), 0.1), STEP)
     assert bounded.constants["mu"]["told"] == "at least"
-    assert "(bounded, at least; sampled 0.14" in "\n".join(words(bounded))
+    assert "(bounded, at least; sampled 0.14" in "\n".join(report_text(bounded))
 
 
 def test_bounds_that_samples_contradict_are_not_relied_upon():

@@ -262,10 +262,10 @@ def test_a_first_step_that_ends_the_run_otherwise_is_no_matter_of_its_length():
 # --------------------------------------------------------------- pieces of a step, as plain Python
 
 
-def room_for_pieces(m, p):
+def workspace_for_pieces(m, p):
     """Those arrays of a loop's that pieces are judged by."""
     return SimpleNamespace(
-        y=np.zeros(m), g=np.zeros(p), u=np.zeros(m), demand=np.zeros(m),
+        y=np.zeros(m), g=np.zeros(p), u=np.zeros(m), commanded=np.zeros(m),
         division=numbers(division.Division), stages=fresh(division.Stages, m=m, p=p),
     )  # fmt: skip
 
@@ -278,7 +278,7 @@ def test_pieces_fill_their_steps_whatever_fails(guarded, outcomes):
     """Each begins to the bit where the one before ended, on the grid of its own length."""
     h, step = 0.007, 3
     problem = SimpleNamespace(settings=np.full(settings_of_laws.COUNT, float(guarded)))
-    work, monitor = room_for_pieces(1, 1), watch.fresh(1, 1)
+    work, monitor = workspace_for_pieces(1, 1), watch.fresh(1, 1)
     divided, time = work.division, step * h
     for outcome in outcomes:
         length, level = division.piece(divided, h), divided.level
@@ -306,7 +306,7 @@ def test_pieces_fill_their_steps_whatever_fails(guarded, outcomes):
 
 def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
     problem = SimpleNamespace(settings=np.zeros(settings_of_laws.COUNT))
-    work, monitor = room_for_pieces(1, 1), watch.fresh(1, 1)
+    work, monitor = workspace_for_pieces(1, 1), watch.fresh(1, 1)
     work.division.level = division.FINEST
     stood = 0
     while True:
@@ -322,7 +322,7 @@ def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
 
 def test_a_slack_is_used_up_by_stages_too():
     """Three quarters at the second stage, none at the end; and twice as much at the third."""
-    work = room_for_pieces(1, 2)
+    work = workspace_for_pieces(1, 2)
     problem = SimpleNamespace(data=SimpleNamespace(tightening=np.array([0.0, 0.5])))
     stages = work.stages
     stages.g[:] = [-1.0, -1.5, -0.25, -1.5, -1.0, -2.5, -1.0, -1.5]  # stage by stage
@@ -334,7 +334,7 @@ def test_a_slack_is_used_up_by_stages_too():
 
 def test_sizes_are_those_that_the_start_shows():
     """At least what is given; rounding and errors are measured by them."""
-    work = room_for_pieces(3, 2)
+    work = workspace_for_pieces(3, 2)
     problem = SimpleNamespace(
         data=SimpleNamespace(tightening=np.array([0.0, 0.5])), size=np.array([1.0, 0.25, 4.0])
     )
@@ -348,7 +348,7 @@ def piece_of(rate, g, y, h):
     """What division.judge says of one Runge-Kutta piece of y' = rate(y) with constraints g."""
     y = np.asarray(y, dtype=float)
     m, p = len(y), len(g(y))
-    work = room_for_pieces(m, p)
+    work = workspace_for_pieces(m, p)
     data = SimpleNamespace(
         tightening=np.zeros(p), member_pointer=m * np.arange(p + 1),
         member_index=np.tile(np.arange(m), p), offsets=np.arange(m + 1),

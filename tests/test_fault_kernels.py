@@ -108,14 +108,14 @@ def test_outputs_are_read_with_noise_and_bias_while_they_last():
         for r in (0, 2):
             error[r] += 0.02 * (2 * random(0, r, k) - 1) if 1 <= k < 3 else 0.0
         error[1] -= 0.05 if k >= 2 else 0.0
-        assert found.seen[k] - found.y[k] == pytest.approx(error, abs=1e-12)
+        assert found.measurement[k] - found.y[k] == pytest.approx(error, abs=1e-12)
 
 
 def test_actuators_deliver_the_least_of_their_limits():
     weak = Saturation(limit=0.5, agents=(0, 1), start=0.01, end=0.03)
     weaker = Saturation(limit=0.25, agents=(1,), start=0.02)
     parts = parts_of(struck(weak, weaker, limit=2.0), clock(H))
-    parts.work.demand[:] = [-3.0, 3.0, 3.0, -3.0, 1.0]
+    parts.work.commanded[:] = [-3.0, 3.0, 3.0, -3.0, 1.0]
     for step, expected in (
         (0, [-2.0, 2.0, 2.0, -2.0, 1.0]), (1, [-0.5, 0.5, 2.0, -2.0, 1.0]),
         (2, [-0.5, 0.25, 2.0, -2.0, 1.0]), (3, [-2.0, 0.25, 2.0, -2.0, 1.0]),
@@ -133,10 +133,10 @@ def test_pushes_have_their_courses():
         Push(agents=(0, 4), force=0.5),
     )
     parts = parts_of(struck(*pushes), clock(0.1))
-    u, acts = np.arange(5.0), np.zeros(5)
+    u, applied = np.arange(5.0), np.zeros(5)
     for step in range(5):
-        got = native.push(parts.problem, parts.clock, step, u, acts)
-        assert got is acts
+        got = native.push(parts.problem, parts.clock, step, u, applied)
+        assert got is applied
         time, on = 0.1 * step, step >= 1
         expected = [
             0.5 + (2.0 if 1 <= step < 3 else 0.0),
@@ -145,7 +145,7 @@ def test_pushes_have_their_courses():
             2.0 * (2 * random(3, 3, step) - 1),
             0.5,
         ]
-        assert acts - u == pytest.approx(np.array(expected), abs=1e-6)
+        assert applied - u == pytest.approx(np.array(expected), abs=1e-6)
     assert u.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 

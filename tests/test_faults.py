@@ -80,25 +80,25 @@ def test_pushes_noise_and_limits_against_a_loop_in_plain_python():
         for k in range(60):
             time, y = k * H, plant.output
             noise = [0.01 * (2 * native.uniform(5, 4, i, k) - 1) for i in range(5)]
-            seen = y + noise
+            measurement = y + noise
             if time >= 0.2 - 1e-9:
-                seen[3] -= 0.02
-            u = reference.full_information(GAME, RHO, seen)
+                measurement[3] -= 0.02
+            u = reference.full_information(GAME, RHO, measurement)
             if time < 0.25 - 1e-9:
                 u[0] = np.clip(u[0], -2.5, 2.5)
-            acts = u.copy()
+            applied = u.copy()
             if 0.1 - 1e-9 <= time < 0.3 - 1e-9:
-                acts[1] += 2.0
-            acts[1:3] += 1.5 * np.sin(2 * np.pi * (time + 5e-10) / 0.25)
+                applied[1] += 2.0
+            applied[1:3] += 1.5 * np.sin(2 * np.pi * (time + 5e-10) / 0.25)
             if time >= 0.05 - 1e-9:
                 half = int(np.floor(2 * (time - 0.05) / 0.1 + 1e-9))
-                acts += -1.0 if half % 2 == 0 else 1.0
-            acts[4] += 3.0 * (2 * native.uniform(5, 3, 4, k) - 1)
+                applied += -1.0 if half % 2 == 0 else 1.0
+            applied[4] += 3.0 * (2 * native.uniform(5, 3, 4, k) - 1)
             assert np.allclose(recorded.state[k, :, 1], y, rtol=0, atol=1e-12)
-            assert np.allclose(recorded.seen[k], seen, rtol=0, atol=1e-12)
+            assert np.allclose(recorded.measurement[k], measurement, rtol=0, atol=1e-12)
             assert np.allclose(recorded.input[k], u, rtol=0, atol=1e-11)
-            assert np.allclose(recorded.acts[k], acts, rtol=0, atol=1e-11)
-            plant.step(acts)
+            assert np.allclose(recorded.applied[k], applied, rtol=0, atol=1e-11)
+            plant.step(applied)
 
 
 def test_a_run_repeats_by_its_seed_however_it_is_cut():
@@ -121,7 +121,7 @@ def test_late_sensors(delay):
     y = recorded.state[:, :, 1]
     for k in range(40):
         old = y[max(k - delay, 0)]
-        assert np.array_equal(recorded.seen[k], old)
+        assert np.array_equal(recorded.measurement[k], old)
         assert np.allclose(recorded.input[k], reference.full_information(GAME, RHO, old))
 
 
@@ -132,7 +132,7 @@ def test_mode_implicit_is_not_deceived_by_a_known_delay():
         ahead = recorded.state[steps::steps, :, 1]
         expected = [reference.full_information(GAME, RHO, y) for y in ahead]
         assert np.allclose(recorded.input[: len(ahead) * steps : steps], expected, atol=1e-6)
-        assert np.array_equal(recorded.seen[4 * steps], recorded.state[2 * steps, :, 1])
+        assert np.array_equal(recorded.measurement[4 * steps], recorded.state[2 * steps, :, 1])
 
 
 def exchange_oracle(system, periods, seed, loss, delay, silent):
@@ -214,7 +214,7 @@ def test_engines_agree_under_all_faults(mode):
     law = PartialInformation(graphs.ring(5), 2.0, 0.5)
     ode, _ = record(struck(*faults, law=law, mode=mode), 60, control=2 * H)
     mujoco, _ = record(struck(*faults, law=law, mode=mode, engine="mujoco"), 60, control=2 * H)
-    for name in ("state", "input", "memory", "seen", "acts"):
+    for name in ("state", "input", "memory", "measurement", "applied"):
         assert np.allclose(getattr(ode, name), getattr(mujoco, name), rtol=0, atol=1e-8), name
 
 
@@ -227,10 +227,10 @@ def test_continuous_runs_record_what_was_seen_at_the_start_of_a_step(engine):
     recorded, _ = record(system, 30)
     with np.errstate(over="ignore"):
         noise = [[0.01 * (2 * native.uniform(2, 0, i, k) - 1) for i in range(5)] for k in range(30)]
-    assert np.allclose(recorded.seen, recorded.state[:, :, 1] + noise, rtol=0, atol=1e-12)
-    expected = [reference.full_information(GAME, RHO, y) for y in recorded.seen]
+    assert np.allclose(recorded.measurement, recorded.state[:, :, 1] + noise, rtol=0, atol=1e-12)
+    expected = [reference.full_information(GAME, RHO, y) for y in recorded.measurement]
     assert np.allclose(recorded.input, expected, rtol=0, atol=1e-10)
-    assert np.allclose(recorded.acts, recorded.input + 1.0)
+    assert np.allclose(recorded.applied, recorded.input + 1.0)
 
 
 def test_the_trajectory_tells_what_the_law_saw():
@@ -310,9 +310,9 @@ def test_what_the_sensors_say_is_what_the_memory_moves_with():
         recorded, _ = record(system, 100)
         rows = recorded.memory[-1, :25].reshape(5, 5)
         others = np.delete(rows[:, 2], 2)
-        seen, y = recorded.seen[-1, 2], recorded.state[-1, 2, 1]
-        assert seen == pytest.approx(y + 0.3)
-        assert np.max(np.abs(others - seen)) < 0.1 < np.min(np.abs(others - y)), mode
+        measurement, y = recorded.measurement[-1, 2], recorded.state[-1, 2, 1]
+        assert measurement == pytest.approx(y + 0.3)
+        assert np.max(np.abs(others - measurement)) < 0.1 < np.min(np.abs(others - y)), mode
 
 
 @pytest.mark.slow

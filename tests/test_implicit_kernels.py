@@ -20,7 +20,7 @@ from gne_mj.games import velocity_consensus_game
 from gne_mj.loops import implicit, joint, local
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.newton import OUTSIDE
-from gne_mj.plants import held_map, integrator
+from gne_mj.plants import integrator, zero_order_hold
 from gne_mj.system import System
 
 PENALTY = 0.1
@@ -79,9 +79,9 @@ def test_agents_alone_in_the_plane():
     for k in range(4):
         now, after = found.y[k], found.y[k + 1]
         for i in range(3):
-            own, ahead = [2 * i, 2 * i + 1], now.copy()
-            ahead[own] = after[own]
-            expected = [-oracle.partial_gradient(a, ahead) for a in own]
+            own, prediction = [2 * i, 2 * i + 1], now.copy()
+            prediction[own] = after[own]
+            expected = [-oracle.partial_gradient(a, prediction) for a in own]
             expected -= alone(oracle, members, own, now, after)
             assert found.u[k, own] == pytest.approx(expected, abs=1e-6)
     assert found.monitor.unsolved == 0
@@ -114,9 +114,11 @@ def test_a_prediction_that_moves_far_is_checked_where_it_arrives():
 
         def predict(*arguments, h=h):
             maps[h] += 1
-            held_map.predict(*arguments)
+            zero_order_hold.predict(*arguments)
 
-        counted = SimpleNamespace(predict=predict, is_affine=held_map.is_affine, roll=held_map.roll)
+        counted = SimpleNamespace(
+            predict=predict, is_affine=zero_order_hold.is_affine, roll=zero_order_hold.roll
+        )
         system = robot_system(robot_state(FIVE), UNEQUAL, mode="implicit", integrator="euler")
         run_plain(system, clock(h), 1, counted)
     assert maps == {1e-5: 3, 0.1: 4}
@@ -133,7 +135,7 @@ def test_a_known_delay_does_not_deceive_mode_implicit(steps):
     expected = [reference.full_information(GAME, PENALTY, y) for y in found.y[1:]]
     assert found.u[:-1] == pytest.approx(np.array(expected), abs=1e-6)
     for k in range(9):
-        assert np.array_equal(found.seen[k], found.y[max(k - 2, 0)])
+        assert np.array_equal(found.measurement[k], found.y[max(k - 2, 0)])
 
 
 class ShortLaw(FullInformation):
@@ -240,10 +242,10 @@ def test_an_agent_without_an_action_says_at_which_constraint():
     # the ball's three members: looked at three times as far from the anchor
     look = system.start.copy()
     look[:2] += 3.0 * (np.array([1.95, 1.2]) - system.start[:2])
-    assert parts.work.now.shell_value == pytest.approx(look @ look - 4.0)
+    assert parts.work.now.tightened_value == pytest.approx(look @ look - 4.0)
     parts.problem.order.band[1] = 0  # without shares
     residual(0, 1, np.array([1.95, 1.2, 0.5, -0.2]))
-    assert parts.work.now.shell_value == pytest.approx(1.95**2 + 1.2**2 + 0.25 + 0.04 - 4.0)
+    assert parts.work.now.tightened_value == pytest.approx(1.95**2 + 1.2**2 + 0.25 + 0.04 - 4.0)
 
 
 def test_all_agents_without_actions_say_at_which_constraint():
@@ -251,7 +253,7 @@ def test_all_agents_without_actions_say_at_which_constraint():
     outside = np.array([1.95, 1.2, 0.5, -0.2])
     assert not residual(0, 3, outside)[0]
     assert parts.work.now.tightened == 0.0
-    assert parts.work.now.shell_value == pytest.approx(outside @ outside - 4.0)
+    assert parts.work.now.tightened_value == pytest.approx(outside @ outside - 4.0)
 
 
 def test_a_steps_length_is_measured_where_the_agent_looks():
@@ -285,8 +287,8 @@ def test_both_entries_of_an_action_count_in_its_length():
 # ------------------------------------------------------------------------------------- secants
 
 
-def secant_solver(u, held, reached, ahead):
-    arrays = {"u": u, "held": held, "reached": reached, "ahead": ahead}
+def secant_solver(u, held, reached, prediction):
+    arrays = {"u": u, "held": held, "reached": reached, "ahead": prediction}
     return SimpleNamespace(
         **{name: np.array(values, dtype=float) for name, values in arrays.items()},
         slope=np.full(len(u), 0.5), stiff=np.full(len(u), 2.0),
@@ -325,7 +327,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
     ):
         parts = parts_of(system, clock(0.05, 0.05 * steps, 0.05 * steps))
         state, agent = system.state.ravel(), system.agents.kind
-        implicit.find_slopes(held_map, (), parts.channels, parts.clock, state, parts.solver)
+        implicit.find_slopes(zero_order_hold, (), parts.channels, parts.clock, state, parts.solver)
         assert np.all(parts.solver.slope * parts.solver.stiff == pytest.approx(1.0))
         if agent is integrator:
             assert parts.solver.slope == pytest.approx(0.05 * steps)
@@ -333,7 +335,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
         for row, size in zip(reached, (0.0, 1.0), strict=True):
             moved = state.copy()
             u = np.full(len(row), size)
-            held_map.roll(parts.channels, parts.clock, moved, u, np.zeros(20))
+            zero_order_hold.roll(parts.channels, parts.clock, moved, u, np.zeros(20))
             row[:] = moved.reshape(parts.channels.rest.shape)[:, agent.OUTPUT]
         assert parts.solver.slope == pytest.approx(reached[1] - reached[0])
 

@@ -30,7 +30,7 @@ from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.loops.layout import Clock, Setup, problem_and_table
+from gne_mj.loops.layout import LoopClock, Setup, problem_and_parameter_block
 from gne_mj.loops.link import link
 from gne_mj.loops.ode import CONTINUOUS, OdeLoop
 from gne_mj.plants.functions import EULER
@@ -77,8 +77,8 @@ def problem_of(game, law, limit=np.inf):
 
 def tabled(problem, memory):
     """The problem with its table, which has to be kept."""
-    rest, clock = np.zeros((len(problem.limit), 1)), Clock(1.0, 1, CONTINUOUS, EULER)
-    return problem_and_table(
+    rest, clock = np.zeros((len(problem.limit), 1)), LoopClock(1.0, 1, CONTINUOUS, EULER)
+    return problem_and_parameter_block(
         Setup(problem, rest, clock), integrators(len(problem.limit)), len(memory)
     )
 
@@ -86,7 +86,7 @@ def tabled(problem, memory):
 def loop_at(game, law, y, memory, h=2.0**-30):
     """The product's compiled loop of integrators (state y), Euler, at any state and memory."""
     agents = integrators(game.actions)
-    rest, clock = np.zeros((game.actions, 1)), Clock(h, 1, CONTINUOUS, EULER)
+    rest, clock = np.zeros((game.actions, 1)), LoopClock(h, 1, CONTINUOUS, EULER)
     setup = Setup(problem_of(game, law), rest, clock)
     return OdeLoop(agents, setup, y.reshape(-1, 1), memory)
 
@@ -101,7 +101,7 @@ def step(game, law, y, memory):
     assert np.array_equal(first.memory[0], memory)
     u, rate = first.input[0], np.zeros(len(memory))
     assert np.array_equal(loop.finish().state[0, :, 0], y + 2.0**-30 * u)
-    problem, _table = tabled(problem_of(game, law), memory)
+    problem, _parameter_block = tabled(problem_of(game, law), memory)
     functions.rate(problem, y, memory, rate)
     return u, rate
 
@@ -233,7 +233,7 @@ def test_the_five_robots_first_forces():
 def ask(game, law, y, weights, memory):
     """Code, u and the memory's rates by the law's kernels."""
     u, rates = np.full(len(y), np.nan), np.full(len(memory), np.nan)
-    problem, _table = tabled(problem_of(game, law), memory)
+    problem, _parameter_block = tabled(problem_of(game, law), memory)
     scratch = work(len(y), len(weights), game.agents)
     scratch.now.penalty = RHO
     code = functions.action(problem, y, weights, memory, scratch, u)
@@ -326,11 +326,11 @@ def test_a_partial_action_depends_on_what_the_agent_may_see(kind, count, graph):
         measured = sorted({i}.union(*(game.in_constraint[l] for l in shared)))  # noqa: E741
         seen_weights, seen_y = np.full(len(weights), np.nan), np.full(count, np.nan)
         seen_weights[shared], seen_y[measured] = weights[shared], y[measured]
-        seen = np.full((count, count), np.nan)
+        measurement = np.full((count, count), np.nan)
         costly = [j for j in game.in_cost[i] if j != i]
-        seen[i, costly] = estimates[i, costly]
-        seen[heard, i] = estimates[heard, i]
-        other_u, _ = act_partially(game, law, seen_y, seen_weights, seen)
+        measurement[i, costly] = estimates[i, costly]
+        measurement[heard, i] = estimates[heard, i]
+        other_u, _ = act_partially(game, law, seen_y, seen_weights, measurement)
         assert other_u[i] == u[i]
         # and it does depend on each of these
         for j in costly:
@@ -353,10 +353,10 @@ def test_partial_rates_depend_on_neighbours_messages_only(kind, count, graph):
     _, rates = act_partially(game, law, y, unknown, estimates)
     for i in range(count):
         heard = np.flatnonzero(law.graph.laplacian[i] < 0)
-        seen_y, seen = np.full(count, np.nan), np.full((count, count), np.nan)
-        seen_y[heard], seen[heard], seen[i] = y[heard], estimates[heard], estimates[i]
-        seen[heard, i] = np.nan
-        _, other = act_partially(game, law, seen_y, unknown, seen)
+        seen_y, measurement = np.full(count, np.nan), np.full((count, count), np.nan)
+        seen_y[heard], measurement[heard], measurement[i] = y[heard], estimates[heard], estimates[i]
+        measurement[heard, i] = np.nan
+        _, other = act_partially(game, law, seen_y, unknown, measurement)
         assert np.array_equal(other[i], rates[i])
         assert np.all(np.isfinite(other[i]))
 

@@ -40,7 +40,7 @@ from gne_mj.margins import (
 from gne_mj.plants.ode import OdePlant
 from gne_mj.scenario import load_scenario
 from gne_mj.system import Clock, System
-from gne_mj.theory import certify, search_period, search_push, words
+from gne_mj.theory import certify, report_text, search_period, search_push
 
 
 def random_robots(rng, count=5):
@@ -305,12 +305,12 @@ def test_a_scenario_declares_bounds_and_certify_tells_what_they_cost():
         ({"simulation.control_period": 2.0, "margin": {"push": 0.01}}, "dy+/du > 0", "checked"),
     ],
 )  # fmt: skip
-def test_what_is_not_covered_is_named(changes, label, words):
+def test_what_is_not_covered_is_named(changes, label, report_text):
     scenario = load_scenario("velocity-sync", {**MARGIN, **changes})
     (system,) = scenario.system_objects()
     report = certify(system, scenario.clock())
     (condition,) = [c for c in report.held["conditions"] if c["label"] == label]
-    assert words in condition["why"]
+    assert report_text in condition["why"]
     assert condition["status"] != "met"
     assert report.held["promised"] == (condition["status"] == "assumed")
 
@@ -389,7 +389,7 @@ def test_certify_tells_what_the_margin_costs():
     assert bounds["bound"] == pytest.approx(bounds["p_rho"] + lost)
     gains = measured_epsilon(of_the_set(system.game), system.equilibrium.action)
     assert np.max(gains) <= bounds["largest_own_bound"] <= bounds["bound"]
-    assert f"{bounds['bound']:.4g} = p rho" in "\n".join(words(report))
+    assert f"{bounds['bound']:.4g} = p rho" in "\n".join(report_text(report))
 
 
 def test_a_start_within_the_tightening_is_refused():

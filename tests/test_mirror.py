@@ -18,7 +18,7 @@ from PIL import Image
 
 from gne_mj.plants.fleet import compile_model, compose
 from gne_mj.view.mirror import Mirror, rotations, transforms, turn_z_to
-from gne_mj.view.shapes import Group, Part, capsule, coil, material
+from gne_mj.view.shapes import DrawnPart, Group, capsule, coil, material
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "robot"
 
@@ -399,11 +399,11 @@ def test_objects_are_three_js_objects(xml):
 
 def test_equal_parts_of_an_object_are_shared_and_equal_objects_equal():
     ball = ({"type": "SphereGeometry", "radius": 1.0}, material([1, 0, 0, 1]))
-    parts = [Part("a", *ball, np.eye(4)), Part("b", *ball, 2 * np.eye(4))]
+    parts = [DrawnPart("a", *ball, np.eye(4)), DrawnPart("b", *ball, 2 * np.eye(4))]
     scene = Group(parts).lower()
     assert (len(scene["geometries"]), len(scene["materials"])) == (1, 1)
     assert scene == Group(list(parts)).lower()
-    other = Part("b", capsule(0.1, 0.2), material([0, 0, 1, 1]), np.eye(4))
+    other = DrawnPart("b", capsule(0.1, 0.2), material([0, 0, 1, 1]), np.eye(4))
     scene = Group([parts[0], other]).lower()
     assert (len(scene["geometries"]), len(scene["materials"])) == (2, 2)
 

@@ -12,7 +12,7 @@ from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
 from gne_mj.plants.mujoco import MujocoPlant
-from gne_mj.plants.native_mujoco import LOST, check_warnings, lost_words
+from gne_mj.plants.native_mujoco import LOST, check_warnings, lost_text
 from gne_mj.scenario import load_scenario
 
 # A boat that swings a mast against a stop, over a floor of its own
@@ -273,7 +273,7 @@ def test_a_run_ends_where_forces_are_left_out_and_keeps_what_it_had(mode, kind):
     report = kept.reports["robots"]
     assert kept.status == report["status"] == "forces_left_out"
     assert report["end_time"] == pytest.approx(0.4)
-    assert report["message"] == f"at 0.4 s {lost_words(kind)}"
+    assert report["message"] == f"at 0.4 s {lost_text(kind)}"
     times = kept["robots"]["time"].to_numpy()
     assert times[-1] == pytest.approx(0.4)
     assert np.all(np.diff(times) > 0.0)

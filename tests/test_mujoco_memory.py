@@ -12,7 +12,7 @@ from gne_mj.errors import EngineError
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.layout import steps_of
-from gne_mj.loops.mujoco import room_of
+from gne_mj.loops.mujoco import workspace_of
 from gne_mj.plants.native_mujoco import callbacks
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -99,8 +99,9 @@ def test_a_state_that_is_set_again_goes_on_bitwise(information, mode, integrator
         if mode == "sampled":
             assert np.array_equal(other.userdata, loop.plant.data.userdata)
         else:  # but what the loop keeps to divide steps, which MuJoCo alone does not
-            room = room_of(other.userdata, loop.plant.sizes.room, steps_of(loop._table)).loop
-            assert room.monitor == loop.monitor
+            sizes = steps_of(loop._parameter_block)
+            workspace = workspace_of(other.userdata, loop.plant.sizes.workspace, sizes).loop
+            assert workspace.monitor == loop.monitor
 
 
 @LAWS

@@ -28,7 +28,7 @@ from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.layout import LoopClock, Setup
 from gne_mj.loops.link import link
 from gne_mj.loops.ode import SAMPLED, OdeLoop
 from gne_mj.plants.functions import RK4
@@ -137,7 +137,7 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
         law.propagator(period),
         functions=link(law.kernels, game.kernels, memory=True),
     )
-    loop_clock = Clock(period / substeps, substeps, SAMPLED, RK4)
+    loop_clock = LoopClock(period / substeps, substeps, SAMPLED, RK4)
     setup = Setup(problem, np.zeros((10, 1)), loop_clock)
     loop = OdeLoop(integrators(10), setup, y[:, None], memory)
     laplacian = reference.laplacian(10, law.graph.edges)
@@ -243,9 +243,9 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
     peak, peak_time, square, energy, last_y, last_u = (
         monitor[name] for name in ("peak", "peak_time", "square", "energy", "last_y", "last_u")
     )
-    demand = np.array([reference.full_information(game, RHO, row) for row in y])
+    commanded = np.array([reference.full_information(game, RHO, row) for row in y])
     if mode == "sampled":
-        demand = np.repeat(demand[::5], 5, axis=0)[: steps + 1]
+        commanded = np.repeat(commanded[::5], 5, axis=0)[: steps + 1]
         assert np.allclose(square, h * np.sum(u[:-1] ** 2, axis=0), rtol=1e-12)
         means = 0.5 * (y[1:] + y[:-1])
         assert np.allclose(energy, h * np.sum(u[:-1] * means, axis=0), rtol=1e-11, atol=1e-11)
@@ -255,12 +255,12 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
         assert np.allclose(energy, h * np.sum(means_u * means_y, axis=0), rtol=1e-11, atol=1e-11)
         fine = np.trapezoid(u * y, times, axis=0)
         assert np.allclose(energy, fine, rtol=0.02, atol=0.02)
-    magnitude = np.abs(demand)
+    magnitude = np.abs(commanded)
     assert np.allclose(peak, magnitude.max(axis=0), rtol=1e-11)
     assert np.allclose(peak_time, times[magnitude.argmax(axis=0)], rtol=1e-12)
     assert np.array_equal(last_y, y[-1])
     assert np.array_equal(last_u, u[-1])
-    assert np.allclose(u, np.clip(demand, -limit, limit), rtol=1e-10, atol=1e-10)
+    assert np.allclose(u, np.clip(commanded, -limit, limit), rtol=1e-10, atol=1e-10)
 
     over = np.argwhere(magnitude > limit)
     assert monitor.saturated == (len(over) > 0) == (limit < np.inf)
@@ -268,7 +268,7 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
         step, action = over[0]
         assert monitor.saturated_time == pytest.approx(times[step])
         assert monitor.saturated_action == action
-        assert monitor.saturated_demand == pytest.approx(demand[step, action], rel=1e-11)
+        assert monitor.saturated_command == pytest.approx(commanded[step, action], rel=1e-11)
 
     robot = reference_robots(UNEQUAL)
     rest = robot.equilibrium(np.full(5, V0))

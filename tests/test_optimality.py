@@ -23,10 +23,10 @@ from gne_mj.errors import InvalidInput, SolverError, UserCodeError
 from gne_mj.game import Game
 from gne_mj.loops import monitor as watch
 from gne_mj.optimality import examine
+from gne_mj.run_metrics import check_numbers
 from gne_mj.scenario import load_scenario
 from gne_mj.solve import solve_system
 from gne_mj.starts import interior_profile
-from gne_mj.verdicts import check_numbers
 
 HERE = Path(__file__).parent
 # Where the logarithm game's gradient is, after its cost

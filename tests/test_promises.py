@@ -39,7 +39,7 @@ from gne_mj.margins import influence, tightening
 from gne_mj.summary import summary
 from gne_mj.system import System
 from gne_mj.system.first_input import first_input, law_at_start, limits_at
-from gne_mj.theory import Held, Theorem, certify, words
+from gne_mj.theory import Theorem, ZeroOrderHold, certify, report_text
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET
 
 H = 0.01
@@ -108,7 +108,7 @@ def test_a_limit_that_the_start_exceeds_is_told_with_its_factor(mode):
     assert report.inputs["largest_factor"] == pytest.approx(np.max(peaks))
     assert report.status == "not certified"
     assert not report.lyapunov_claimed
-    assert f"{np.max(peaks):.3g} times its limit 1" in "\n".join(words(report))
+    assert f"{np.max(peaks):.3g} times its limit 1" in "\n".join(report_text(report))
     assert any("times its limit" in text for text in report.not_certified)
 
 
@@ -121,7 +121,7 @@ def test_a_limit_that_the_start_keeps_is_a_condition(mode):
     )
     assert "as long as no input limit is met" in report.guaranteed[0]
     assert 0.8 < report.inputs["largest_factor"] < 1.0
-    assert "of a limit; limits of at least" in "\n".join(words(report))
+    assert "of a limit; limits of at least" in "\n".join(report_text(report))
 
 
 def test_only_some_agents_have_limits():
@@ -133,7 +133,7 @@ def test_only_some_agents_have_limits():
     system = System(
         "robots", velocity_game(5, 3.0, 3.0), agents, FullInformation(), 0.1, robot_state(y)
     )
-    assert "agent 3" in Theorem(system).demand.exceeded
+    assert "agent 3" in Theorem(system).commanded_input.exceeded
     assert Theorem(system).status == "not certified"
 
 
@@ -142,7 +142,7 @@ def held(faults=(), decentralised=False, law=None, limit=np.inf, **options):
         limit=limit, mode="implicit", integrator="euler", faults=tuple(faults), law=law,
         decentralised=decentralised, **options,
     )  # fmt: skip
-    return Held(system, clock(H))
+    return ZeroOrderHold(system, clock(H))
 
 
 def condition(found, label):
@@ -171,7 +171,7 @@ def test_a_period_that_no_run_may_have_has_no_first_input():
     assert np.all(np.isnan(first_input(system, clock(H, 10.0, 4.2, 4.2))))
     report = certify(system, clock(H, 10.0, 4.2, 4.2))
     assert report.to_dict()["inputs"]["largest"] is None
-    assert "has none" in "\n".join(words(report))
+    assert "has none" in "\n".join(report_text(report))
     assert report.status == "not certified"
 
 
@@ -240,7 +240,7 @@ def test_the_largest_push_counts_what_sensors_do_besides():
             "robots", game, agents, FullInformation(), 0.1, robot_state(np.full(5, 3.0)),
             mode="implicit", integrator="euler", faults=faults,
         )  # fmt: skip
-        each.append(Held(system, clock(H, 1.0, steps * H)).largest_push())
+        each.append(ZeroOrderHold(system, clock(H, 1.0, steps * H)).largest_push())
     assert each[0] == pytest.approx(2.0)
     assert 0.0 < each[1] < 2.0
     assert 0.0 < each[2] < 1.0

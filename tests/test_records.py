@@ -9,9 +9,10 @@ import pytest
 from gne_mj.game import GameData
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.layout import Run, Steps
-from gne_mj.loops.newton import Solver, SolverNumbers, solver_length
+from gne_mj.loops.newton import InputSolver, SolverNumbers, solver_length
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, flat, names_of, numbers, numbers_in
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.records import (
     arrays,
     by_name,
@@ -22,11 +23,10 @@ from gne_mj.records import (
     fresh,
     in_array,
     in_numbers,
-    in_table,
+    in_parameter_block,
     place,
     shapes,
 )
-from gne_mj.table import Table
 
 Array = np.ndarray
 
@@ -119,10 +119,10 @@ def test_numbers_of_a_table_are_read_by_name():
     held = Held(np.zeros(2), numbers(Tick, time=4.0))
     assert (count(Held), place(Held, "tick")) == (2, 1)
     assert flat(held.tick).tolist() == [0.0, 4.0]
-    table, read = Table(arrays(held)), in_table(Held)
+    table, read = ParameterBlock(arrays(held)), in_parameter_block(Held)
     assert numba.njit(lambda address: read(address).tick.time)(table.address) == 4.0
     columns = columns_in(Nested.__annotations__["parts"], 0)
-    pieces = Table([np.arange(6.0), np.arange(9.0), np.zeros(5)])
+    pieces = ParameterBlock([np.arange(6.0), np.arange(9.0), np.zeros(5)])
     assert numba.njit(lambda address: columns(address).grid[8])(pieces.address) == 8.0
 
 
@@ -164,8 +164,8 @@ def test_a_table_is_read_in_the_declarations_order():
     assert (count(Outer), place(Outer, "inner"), place(Outer, "end")) == (4, 1, 3)
     with pytest.raises(KeyError):
         place(Outer, "nothing")
-    table = Table([np.zeros(1), *given])
-    read = in_table(Outer, 1)
+    table = ParameterBlock([np.zeros(1), *given])
+    read = in_parameter_block(Outer, 1)
 
     @numba.njit
     def look(address):
@@ -176,7 +176,7 @@ def test_a_table_is_read_in_the_declarations_order():
 
 
 def test_numbers_are_read_by_name():
-    numbers = Table([np.arange(len(Steps._fields))])
+    numbers = ParameterBlock([np.arange(len(Steps._fields))])
     read = in_numbers(Steps, 0)
     found = numba.njit(lambda address: read(address).output)(numbers.address)
     assert found == Steps._fields.index("output")
@@ -188,16 +188,16 @@ def test_fresh_arrays_have_the_declared_shapes():
     assert fresh(GameData, N=2, m=3, p=4, n=1).offsets.dtype == np.int64
 
 
-@pytest.mark.parametrize("record", [Problem, Run, GameData, Solver])
+@pytest.mark.parametrize("record", [Problem, Run, GameData, InputSolver])
 def test_every_array_of_a_loop_is_declared(record):
     """A field without a shape would be taken for a number that whoever reads gives."""
     numbers = {name for name, field in fields(record).items() if field is None}
-    assert numbers <= {"table"}
+    assert numbers <= {"parameter_block"}
 
 
 def test_the_solvers_length_is_that_of_its_arrays():
     sizes = {"m": 4, "p": 3, "entries": 6, "states": 2, "b": 1}
-    made = fresh(Solver, **sizes)
+    made = fresh(InputSolver, **sizes)
     names = len(names_of(SolverNumbers))
     assert solver_length(*sizes.values()) == names + sum(a.size for a in made[1:])
     assert made.band.shape == (4, 3)

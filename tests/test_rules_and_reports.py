@@ -220,7 +220,7 @@ def test_actuators_tell_the_greatest_demand_and_whose():
     assert found["saturated"] is None
     for time, limit in ((0.5, 7.0), (1.0, 5.0), (1.5, 5.0), (2.0, 7.0)):
         monitor.saturated, monitor.saturated_time = 1.0, time
-        monitor.saturated_action, monitor.saturated_demand = 1, -9.0
+        monitor.saturated_action, monitor.saturated_command = 1, -9.0
         assert certificate._actuators(system, monitor)["saturated"] == {
             "agent": 2, "time": time, "demand": -9.0, "limit": limit,
         }  # fmt: skip

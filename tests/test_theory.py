@@ -34,7 +34,7 @@ from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
 from gne_mj.system import System
-from gne_mj.theory import Slopes, Theorem, certify, search_epsilon, words
+from gne_mj.theory import Slopes, Theorem, certify, report_text, search_epsilon
 from gne_mj.theory.constants import profiles
 from gne_mj.theory.coupling import coupling, least_coupling, needed_connectivity
 from gne_mj.theory.gain import decay_rate, least_beta, required_gain
@@ -580,7 +580,7 @@ def test_a_law_of_ones_own_is_covered_by_no_theorem():
     assert theorem.name is None
     assert theorem.status == "not certified"
     assert not theorem.lyapunov
-    assert "\n".join(words(certify(theorem.system, STEP))).count("nothing") == 1
+    assert "\n".join(report_text(certify(theorem.system, STEP))).count("nothing") == 1
 
 
 def coupled(parameter):
@@ -761,7 +761,7 @@ def test_reports_survive_json_and_become_words(system):
     report = certify(system, STEP)
     document = report.to_dict()
     assert json.loads(json.dumps(document, allow_nan=False)) == document
-    text = words(report)
+    text = report_text(report)
     assert text[0].startswith(f"\n{system.name}: ")
     assert any(line.split() == ["verdict", *report.status.split()] for line in text)
     for heading in ("guaranteed", "only measured", "not certified", "mu"):

@@ -27,7 +27,7 @@ from gne_mj.system import Clock
 from gne_mj.view import html_page, replay_pack, write_html
 from gne_mj.view.html import page_file
 from gne_mj.view.pack import MAGIC, pack, packed_small, unpack
-from gne_mj.view.stage import Stage, shares
+from gne_mj.view.shown_system import ShownSystem, shares
 
 BASED = """<mujoco><worldbody>
   <body name="base"><geom size="0.1"/>
@@ -146,11 +146,11 @@ def test_messages_are_counted_as_the_law_gets_them():
     law = PartialInformation(graphs.ring(5), 1.0, 1.0)
     system = robot_system(robot_state(FIVE), law=law, mode="sampled", faults=(lost, silent))
     clock = Clock(duration=1.0, timestep=0.01, control_period=0.02, sample_period=0.1)
-    stage = Stage(system, clock)
-    links = stage.meta()["links"]
+    shown_system = ShownSystem(system, clock)
+    links = shown_system.meta()["links"]
     assert len(links) == 10
-    assert sorted(map(sorted, links))[::2] == stage.meta()["edges"]
-    found = stage.messages(13, 97)["robots/messages"]
+    assert sorted(map(sorted, links))[::2] == shown_system.meta()["edges"]
+    found = shown_system.messages(13, 97)["robots/messages"]
 
     faults = for_native(system.faults, system.game, law.graph, system.seed)
     plain = np.zeros((10, 2))
@@ -178,12 +178,12 @@ def test_messages_are_counted_as_the_law_gets_them():
 def test_nothing_is_lost_without_faults_and_nothing_counted_in_continuous_time():
     law = PartialInformation(graphs.ring(5), 1.0, 1.0)
     clock = Clock(duration=1.0, timestep=0.01, control_period=0.02, sample_period=0.1)
-    held = Stage(robot_system(robot_state(FIVE), law=law, mode="sampled"), clock)
+    held = ShownSystem(robot_system(robot_state(FIVE), law=law, mode="sampled"), clock)
     assert np.all(held.messages(0, 10)["robots/messages"] == [5, 0])
-    flowing = Stage(robot_system(robot_state(FIVE), law=law), clock)
+    flowing = ShownSystem(robot_system(robot_state(FIVE), law=law), clock)
     assert flowing.meta()["message_period"] is None
     assert flowing.messages(0, 10) == {}
-    measured = Stage(robot_system(robot_state(FIVE)), clock).meta()
+    measured = ShownSystem(robot_system(robot_state(FIVE)), clock).meta()
     assert measured["edges_are"] == "measurements"
     assert measured["edges"] == [[1, 2], [2, 3], [3, 4], [4, 5]]
 

@@ -9,7 +9,7 @@ from batch_plans import ROOT
 from builders import FIVE, V0, distributed, integrators, robot_state, robot_system
 
 from gne_mj import graph as graphs
-from gne_mj import verdicts
+from gne_mj import run_metrics
 from gne_mj.barrier import Schedule
 from gne_mj.batch_variables import declared_figures
 from gne_mj.batches import summary
@@ -59,7 +59,7 @@ def test_of_a_run_that_never_began_nothing_was_the_worst():
         ]
     )  # fmt: skip
     kept = runs.copy()
-    worst, when = verdicts.worst_constraints(runs)
+    worst, when = run_metrics.worst_constraints(runs)
     assert worst.tolist() == [
         [-1, -2, -3], [-np.inf] * 3, [-1, 0.5, -3], [-np.inf, -np.inf, 0.25], [-1, 3, -3],
     ]  # fmt: skip
@@ -68,25 +68,25 @@ def test_of_a_run_that_never_began_nothing_was_the_worst():
     assert np.array_equal(runs, kept), "what was seen stays as it is"
     # an exit below what was seen before does not hide that
     low = run_of(worst=[2, -2, -3], when=[0.1, 0.2, 0.3], EXIT=watch.LEFT_SET, EXIT_VALUE=1.0)
-    worst, when = verdicts.worst_constraints(watch.together([low]))
+    worst, when = run_metrics.worst_constraints(watch.together([low]))
     assert (worst[0, 0], when[0, 0]) == (2.0, 0.1)
 
 
 def test_how_runs_ended():
     runs = watch.together([run_of(EXIT=code) for code in (0, 0, 1, 2, 3)])
-    found = verdicts.status(runs, np.array([0.01, 0.011, 0.0, 0.0, np.nan]), 0.01)
+    found = run_metrics.status(runs, np.array([0.01, 0.011, 0.0, 0.0, np.nan]), 0.01)
     assert found.tolist() == [
         "converged", "completed", "left_feasible_set", "estimate_left_feasible_set", "diverged",
     ]  # fmt: skip
-    assert found.dtype == verdicts.STATUS
+    assert found.dtype == run_metrics.STATUS
 
 
 def test_the_tail_is_a_twentieth_of_what_was_meant():
     time = np.arange(0.0, 10.1, 0.25)
     distance = np.stack([np.where(time < 9.49, 7.0, time), np.where(time == 9.5, 3.0, 0.0)])
-    assert verdicts.tail_distance(time, distance, 10.0).tolist() == [10.0, 3.0]
+    assert run_metrics.tail_distance(time, distance, 10.0).tolist() == [10.0, 3.0]
     # a run that ended early is judged by as long a part
-    assert verdicts.tail_distance(time[:9], distance[:, :9], 10.0).tolist() == [7.0, 0.0]
+    assert run_metrics.tail_distance(time[:9], distance[:, :9], 10.0).tolist() == [7.0, 0.0]
 
 
 def test_a_run_has_settled_when_it_stays_within_a_fiftieth():
@@ -95,14 +95,14 @@ def test_a_run_has_settled_when_it_stays_within_a_fiftieth():
         [1.0, 0.02, 0.02, 0.0], [1.0, 0.0, 0.03, 0.0], [1.0, 0.5, 0.4, 0.3], [0.0] * 4,
         [1.0, 0.0, np.nan, 0.0],
     ]  # fmt: skip
-    settled = verdicts.settling_time(time, np.array(rows))
+    settled = run_metrics.settling_time(time, np.array(rows))
     assert settled.tolist() == pytest.approx([1.0, 3.0, np.nan, 0.0, 3.0], nan_ok=True)
 
 
 def test_what_actuators_delivered():
     runs = watch.together([run_of(TIME=4.0), run_of(TIME=0.0)])
     runs.peak, runs.peak_time, runs.square, runs.energy = [3, 5], [0.1, 0.2], [16, 36], [-1, 1]
-    found = verdicts.inputs(runs)
+    found = run_metrics.inputs(runs)
     assert found.peak.tolist() == [[3, 5]] * 2
     assert found.peak_time.tolist() == [[0.1, 0.2]] * 2
     assert found.rms.tolist() == [[2, 3], [0, 0]]
@@ -117,7 +117,7 @@ def samples_of(system, memory=0, rows=3, **columns):
     state = np.tile(system.state, (rows, 1, 1)) + np.arange(rows)[:, None, None] * 0.01
     empty = np.zeros((rows, 0))
     given = {
-        "state": state, "input": np.ones((rows, m)), "seen": empty, "acts": empty,
+        "state": state, "input": np.ones((rows, m)), "measurement": empty, "applied": empty,
         "memory": np.arange(rows * memory, dtype=float).reshape(rows, memory),
         "configuration": empty,
     }  # fmt: skip
@@ -173,7 +173,7 @@ def test_estimates_and_filtered_actions_are_kept():
 
 def test_what_was_seen_and_what_acted_is_kept_with_faults():
     system, rows = line(faults=(Push(force=2.0),)), np.arange(6.0).reshape(3, 2)
-    found = variables_of(system, TIMES, samples_of(system, seen=rows, acts=10.0 + rows))
+    found = variables_of(system, TIMES, samples_of(system, measurement=rows, applied=10.0 + rows))
     assert found["measurement"][1] is rows
     assert found["acting_input"][1].tolist() == (10.0 + rows).tolist()
     assert found["input"][2]["units"] == found["acting_input"][2]["units"]

@@ -48,6 +48,6 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
+def storage(q, x, equilibrium_state):
     """V about an equilibrium."""
-    return 0.5 * ((x[0] - rest[0]) ** 2 + (x[1] - rest[1]) ** 2)
+    return 0.5 * ((x[0] - equilibrium_state[0]) ** 2 + (x[1] - equilibrium_state[1]) ** 2)

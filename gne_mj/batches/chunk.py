@@ -141,7 +141,7 @@ class Runner:
             yield from [None] * len(starts)
             return
         structure = self._structure(prepared)
-        shared = structure.table(system, setup)
+        shared = structure.parameter_block(system, setup)
         initial = combination.scenario.systems[system.name].initial
         for start, y in zip(starts, plan.profiles(combination, starts), strict=True):
             seed = int(plan.seeds[start])
@@ -154,14 +154,14 @@ class Runner:
                 except InfeasibleStart:
                     yield None
                     continue
-            table = shared
+            parameter_block = shared
             if system.faults and seed != system.seed:  # what is random in them
-                table = structure.table(system, _seeded(setup, seed))
+                parameter_block = structure.parameter_block(system, _seeded(setup, seed))
             yield Case(
                 state=state,
                 memory=system.with_links(memory),
                 parameters=system.agents.parameters,
-                table=table,
+                parameter_block=parameter_block,
                 loop=_Alone(system, state, memory, seed, combination.clock),
             )
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 RETRIES = 5  # of a chunk that failed; one whose worker was lost is run elsewhere besides
 PATIENCE = 10.0  # s for a scheduler to answer
-LOOK = 0.5  # s between looks at the user's wishes
+POLL = 0.5  # s between looks at the user's wishes
 
 
 class Finished(NamedTuple):
@@ -108,7 +108,7 @@ def on_cluster(store: Store, client: "Client", stopped: Callable[[], bool]) -> I
         with client.as_current():
             while waiting and not stopped():
                 try:
-                    finished, waiting = wait(waiting, timeout=LOOK, return_when="FIRST_COMPLETED")
+                    finished, waiting = wait(waiting, timeout=POLL, return_when="FIRST_COMPLETED")
                 except TimeoutError:
                     finished = set()
                 done = [future.result() for future in finished]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.store import Store
-from gne_mj.verdicts import SUCCESSES
+from gne_mj.run_metrics import SUCCESSES
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from gne_mj.batches.integrity import reading
 from gne_mj.batches.store import RUNS, Store
 from gne_mj.errors import InvalidInput
 from gne_mj.files import refuse_existing, written
-from gne_mj.verdicts import SUCCESSES
+from gne_mj.run_metrics import SUCCESSES
 
 if TYPE_CHECKING:
     import pandas

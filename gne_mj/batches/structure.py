@@ -1,4 +1,4 @@
-"""What runs of one structure share: a native batch that holds them, and how their tables are made.
+"""What runs of one structure share: a native batch that holds them, and their parameter blocks.
 
 Two systems have one structure if they have the same kernels, shapes, mode, integrator and step. All
 else may differ, and is in a run's table.
@@ -8,12 +8,12 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from gne_mj.loops.batch import BatchLoop, EachLoop
-from gne_mj.loops.layout import Setup, ode_table
+from gne_mj.loops.layout import Setup, ode_parameter_block
 from gne_mj.loops.ode_batch import OdeBatch
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.system import Clock, System
-from gne_mj.table import Table
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
@@ -50,16 +50,16 @@ class Structure:
                 self._plant, system.fault_kernels, faulty, 1 if alone else threads
             )
 
-    def table(self, system: System, setup: Setup) -> Table | None:
+    def parameter_block(self, system: System, setup: Setup) -> ParameterBlock | None:
         """The table of a run; None where each run has a loop of its own."""
         if not self._native:
             return None
         memory = len(system.loop_memory)
         if self._plant is None:
-            return ode_table(setup, system.agents, memory)
-        from gne_mj.loops.mujoco import mujoco_table
+            return ode_parameter_block(setup, system.agents, memory)
+        from gne_mj.loops.mujoco import mujoco_parameter_block
 
-        return mujoco_table(self._plant, setup, system.agents, memory)
+        return mujoco_parameter_block(self._plant, setup, system.agents, memory)
 
 
 def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:

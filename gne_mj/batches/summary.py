@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import verdicts
+from gne_mj import run_metrics
 from gne_mj.batch_variables import Runs, declared_figures
 from gne_mj.batches.plan import Combination
 from gne_mj.errors import InfeasibleStart
@@ -32,7 +32,7 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
         times(combination, span), outcome.samples, outcome.monitors,
     )  # fmt: skip
     for monitor, last in zip(runs.monitors, runs.y[:, -1], strict=True):
-        verdicts.check_numbers(system.game, monitor, last, clock.timestep)
+        run_metrics.check_numbers(system.game, monitor, last, clock.timestep)
     found = {
         figure.name: (figure.dims(system), figure.source(runs), figure.attributes(system))
         for figure in declared_figures(system)
@@ -42,7 +42,9 @@ def columns_of(combination: Combination, span: Span, outcome: Outcome, record: i
 
 def refused_columns(runs: int) -> Labelled:
     """Of runs that cannot begin, since their start is not inside."""
-    return {"status": (("run",), np.full(runs, InfeasibleStart.status, dtype=verdicts.STATUS), {})}
+    return {
+        "status": (("run",), np.full(runs, InfeasibleStart.status, dtype=run_metrics.STATUS), {})
+    }
 
 
 def span_of(combination: Combination) -> Span:

@@ -129,7 +129,7 @@ def certify(
     """Tell what the theory guarantees for a scenario's systems, and what it does not."""
     from gne_mj.scenario import load_scenario
     from gne_mj.theory import certify as examine
-    from gne_mj.theory import search_epsilon, search_period, search_push, words
+    from gne_mj.theory import report_text, search_epsilon, search_period, search_push
 
     loaded = load_scenario(source, settings(set_))
     systems, moved = loaded.inside_systems()
@@ -151,7 +151,7 @@ def certify(
         emit(json.dumps(every, indent=2))
     else:
         for name, report in reports.items():
-            print("\n".join([*words(report), *_moved(moved.get(name))]))
+            print("\n".join([*report_text(report), *_moved(moved.get(name))]))
 
 
 @dataclass(frozen=True)

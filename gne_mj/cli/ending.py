@@ -22,7 +22,7 @@ from gne_mj.errors import USER_MODULES, UserCodeError
 
 # s after Ctrl-C: between looks; how long one call of a user's function, or of native code, may
 # still take (a tenth of that is much); and until what was asked to end is ended
-LOOK, OF_USER, NATIVE, GRACE = 0.25, 3.0, 20.0, 3.0
+POLL, OF_USER, NATIVE, GRACE = 0.25, 3.0, 20.0, 3.0
 
 
 class _Call(NamedTuple):
@@ -57,7 +57,7 @@ def _watch(reader: int) -> None:
     asked, sent, second = 0, 0, 0.0  # signals that came, that were sent from here
     since: dict[int, tuple[_Call, float, bool]] = {}  # of each thread; whether it was told to end
     while True:
-        if select.select([reader], [], [], LOOK if asked else None)[0]:
+        if select.select([reader], [], [], POLL if asked else None)[0]:
             told = os.read(reader, 64)
             if not told:
                 return

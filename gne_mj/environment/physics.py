@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj import game_functions as games
 from gne_mj.game import Game
 from gne_mj.native import compiled, source_key
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import raise_pending
 from gne_mj.plants import mjcf_file
 from gne_mj.plants.fleet_plant import FleetPlant
@@ -28,12 +29,11 @@ from gne_mj.plants.native_mujoco import (
     check_warnings,
     field,
     offsets,
+    parameter_block_of,
     state_functions,
     step_address,
-    table_of,
     timed_step,
 )
-from gne_mj.table import Table
 
 # What a look found in place of the first constraint that is violated
 INSIDE, DIVERGED = -1, -2
@@ -83,8 +83,8 @@ def build(at: Offsets, fleet: ModuleType) -> Any:
         present is looked at.
         """
         _ = source
-        table = abs(table_of(at, model, data))
-        sizes = sizes_in(table)
+        parameter_block = abs(parameter_block_of(at, model, data))
+        sizes = sizes_in(parameter_block)
         nq, nv, na = sizes.nq, sizes.nv, sizes.na
         qpos, qvel = field(data, at.qpos, nq), field(data, at.qvel, nv)
         act = field(data, at.act, na)
@@ -93,8 +93,8 @@ def build(at: Offsets, fleet: ModuleType) -> Any:
                 call_state(functions[0], model, data, before.ctypes.data, functions[2])
             if taken > 0:
                 timed_step(at, mj_step, model, data)
-            fleet.refresh(model, data, table)
-            fleet.gather(at, data, table, state)
+            fleet.refresh(model, data, parameter_block)
+            fleet.gather(at, data, parameter_block, state)
             for r in range(len(y)):
                 y[r] = state[r * states + output]
             found = INSIDE
@@ -134,7 +134,7 @@ class FleetPhysics(control.Physics):
         self.exit: Exit | None = None
         at, kernels = offsets(), plant.kernels
         self._advance = build(at, kernels)
-        self._table = Table(plant.table_arrays)
+        self._parameter_block = ParameterBlock(plant.parameter_arrays)
         m, model = game.actions, plant.model
         self._actuators = np.array(plant.places.actuator)
         self._inputs = np.zeros(m)
@@ -187,7 +187,7 @@ class FleetPhysics(control.Physics):
         From outside it does not move on.
         """
         if self.exit is None:
-            self._look(n_sub_steps)
+            self._observe(n_sub_steps)
 
     def reset(self) -> None:
         """To the start, at time 0, no input acting."""
@@ -201,20 +201,20 @@ class FleetPhysics(control.Physics):
         self.plant.reset(state)
         self._inputs[:] = 0.0
         self.exit = None
-        self._look(0)
+        self._observe(0)
 
     def restore(self) -> None:
         """Back to the start of the last integration step; the exit that it led to stays noted."""
         left = self.exit
         mujoco.mj_setState(self.model, self.data, self._before, STATE)
         self.exit = None
-        self._look(0)
+        self._observe(0)
         if left is not None:
             self.exit = Exit(left.time, left.constraint, left.value, restored=True)
 
-    def _look(self, steps: int) -> None:
+    def _observe(self, steps: int) -> None:
         data = self.plant.data
-        data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
+        data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
         data.ctrl[self._actuators] = self._inputs
         with callbacks(passive=self.plant.passive):
             found = self._advance(

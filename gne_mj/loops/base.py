@@ -25,9 +25,9 @@ class Samples(NamedTuple):
         state: (samples, m, states) of the agents' channels.
         input: (samples, m) delivered inputs.
         memory: (samples, k) the law's memory (k = 0 for a static law).
-        seen: (samples, m) outputs as the law read them for that input; (samples, 0) in a run
+        measurement: (samples, m) outputs as the law read them for that input; (samples, 0) in a run
             without faults.
-        acts: (samples, m) inputs with pushes, which moved the plant; likewise.
+        applied: (samples, m) inputs with pushes, which moved the plant; likewise.
         configuration: (samples, nq) all joints' positions of MJCF robots, MuJoCo's qpos; of other
             agents, whose state says it, (samples, 0).
     """
@@ -35,8 +35,8 @@ class Samples(NamedTuple):
     state: Annotated[NDArray[np.float64], "m, states"]
     input: Annotated[NDArray[np.float64], "m"]
     memory: Annotated[NDArray[np.float64], "memory"]
-    seen: Annotated[NDArray[np.float64], "m * faulty"]
-    acts: Annotated[NDArray[np.float64], "m * faulty"]
+    measurement: Annotated[NDArray[np.float64], "m * faulty"]
+    applied: Annotated[NDArray[np.float64], "m * faulty"]
     configuration: Annotated[NDArray[np.float64], "joints"]
 
     @classmethod
@@ -66,11 +66,11 @@ class ClosedLoop(ABC):
 
     Attributes:
         monitor: what :mod:`gne_mj.loops.monitor` measures, by name.
-        keeps: what must live as long as the loop, as plain functions that it knows by address.
+        kept_alive: what must live as long as the loop, as plain functions that it knows by address.
     """
 
     monitor: Any
-    keeps: object = None
+    kept_alive: object = None
 
     @abstractmethod
     def advance(self, samples: int, every: int) -> Samples:

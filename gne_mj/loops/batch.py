@@ -1,9 +1,9 @@
 """Many runs of one structure at once: what every engine's batch offers.
 
-Runs of one structure share kernels, shapes, mode, integrator and step; whatever is in their tables
-(the game's numbers, gains, penalties, periods, the agents' numbers) may differ from run to run.
-Every run is computed as it would be alone, so results depend neither on threads nor on how runs
-are put together.
+Runs of one structure share kernels, shapes, mode, integrator and step; whatever is in their
+parameter blocks (the game's numbers, gains, penalties, periods, the agents' numbers) may differ
+from run to run. Every run is computed as it would be alone, so results depend neither on threads
+nor on how runs are put together.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Samples
 from gne_mj.loops.layout import Steps, steps_of
 from gne_mj.loops.recorder import Recorder
-from gne_mj.table import Table
+from gne_mj.parameter_block import ParameterBlock
 
 SLICE = 50  # rows of a run alone between looks at the user's wishes
 
@@ -33,14 +33,14 @@ class Case:
         state: (m, states) at the start.
         memory: the law's, at the start.
         parameters: (m, numbers of the agents' type).
-        table: of the run, for native batches.
+        parameter_block: of the run, for native batches.
         loop: makes the run's own closed loop, for engines without a native batch.
     """
 
     state: NDArray[np.float64]
     memory: NDArray[np.float64]
     parameters: NDArray[np.float64]
-    table: Table | None
+    parameter_block: ParameterBlock | None
     loop: Callable[[], ClosedLoop]
 
 
@@ -86,19 +86,20 @@ class Outcome:
 
 def begin(
     cases: Sequence[Case], span: Span, faulty: bool
-) -> tuple[list[Table], Steps, Recorder, Any]:
-    """What a native batch begins with: tables, the sizes that all share, room for rows, monitors.
+) -> tuple[list[ParameterBlock], Steps, Recorder, Any]:
+    """What a native batch begins with: parameter blocks, the sizes that all share, room for rows,
+    monitors.
 
     Args:
-        cases: all with a table.
+        cases: all with a parameter block.
         span: of the runs.
         faulty: whether runs record what was seen and what acted.
     """
-    tables = [case.table for case in cases if case.table is not None]
-    sizes = steps_of(tables[0])
+    parameter_blocks = [case.parameter_block for case in cases if case.parameter_block is not None]
+    sizes = steps_of(parameter_blocks[0])
     m, p, states, memory = sizes.actions, sizes.constraints, sizes.states, sizes.memory
     recorder = Recorder(len(cases), span.rows, (m, states), memory, faulty, every=span.every)
-    return tables, sizes, recorder, watch.fresh(m, p, len(cases))
+    return parameter_blocks, sizes, recorder, watch.fresh(m, p, len(cases))
 
 
 class BatchLoop(ABC):

@@ -260,7 +260,7 @@ def halve(faults, step, h, which, problem, work, monitor):
     left = monitor.exit == watch.LEFT_SET
     obeyed = True
     for r in range(len(work.u)):
-        obeyed &= work.u[r] == work.demand[r]
+        obeyed &= work.u[r] == work.commanded[r]
     guarded = obeyed and problem.settings[GUARDED] > 0.0 and faults.measured(problem)
     level = int(division.level)
     doubtful = (left and obeyed and not guarded) or level > FINEST

@@ -7,7 +7,7 @@ not use costs nothing.
 from gne_mj.native import copy, kernel
 
 # Whether the law's action follows from the present state alone, whichever step comes next
-KNOWN_AHEAD = True
+PREDICTION_KNOWN = True
 
 
 @kernel
@@ -24,14 +24,14 @@ def begin(parts, at, state, memory):
 
 
 @kernel
-def choose(y, seen):
+def choose(y, measurement):
     """Of the outputs as they are and as they are seen, those that the law has."""
     return y
 
 
 @kernel
-def sense(problem, work, y, seen):
-    """The outputs (m,) that the law sees: work.y or work.seen, which are given, the latter filled.
+def sense(problem, work, y, measurement):
+    """The outputs (m,) that the law sees: work.y or work.measurement, both given, which it fills.
 
     Native code returns no arrays but those that it was given as such.
     """
@@ -46,18 +46,18 @@ def sense_state(plant, parts, step, state, known, scratch):
 
 @kernel
 def deliver(problem, clock, step, work):
-    """Fill work.u with the demand within the actuators' limits."""
+    """Fill work.u with the commanded input within the actuators' limits."""
     limit = problem.limit
     for r in range(len(work.u)):
-        work.u[r] = min(max(work.demand[r], -limit[r]), limit[r])
+        work.u[r] = min(max(work.commanded[r], -limit[r]), limit[r])
 
 
 @kernel
-def push(problem, clock, step, u, acts):
-    """What acts on the plant under the input u (m,): u, or ``acts``, filled."""
+def push(problem, clock, step, u, applied):
+    """What acts on the plant under the input u (m,): u, or ``applied``, filled."""
     return u
 
 
 @kernel
-def record(parts, step, state, seen, acts):
+def record(parts, step, state, measurement, applied):
     """Nothing to record: outputs and inputs are what they are."""

@@ -20,7 +20,7 @@ from gne_mj.numbers import numbers_in
 PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
 STEADY, SINE, SQUARE, RANDOM = range(4)  # forms of pushes
 # Whether the law's action follows from the present state alone, whichever step comes next
-KNOWN_AHEAD = False
+PREDICTION_KNOWN = False
 
 _fault_at = numbers_in(Fault)
 
@@ -84,12 +84,12 @@ def measured(problem):
 def begin(parts, at, state, memory):
     """What happens before the law acts: sensors read, estimates corrupted, messages exchanged."""
     work, step = parts.work, at.step
-    fresh = at.stage == 0 and work.now.dealt <= step
+    fresh = at.stage == 0 and work.now.faults_step <= step
     if at.stage == 0:
-        work.now.dealt = step + 1.0
+        work.now.faults_step = step + 1.0
     read_sensors(parts, step, state)
     if parts.clock.mode != 0:
-        copy(work.seen, work.held)
+        copy(work.measurement, work.held)
     if len(memory) > 0:
         if fresh:
             corrupt(parts.problem, parts.clock, step, memory)
@@ -98,14 +98,14 @@ def begin(parts, at, state, memory):
 
 
 @kernel
-def choose(y, seen):
+def choose(y, measurement):
     """Of the outputs as they are and as they are seen, those that the law has."""
-    return seen
+    return measurement
 
 
 @kernel
 def read_sensors(parts, step, state):
-    """Fill work.seen (m,) with the outputs as they are read, which may be of some periods ago."""
+    """Fill work.measurement (m,) with the outputs as they are read, perhaps of some periods ago."""
     work, faults = parts.work, parts.problem.faults
     m, time, count = len(work.y), step * parts.clock.h, count_of(parts.clock, step)
     delay = int(faults.numbers.sensor_delay)
@@ -117,17 +117,17 @@ def read_sensors(parts, step, state):
         copy(state[:size], work.history[at : at + size])
         at = (max(count - delay, 0) % slots) * size
         for r in range(m):
-            work.seen[r] = work.history[at + r * states + parts.channels.output]
+            work.measurement[r] = work.history[at + r * states + parts.channels.output]
     else:
-        copy(work.y, work.seen)
+        copy(work.y, work.measurement)
     for f in range(faults.pointer[NOISE], faults.pointer[NOISE + 1]):
         row = fault(faults, f)
         if active(row, time):
-            work.seen[int(row.target)] += row.amount * spread(faults, row, count)
+            work.measurement[int(row.target)] += row.amount * spread(faults, row, count)
     for f in range(faults.pointer[BIAS], faults.pointer[BIAS + 1]):
         row = fault(faults, f)
         if active(row, time):
-            work.seen[int(row.target)] += row.amount
+            work.measurement[int(row.target)] += row.amount
 
 
 @kernel
@@ -186,7 +186,7 @@ def exchange(problem, clock, step, memory, work):
     ring, slots = links + len(graph.neighbour) * m, int(faults.numbers.message_delay) + 1
     at = ring + (count % slots) * agents * m
     for r in range(m):
-        memory[data.owner[r] * m + r] = work.seen[r]
+        memory[data.owner[r] * m + r] = work.measurement[r]
     copy(memory[: agents * m], memory[at : at + agents * m])
     for link in range(len(graph.neighbour)):
         delay = 0
@@ -200,16 +200,16 @@ def exchange(problem, clock, step, memory, work):
 
 
 @kernel
-def sense(problem, work, y, seen):
-    """The outputs (m,) that the law sees: ``seen``. Fills the barrier's weights there."""
+def sense(problem, work, y, measurement):
+    """The outputs (m,) that the law sees: ``measurement``. Fills the barrier's weights there."""
     rho, data = work.now.penalty, problem.data
-    work.now.shell = -1.0
+    work.now.tightened = -1.0
     for k in range(len(work.weights)):
-        room = -games.constraint(data, k, seen) - data.tightening[k]
-        work.weights[k] = rho / room
-        if not room > 0.0 and work.now.shell < 0.0:
-            work.now.shell, work.now.shell_value = float(k), -room
-    return seen
+        slack = -games.constraint(data, k, measurement) - data.tightening[k]
+        work.weights[k] = rho / slack
+        if not slack > 0.0 and work.now.tightened < 0.0:
+            work.now.tightened, work.now.tightened_value = float(k), -slack
+    return measurement
 
 
 @kernel
@@ -220,7 +220,7 @@ def sense_state(plant, parts, step, state, known, scratch):
     """
     work, channels, faults = parts.work, parts.channels, parts.problem.faults
     count = count_of(parts.clock, step)
-    m, states = channels.rest.shape
+    m, states = channels.equilibrium_state.shape
     delay = int(faults.numbers.sensor_delay)
     late, size, slots = min(delay, count), m * states, delay + 1
     if delay > 0:
@@ -229,7 +229,7 @@ def sense_state(plant, parts, step, state, known, scratch):
     else:
         copy(state[: m * states], known)
     for r in range(m):
-        known[r * states + channels.output] = work.seen[r]
+        known[r * states + channels.output] = work.measurement[r]
     for ago in range(late):
         at = slots * size + ((count - late + ago) % slots) * m
         plant.roll(channels, parts.clock, known, work.history[at : at + m], scratch)
@@ -238,7 +238,7 @@ def sense_state(plant, parts, step, state, known, scratch):
 
 @kernel
 def deliver(problem, clock, step, work):
-    """Fill work.u with the demand within the limits of now."""
+    """Fill work.u with the commanded input within the limits of now."""
     faults, m, time = problem.faults, len(work.u), step * clock.h
     for r in range(m):
         limit = problem.limit[r]
@@ -246,7 +246,7 @@ def deliver(problem, clock, step, work):
             row = fault(faults, f)
             if row.target == r and active(row, time):
                 limit = min(limit, row.amount)
-        work.u[r] = min(max(work.demand[r], -limit), limit)
+        work.u[r] = min(max(work.commanded[r], -limit), limit)
     delay = int(faults.numbers.sensor_delay)
     if delay > 0:
         slots = delay + 1
@@ -256,10 +256,10 @@ def deliver(problem, clock, step, work):
 
 
 @kernel
-def push(problem, clock, step, u, acts):
-    """What acts on the plant during a step under the input u (m,): ``acts``, u with all pushes."""
+def push(problem, clock, step, u, applied):
+    """What acts on the plant in a step under the input u (m,): ``applied``, u with all pushes."""
     faults, time = problem.faults, step * clock.h
-    copy(u, acts)
+    copy(u, applied)
     for f in range(faults.pointer[PUSH], faults.pointer[PUSH + 1]):
         row = fault(faults, f)
         if active(row, time):
@@ -273,17 +273,17 @@ def push(problem, clock, step, u, acts):
                 size *= 1.0 if np.floor(2.0 * phase) % 2.0 == 0.0 else -1.0
             elif row.form == RANDOM:
                 size *= spread(faults, row, step)
-            acts[int(row.target)] += size
-    return acts
+            applied[int(row.target)] += size
+    return applied
 
 
 @kernel
-def record(parts, step, state, seen, acts):
+def record(parts, step, state, measurement, applied):
     """Fill rows (m,) with what the law has seen for the input of this step, and what acts."""
     work, channels = parts.work, parts.channels
-    copy(work.seen, seen)
-    states = channels.rest.shape[1]
+    copy(work.measurement, measurement)
+    states = channels.equilibrium_state.shape[1]
     if parts.clock.mode == 0:  # the look may have been at a later stage, with its own errors
-        for r in range(len(seen)):
-            seen[r] += state[r * states + channels.output] - work.y[r]
-    push(parts.problem, parts.clock, step, parts.u, acts)
+        for r in range(len(measurement)):
+            measurement[r] += state[r * states + channels.output] - work.y[r]
+    push(parts.problem, parts.clock, step, parts.u, applied)

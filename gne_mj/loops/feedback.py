@@ -81,23 +81,23 @@ class Problem(NamedTuple):
     size: Annotated[np.ndarray, "1 + p"] = np.zeros(1)
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
-    table: int = 0
+    parameter_block: int = 0
 
 
-class Work(NamedTuple):
+class StepScratch(NamedTuple):
     """Scratch arrays of one loop, so that a step allocates nothing."""
 
     now: Now
     g: Annotated[np.ndarray, "p"]  # constraint values at the last evaluation
     weights: Annotated[np.ndarray, "p"]  # rho / (-g - t)
-    demand: Annotated[np.ndarray, "m"]  # what the law asks for
+    commanded: Annotated[np.ndarray, "m"]  # what the law asks for
     profile: Annotated[np.ndarray, "m"]  # an agent's own profile
     y: Annotated[np.ndarray, "m"]  # outputs
     u: Annotated[np.ndarray, "m"]  # inputs at a stage
     held: Annotated[np.ndarray, "m"]  # outputs at the last control instant, held modes
     scratch: Annotated[np.ndarray, "propagation(agents)"]  # for the propagation of estimates
-    seen: Annotated[np.ndarray, "m"]  # outputs as the law sees them
-    acts: Annotated[np.ndarray, "m"]  # inputs with pushes, which move the plant
+    measurement: Annotated[np.ndarray, "m"]  # outputs as the law sees them
+    applied: Annotated[np.ndarray, "m"]  # inputs with pushes, which move the plant
     history: Annotated[np.ndarray, "history"]  # past states and inputs, where sensors are late
     division: division.Division  # of steps, mode continuous
     stages: division.Stages
@@ -114,13 +114,15 @@ class Sizes(NamedTuple):
 NO_SIZES = Sizes()
 
 
-work_length, work_views = in_array(Work, "m p agents history solver", propagation=scratch_length)
+work_length, work_views = in_array(
+    StepScratch, "m p agents history solver", propagation=scratch_length
+)
 
 
-def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> Work:
+def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -> StepScratch:
     """Fresh scratch arrays."""
     lengths = (actions, constraints, agents, *sizes)
-    found: Work = work_views(np.zeros(work_length(*lengths)), 0, *lengths)
+    found: StepScratch = work_views(np.zeros(work_length(*lengths)), 0, *lengths)
     return found
 
 
@@ -134,10 +136,10 @@ def inside(problem, time, stage, y, work, monitor):
     rho = functions.penalty(problem, time, problem.settings[RHO])
     work.now.penalty = rho
     outside = games.evaluate(problem.data, rho, y, work.g, work.weights)
-    work.now.shell = outside
+    work.now.tightened = outside
     if outside < 0:
         return True
-    work.now.shell_value = work.g[outside] + problem.data.tightening[outside]
+    work.now.tightened_value = work.g[outside] + problem.data.tightening[outside]
     for k in range(outside, len(work.g)):
         value = work.g[k]
         if not value < 0.0:
@@ -151,27 +153,29 @@ def inside(problem, time, stage, y, work, monitor):
 def feedback(problem, time, stage, y, memory, work, monitor, u):
     """Fill u (m,) with the input that actuators deliver at outputs y (m,), all seen as they are.
 
-    work.g, work.weights and work.demand are filled on the way. Returns True if there is an input.
-    If not (y or an estimate is not strictly inside, or the demand is not finite), the exit is
-    latched in the monitor with the given time and stage, and u is left unfinished.
+    work.g, work.weights and work.commanded are filled on the way. Returns True if there is an
+    input. If not (y or an estimate is not strictly inside, or the commanded input is not finite),
+    the exit is latched in the monitor with the given time and stage, and u is left unfinished.
     """
     if not inside(problem, time, stage, y, work, monitor):
         return False
     if not explicit_law(problem, time, stage, y, memory, work, monitor):
         return False
     for r in range(len(u)):
-        u[r] = min(max(work.demand[r], -problem.limit[r]), problem.limit[r])
+        u[r] = min(max(work.commanded[r], -problem.limit[r]), problem.limit[r])
     return True
 
 
 @kernel
 def explicit_law(problem, time, stage, y, memory, work, monitor):
-    """Fill work.demand by the law at y (m,), whose weights are given; False if it has no action."""
-    shell = int(work.now.shell)
-    if shell >= 0:
-        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, shell, work.now.shell_value, stage)
+    """Fill work.commanded by the law at y (m,), whose weights are given; False: it has no action."""
+    tightened = int(work.now.tightened)
+    if tightened >= 0:
+        watch.leave(
+            monitor, watch.ESTIMATE_LEFT, time, -1, tightened, work.now.tightened_value, stage
+        )
         return False
-    left = functions.action(problem, y, work.weights, memory, work, work.demand)
+    left = functions.action(problem, y, work.weights, memory, work, work.commanded)
     if left >= 0:
         agent, constraint = left // len(work.g), left % len(work.g)
         value = games.constraint(problem.data, constraint, work.profile)
@@ -185,8 +189,8 @@ def explicit_law(problem, time, stage, y, memory, work, monitor):
 @kernel
 def usable(time, stage, work, monitor):
     """Whether all demands are numbers that actuators can take; else the exit is latched."""
-    for r in range(len(work.demand)):
-        if not abs(work.demand[r]) < LARGEST_INPUT:
-            watch.leave(monitor, watch.DIVERGED, time, -1, -1, work.demand[r], stage)
+    for r in range(len(work.commanded)):
+        if not abs(work.commanded[r]) < LARGEST_INPUT:
+            watch.leave(monitor, watch.DIVERGED, time, -1, -1, work.commanded[r], stage)
             return False
     return True

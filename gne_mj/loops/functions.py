@@ -9,7 +9,9 @@ from gne_mj.native import address_in, call_integer, call_number, kernel
 
 # Entries of ``problem.functions``, those of the second line for mode implicit
 ACTION, RATE, PROPAGATE, STORAGE = range(4)
-PREPARE, PULLS, ADD_PULL_SLOPE, OWN_PROFILE, SETTLE, SOLVE, ACT = range(4, 11)
+PREPARE, BARRIER_FREE_TERMS, ADD_BARRIER_FREE_SLOPE, OWN_PROFILE, MEMORY_OUTPUTS, SOLVE, ACT = (
+    range(4, 11)
+)
 PENALTY, COUNT = 11, 12  # the first for penalties that change in time
 
 
@@ -19,7 +21,7 @@ def action(problem, y, weights, memory, work, u):
     return call_integer(
         problem.functions[ACTION],
         (
-            problem.table, address_in(y), address_in(weights), address_in(memory),
+            problem.parameter_block, address_in(y), address_in(weights), address_in(memory),
             address_in(work.profile), address_in(work.now), address_in(u),
         ),
     )  # fmt: skip
@@ -30,7 +32,7 @@ def penalty(problem, time, rho):
     """The penalty at a time in s: rho, or what the schedule says."""
     if problem.functions[PENALTY] == 0:
         return rho
-    return call_number(problem.functions[PENALTY], (problem.table, time))
+    return call_number(problem.functions[PENALTY], (problem.parameter_block, time))
 
 
 @kernel
@@ -39,7 +41,7 @@ def rate(problem, y, memory, out):
     if len(memory) > 0:
         call_integer(
             problem.functions[RATE],
-            (problem.table, address_in(y), address_in(memory), address_in(out)),
+            (problem.parameter_block, address_in(y), address_in(memory), address_in(out)),
         )
 
 
@@ -50,7 +52,7 @@ def propagate(problem, y, memory, scratch):
         call_integer(
             problem.functions[PROPAGATE],
             (
-                problem.table, address_in(y), address_in(memory), address_in(scratch),
+                problem.parameter_block, address_in(y), address_in(memory), address_in(scratch),
                 len(scratch),
             ),
         )  # fmt: skip
@@ -61,33 +63,33 @@ def storage(problem, memory):
     """The memory's part of the Lyapunov function."""
     if len(memory) == 0:
         return 0.0
-    return call_number(problem.functions[STORAGE], (problem.table, address_in(memory)))
+    return call_number(problem.functions[STORAGE], (problem.parameter_block, address_in(memory)))
 
 
 @kernel
 def prepare(problem, first, last, y, memory):
-    """Put the actions of agents ``first`` to ``last`` - 1 where the law's pull reads them."""
+    """Put the actions of agents ``first`` to ``last`` - 1 where its law reads them."""
     call_integer(
         problem.functions[PREPARE],
-        (problem.table, first, last, address_in(y), address_in(memory)),
+        (problem.parameter_block, first, last, address_in(y), address_in(memory)),
     )
 
 
 @kernel
-def pulls(problem, first, last, y, memory, out):
+def barrier_free_terms(problem, first, last, y, memory, out):
     """Prepare, and fill these agents' entries of out (m,) with what drives them but the barrier."""
     call_integer(
-        problem.functions[PULLS],
-        (problem.table, first, last, address_in(y), address_in(memory), address_in(out)),
+        problem.functions[BARRIER_FREE_TERMS],
+        (problem.parameter_block, first, last, address_in(y), address_in(memory), address_in(out)),
     )
 
 
 @kernel
-def add_pull_slope(problem, i, a, y, memory, out):
+def add_barrier_free_slope(problem, i, a, y, memory, out):
     """Add the derivative of entry a of that, of agent i, to out (m,)."""
     call_integer(
-        problem.functions[ADD_PULL_SLOPE],
-        (problem.table, i, a, address_in(y), address_in(memory), address_in(out)),
+        problem.functions[ADD_BARRIER_FREE_SLOPE],
+        (problem.parameter_block, i, a, address_in(y), address_in(memory), address_in(out)),
     )
 
 
@@ -97,14 +99,17 @@ def own_profile(problem, i, y, memory, profile):
     own action."""
     return call_number(
         problem.functions[OWN_PROFILE],
-        (problem.table, i, address_in(y), address_in(memory), address_in(profile)),
+        (problem.parameter_block, i, address_in(y), address_in(memory), address_in(profile)),
     )
 
 
 @kernel
-def settle(problem, ahead, held):
-    """The outputs (m,) that the memory moves with, those of the period's end being ``ahead``."""
-    call_integer(problem.functions[SETTLE], (problem.table, address_in(ahead), address_in(held)))
+def memory_outputs(problem, prediction, held):
+    """The outputs (m,) that the memory moves with; those of the period's end are ``prediction``."""
+    call_integer(
+        problem.functions[MEMORY_OUTPUTS],
+        (problem.parameter_block, address_in(prediction), address_in(held)),
+    )
 
 
 @kernel
@@ -116,27 +121,40 @@ def solve(problem, memory, work):
     return call_integer(
         problem.functions[SOLVE],
         (
-            problem.table, address_in(memory), address_in(work.profile), address_in(work.now),
-            address_in(work.solver), len(work.solver),
+            problem.parameter_block,
+            address_in(memory),
+            address_in(work.profile),
+            address_in(work.now),
+            address_in(work.solver),
+            len(work.solver),
         ),
-    )  # fmt: skip
+    )
 
 
 @kernel
 def act(problem, place, time, step, state, memory):
-    """Fill work.demand in mode implicit; False, with the exit latched, if there is no input.
+    """Fill work.commanded in mode implicit; False, with the exit latched, if there is no input.
 
     Args:
         problem: of the run.
-        place: addresses of the loop's room and, in MuJoCo, of model and data.
+        place: addresses of the loop's workspace and, in MuJoCo, of model and data.
         time: in s, at the start of ``step``.
         step: which.
         state: flat.
         memory: the law's.
     """
-    room, model, data = place
+    workspace, model, data = place
     good = call_integer(
         problem.functions[ACT],
-        (problem.table, room, time, step, address_in(state), address_in(memory), model, data),
+        (
+            problem.parameter_block,
+            workspace,
+            time,
+            step,
+            address_in(state),
+            address_in(memory),
+            model,
+            data,
+        ),
     )
     return good != 0

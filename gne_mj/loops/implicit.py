@@ -29,19 +29,19 @@ FAR = 1e-2
 
 @kernel
 def act(faults, plant, context, parts, at, state, memory):
-    """Fill work.demand; False, with the exit latched, if there is no input."""
+    """Fill work.commanded; False, with the exit latched, if there is no input."""
     problem, channels, clock, work = parts.problem, parts.channels, parts.clock, parts.work
     time, step, monitor = at.time, at.step, parts.monitor
-    m, states = channels.rest.shape
+    m, states = channels.equilibrium_state.shape
     solver = solver_in(work.solver, problem.order, len(work.g), states)
     found = solver.numbers.found
-    if solver.numbers.stands == step + 1.0:  # a run that goes on after its end was looked at
-        copy(solver.held, work.demand)
+    if solver.numbers.solved_step == step + 1.0:  # a run that goes on after its end was looked at
+        copy(solver.held, work.commanded)
         return True
-    solver.numbers.stands = step + 1.0
+    solver.numbers.solved_step = step + 1.0
     if found > 0.0:
-        watch.compare(monitor, time, work.y, solver.ahead)
-    faults.sense(problem, work, work.y, work.seen)
+        watch.compare(monitor, time, work.y, solver.prediction)
+    faults.sense(problem, work, work.y, work.measurement)
     known = faults.sense_state(plant, parts, step, state, solver.state, solver.scratch)
     if found == 0.0:
         find_slopes(plant, context, channels, clock, known, solver)
@@ -53,10 +53,12 @@ def act(faults, plant, context, parts, at, state, memory):
         solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
         solver.before[r], solver.earlier[r] = last, before
     if found == 0.0:
-        copy(problem.equilibrium, solver.ahead)  # inside for certain, as y(0) that is seen is not
+        copy(
+            problem.equilibrium, solver.prediction
+        )  # inside for certain, as y(0) that is seen is not
     solver.numbers.found += 1.0
     solver.numbers.steps = 0.0
-    map_ahead(plant, context, channels, clock, known, solver)
+    map_prediction(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     ended, agreed, least = OUTSIDE, False, np.inf
     for _ in range(MOST_MAPS):
@@ -74,8 +76,8 @@ def act(faults, plant, context, parts, at, state, memory):
             break
         for r in range(m):
             solver.u[r], solver.held[r] = solver.held[r], solver.u[r]
-            solver.ahead[r] = solver.reached[r]
-        map_ahead(plant, context, channels, clock, known, solver)
+            solver.prediction[r] = solver.reached[r]
+        map_prediction(plant, context, channels, clock, known, solver)
         least = correct_slopes(solver)
         copy(solver.u, solver.held)
         agreed = agrees(problem, solver)
@@ -84,18 +86,18 @@ def act(faults, plant, context, parts, at, state, memory):
             break
     functions.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
     for r in range(m):
-        solver.ahead[r], work.demand[r] = solver.y[r], solver.held[r]
-    functions.settle(problem, solver.ahead, work.held)
+        solver.prediction[r], work.commanded[r] = solver.y[r], solver.held[r]
+    functions.memory_outputs(problem, solver.prediction, work.held)
     watch.count_solution(monitor, time, solver.numbers.steps, agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
-        constraint = int(work.now.shell)
-        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now.shell_value, 0)
+        constraint = int(work.now.tightened)
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now.tightened_value, 0)
         return False
     return usable(time, 0, work, monitor)
 
 
 @kernel
-def map_ahead(plant, context, channels, clock, known, solver):
+def map_prediction(plant, context, channels, clock, known, solver):
     """Fill solver.reached with the outputs that the plant's map reaches under solver.u."""
     plant.predict(
         context, channels, clock, known, solver.u, solver.reached, solver.rolled,
@@ -108,11 +110,11 @@ def find_slopes(plant, context, channels, clock, known, solver):
     """Fill the slopes from the map under two inputs: exact where it is affine."""
     for r in range(len(solver.u)):
         solver.u[r] = 0.0
-    map_ahead(plant, context, channels, clock, known, solver)
+    map_prediction(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     for r in range(len(solver.u)):
         solver.u[r] = 1.0
-    map_ahead(plant, context, channels, clock, known, solver)
+    map_prediction(plant, context, channels, clock, known, solver)
     for r in range(len(solver.u)):
         solver.slope[r] = solver.reached[r] - solver.y[r]
         solver.stiff[r] = 1.0 / solver.slope[r]
@@ -127,7 +129,7 @@ def correct_slopes(solver):
     least = np.inf
     for r in range(len(solver.u)):
         change = solver.u[r] - solver.held[r]
-        moved = solver.reached[r] - solver.ahead[r]
+        moved = solver.reached[r] - solver.prediction[r]
         # of a short way rounding is all that is seen
         if abs(moved) > 1e-9 * (1.0 + abs(solver.reached[r])) and change != 0.0:
             secant = moved / change
@@ -143,8 +145,8 @@ def agrees(problem, solver):
     """Whether the outputs reached have nearly the distances to all bounds of those solved for."""
     data = problem.data
     for k in range(len(solver.inverse)):
-        room = -games.constraint(data, k, solver.reached) - data.tightening[k]
+        slack = -games.constraint(data, k, solver.reached) - data.tightening[k]
         meant = -games.constraint(data, k, solver.y) - data.tightening[k]
-        if not abs(room - meant) <= AGREES * abs(meant):
+        if not abs(slack - meant) <= AGREES * abs(meant):
             return False
     return True

@@ -1,7 +1,7 @@
 """Mode implicit, all agents' inputs together: the law as it stands at the outputs it produces.
 
-u = -pull(y+) - dphi(y+) with y+ = base + slope u is strongly monotone in y+ wherever all slopes are
-positive, so that it has one solution, strictly inside.
+u = -barrier_free(y+) - dphi(y+) with y+ = base + slope u is strongly monotone in y+ wherever all
+slopes are positive, so that it has one solution, strictly inside.
 """
 
 import sys
@@ -38,16 +38,16 @@ def residual(problem, first, last, memory, work, solver):
     weight = problem.settings[GAIN] * solver.numbers.rho
     games.values(data, data.all_constraints, y, solver.inverse)
     for k in range(len(solver.inverse)):
-        room = -solver.inverse[k] - data.tightening[k]
-        if not room > 0.0:
-            work.now.shell = k
-            work.now.shell_value = -room
+        slack = -solver.inverse[k] - data.tightening[k]
+        if not slack > 0.0:
+            work.now.tightened = k
+            work.now.tightened_value = -slack
             return False
-        solver.inverse[k] = 1.0 / room
-    functions.pulls(problem, first, last, y, memory, solver.residual)
+        solver.inverse[k] = 1.0 / slack
+    functions.barrier_free_terms(problem, first, last, y, memory, solver.residual)
     for a in range(len(y)):
-        pull = solver.residual[a]
-        solver.residual[a] = (y[a] - solver.base[a]) * solver.stiff[a] + pull
+        barrier_free = solver.residual[a]
+        solver.residual[a] = (y[a] - solver.base[a]) * solver.stiff[a] + barrier_free
     games.slopes(data, data.all_constraints, problem.order.start, column, y, solver.jacobian)
     for entry in range(len(column)):  # one loop without others inside is twice as fast
         k, a = within[entry], column[entry]
@@ -66,7 +66,7 @@ def assemble(problem, first, last, b, memory, work, solver):
         for c in range(2 * b + 1):
             band[r, c] = 0.0
         band[r, b] = solver.stiff[a]
-        functions.add_pull_slope(problem, i, a, y, memory, solver.row)
+        functions.add_barrier_free_slope(problem, i, a, y, memory, solver.row)
         for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
             j = data.cost_index[member]
             for c in range(at[j], at[j + 1]):

@@ -1,8 +1,10 @@
-"""Where a native loop finds its numbers: a table of what does not change, a room of what does.
+"""Where a native loop finds its numbers: a parameter block of what does not change, a workspace of
+what does.
 
-A table (:mod:`gne_mj.table`) has the plant's arrays first, then the game's, the graph's and all
-else that a run is made of. A room is one flat array, as :class:`Room` says, and behind it what
-the engine adds. MuJoCo has it in ``userdata``; so a run's whole memory is part of MuJoCo's state.
+A parameter block (:mod:`gne_mj.parameter_block`) has the plant's arrays first, then the game's, the
+graph's and all else that a run is made of. A workspace is one flat array, as :class:`Workspace`
+says, and behind it what the engine adds. MuJoCo has it in ``userdata``; so a run's whole memory is
+part of MuJoCo's state.
 """
 
 from collections.abc import Sequence
@@ -12,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.propagation import scratch_length
-from gne_mj.loops.feedback import Problem, Work
-from gne_mj.loops.monitor import Monitor, Seen
+from gne_mj.loops.feedback import Problem, StepScratch
+from gne_mj.loops.monitor import Monitor, MonitorNumbers
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers
+from gne_mj.parameter_block import ParameterBlock, floats
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
-from gne_mj.records import arrays, in_array, in_numbers, in_table, place
-from gne_mj.table import Table, floats
+from gne_mj.records import arrays, in_array, in_numbers, in_parameter_block, place
 
-PLANT_TABLE = 3  # arrays of the plant, before all others
+PLANT_BLOCK = 3  # arrays of the plant, before all others
 
 
 class Steps(NamedTuple):
@@ -43,7 +45,7 @@ class Steps(NamedTuple):
 
 
 class Run(NamedTuple):
-    """The arrays of a table behind the plant's."""
+    """The arrays of a parameter block behind the plant's."""
 
     problem: Problem
     channels: Channels
@@ -52,16 +54,16 @@ class Run(NamedTuple):
 
 
 def _place(name: str) -> int:
-    return PLANT_TABLE + place(Run, name)
+    return PLANT_BLOCK + place(Run, name)
 
 
 STEPS, H = _place("steps"), _place("h")
-steps_in = in_numbers(Steps, STEPS)  # of a table, by its address
-_problem = in_table(Problem, _place("problem"))
-_channels = in_table(Channels, _place("channels"))
+steps_in = in_numbers(Steps, STEPS)  # of a parameter block, by its address
+_problem = in_parameter_block(Problem, _place("problem"))
+_channels = in_parameter_block(Channels, _place("channels"))
 
 
-class Clock(NamedTuple):
+class LoopClock(NamedTuple):
     """How a loop steps."""
 
     h: float  # step in s
@@ -74,20 +76,20 @@ class Setup(NamedTuple):
     """What one run is made of besides its plant, its start and its kernels."""
 
     problem: Problem
-    rest: NDArray[np.float64]  # (m, states) equilibrium, from which V is measured
-    clock: Clock
+    equilibrium_state: NDArray[np.float64]  # (m, states) equilibrium, from which V is measured
+    clock: LoopClock
     history: int = 0  # lengths of scratch arrays that depend on the kind of loop
     solver: int = 0
 
 
-def table_arrays(
+def parameter_arrays(
     plant: Sequence[NDArray[Any]],
     setup: Setup,
     agents: Agents,
     memory: int,
     stages: int,
 ) -> list[NDArray[Any]]:
-    """A table's arrays.
+    """A parameter block's arrays.
 
     Args:
         plant: the plant's own, PLANT_TABLE of them.
@@ -98,53 +100,65 @@ def table_arrays(
     """
     problem, clock = setup.problem, setup.clock
     steps = Steps(
-        agents.channels, len(problem.data.member_pointer) - 1, len(problem.data.offsets) - 1,
-        setup.rest.shape[1], memory, stages, clock.period, clock.mode, setup.history, setup.solver,
-        clock.method, agents.kind.OUTPUT,
-    )  # fmt: skip
+        agents.channels,
+        len(problem.data.member_pointer) - 1,
+        len(problem.data.offsets) - 1,
+        setup.equilibrium_state.shape[1],
+        memory,
+        stages,
+        clock.period,
+        clock.mode,
+        setup.history,
+        setup.solver,
+        clock.method,
+        agents.kind.OUTPUT,
+    )
     channels = Channels(
-        np.ascontiguousarray(agents.parameters), np.ascontiguousarray(setup.rest),
+        np.ascontiguousarray(agents.parameters), np.ascontiguousarray(setup.equilibrium_state),
         compiled_functions(agents.kind), steps.output,
     )  # fmt: skip
     run = Run(problem, channels, np.array(steps, dtype=np.int64), np.array([clock.h]))
     return [*plant, *arrays(run)]
 
 
-def ode_table(setup: Setup, agents: Agents, memory: int) -> Table:
-    """The table of a run of ODE agents; ``memory`` is the length of the law's."""
-    nothing = [np.zeros(0)] * PLANT_TABLE
-    return Table(table_arrays(nothing, setup, agents, memory, 1))
+def ode_parameter_block(setup: Setup, agents: Agents, memory: int) -> ParameterBlock:
+    """The parameter block of a run of ODE agents; ``memory`` is the length of the law's."""
+    nothing = [np.zeros(0)] * PLANT_BLOCK
+    return ParameterBlock(parameter_arrays(nothing, setup, agents, memory, 1))
 
 
-def steps_of(table: Table) -> Steps:
-    """What a loop is made of, from its table."""
-    return Steps(*table.arrays[STEPS].tolist())
+def steps_of(parameter_block: ParameterBlock) -> Steps:
+    """What a loop is made of, from its parameter block."""
+    return Steps(*parameter_block.arrays[STEPS].tolist())
 
 
-def problem_and_table(setup: Setup, agents: Agents, memory: int) -> tuple[Problem, Table]:
-    """A run's problem as Python calls its law's functions with; keep the table meanwhile."""
-    table = ode_table(setup, agents, memory)
-    return setup.problem._replace(table=table.address), table
-
-
-@kernel
-def problem_in(table):
-    """What the law reads, from a run's table."""
-    return _problem(table, steps_in(table).agents)
+def problem_and_parameter_block(
+    setup: Setup, agents: Agents, memory: int
+) -> tuple[Problem, ParameterBlock]:
+    """A run's problem as Python calls its law's functions with; keep the parameter block
+    meanwhile."""
+    parameter_block = ode_parameter_block(setup, agents, memory)
+    return setup.problem._replace(parameter_block=parameter_block.address), parameter_block
 
 
 @kernel
-def clock_in(table):
-    """How the loop steps, from a run's table."""
-    steps = steps_in(table)
-    return Clock(floats(table, H)[0], steps.period, steps.mode, steps.method)
+def problem_in(parameter_block):
+    """What the law reads, from a run's parameter block."""
+    return _problem(parameter_block, steps_in(parameter_block).agents)
 
 
 @kernel
-def channels_in(table):
-    """The agents' channels, from a run's table."""
-    steps = steps_in(table)
-    return _channels(table, steps.actions, steps.output)
+def clock_in(parameter_block):
+    """How the loop steps, from a run's parameter block."""
+    steps = steps_in(parameter_block)
+    return LoopClock(floats(parameter_block, H)[0], steps.period, steps.mode, steps.method)
+
+
+@kernel
+def channels_in(parameter_block):
+    """The agents' channels, from a run's parameter block."""
+    steps = steps_in(parameter_block)
+    return _channels(parameter_block, steps.actions, steps.output)
 
 
 class Progress(Numbers):
@@ -155,29 +169,30 @@ class Progress(Numbers):
     recorder: float  # address of the block that rows go to, 0: none
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """What changes in a run, but for what the engine adds."""
 
     progress: Progress
     monitor: Monitor
     u: Annotated[np.ndarray, "m"]  # input held
-    work: Work
+    work: StepScratch
 
 
-ROOM = {"propagation": scratch_length}  # what its shapes use
-_length, _room_in = in_array(Room, "m p agents history solver", **ROOM)
+SCRATCH = {"propagation": scratch_length}  # what its shapes use
+_length, _workspace_in = in_array(Workspace, "m p agents history solver", **SCRATCH)
 
 
 @kernel
-def loop_room_length(s):
-    """Entries of a room, without what the engine adds; of sizes as a table has them."""
+def loop_workspace_length(s):
+    """Entries of a workspace, without what the engine adds; of sizes as a parameter block has
+    them."""
     return _length(s.actions, s.constraints, s.agents, s.history, s.solver)
 
 
 @kernel
-def loop_room_in(flat, s):
-    """A room's views, without what the engine adds."""
-    return _room_in(flat, 0, s.actions, s.constraints, s.agents, s.history, s.solver)
+def loop_workspace_in(flat, s):
+    """A workspace's views, without what the engine adds."""
+    return _workspace_in(flat, 0, s.actions, s.constraints, s.agents, s.history, s.solver)
 
 
 class Parts(NamedTuple):
@@ -185,11 +200,11 @@ class Parts(NamedTuple):
 
     problem: Problem
     channels: Channels
-    clock: Clock
-    monitor: Seen
+    clock: LoopClock
+    monitor: MonitorNumbers
     figures: Monitor
     u: np.ndarray  # (m,) input held
-    work: Work
+    work: StepScratch
 
 
 class Instant(NamedTuple):
@@ -201,9 +216,14 @@ class Instant(NamedTuple):
 
 
 @kernel
-def parts_in(table, room):
-    """The parts of a run, from its table and room."""
+def parts_in(parameter_block, workspace):
+    """The parts of a run, from its parameter block and workspace."""
     return Parts(
-        problem_in(table), channels_in(table), clock_in(table), room.monitor.numbers, room.monitor,
-        room.u, room.work,
-    )  # fmt: skip
+        problem_in(parameter_block),
+        channels_in(parameter_block),
+        clock_in(parameter_block),
+        workspace.monitor.numbers,
+        workspace.monitor,
+        workspace.u,
+        workspace.work,
+    )

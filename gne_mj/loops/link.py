@@ -15,8 +15,8 @@ from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
 from gne_mj.loops import functions, implicit
 from gne_mj.loops.layout import (
     Instant,
-    loop_room_in,
-    loop_room_length,
+    loop_workspace_in,
+    loop_workspace_length,
     parts_in,
     problem_in,
     steps_in,
@@ -24,7 +24,7 @@ from gne_mj.loops.layout import (
 from gne_mj.loops.newton import solver_in
 from gne_mj.native import callback, kernel, source_key
 from gne_mj.numbers import numbers_in
-from gne_mj.table import floats_at
+from gne_mj.parameter_block import floats_at
 
 _whole, _real = types.int64, types.float64
 NO_OTHERS: Mapping[int, Any] = MappingProxyType({})
@@ -75,12 +75,12 @@ def action(law: ModuleType, game: ModuleType) -> Any:
     """The law's action in a game."""
     source = source_key(law, game)
 
-    def action(table, y, weights, memory, profile, now, u):
+    def action(block, y, weights, memory, profile, now, u):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         m = steps.actions
         return law.action(
-            game, problem_in(table), floats_at(y, m), floats_at(weights, steps.constraints),
+            game, problem_in(block), floats_at(y, m), floats_at(weights, steps.constraints),
             floats_at(memory, steps.memory), law_work_at(profile, now, m), floats_at(u, m),
         )  # fmt: skip
 
@@ -92,28 +92,28 @@ def of_memory(law: ModuleType) -> dict[int, Any]:
     """What moves a law's memory, and its storage."""
     source = source_key(law)
 
-    def rate(table, y, memory, out):
+    def rate(block, y, memory, out):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         size = steps.memory
         law.rate(
-            problem_in(table), floats_at(y, steps.actions), floats_at(memory, size),
+            problem_in(block), floats_at(y, steps.actions), floats_at(memory, size),
             floats_at(out, size),
         )  # fmt: skip
         return 0
 
-    def propagate(table, y, memory, scratch, length):
+    def propagate(block, y, memory, scratch, length):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         law.propagate(
-            problem_in(table), floats_at(y, steps.actions), floats_at(memory, steps.memory),
+            problem_in(block), floats_at(y, steps.actions), floats_at(memory, steps.memory),
             floats_at(scratch, length),
         )  # fmt: skip
         return 0
 
-    def storage(table, memory):
+    def storage(block, memory):
         _ = source
-        return law.storage(problem_in(table), floats_at(memory, steps_in(table).memory))
+        return law.storage(problem_in(block), floats_at(memory, steps_in(block).memory))
 
     return {
         functions.RATE: callback(_whole(*[_whole] * 4), rate),
@@ -128,9 +128,9 @@ def penalty(fall: Callable[[float, float], float]) -> Any:
     """The penalty at a time, by a schedule's kernel (:class:`gne_mj.barrier.Fall`)."""
     source = source_key(sys.modules[fall.__module__])
 
-    def penalty(table, time):
+    def penalty(block, time):
         _ = source
-        return scheduled(fall, problem_in(table).schedule, time)
+        return scheduled(fall, problem_in(block).schedule, time)
 
     return callback(_real(_whole, _real), penalty)
 
@@ -140,56 +140,56 @@ def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any
     """What mode implicit solves a law for, each agent by itself if ``alone``."""
     source = source_key(law, game)
 
-    def prepare(table, first, last, y, memory):
+    def prepare(block, first, last, y, memory):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         law.prepare(
-            problem_in(table), first, last, floats_at(y, steps.actions),
+            problem_in(block), first, last, floats_at(y, steps.actions),
             floats_at(memory, steps.memory),
         )  # fmt: skip
         return 0
 
-    def pulls(table, first, last, at_y, at_memory, at_out):
+    def barrier_free_terms(block, first, last, at_y, at_memory, at_out):
         _ = source
-        problem, steps = problem_in(table), steps_in(table)
+        problem, steps = problem_in(block), steps_in(block)
         y, memory = floats_at(at_y, steps.actions), floats_at(at_memory, steps.memory)
         out, data = floats_at(at_out, steps.actions), problem.data
         law.prepare(problem, first, last, y, memory)
         for i in range(first, last):
             for a in range(data.offsets[i], data.offsets[i + 1]):
-                out[a] = law.pull(game, problem, i, a, y, memory)
+                out[a] = law.barrier_free(game, problem, i, a, y, memory)
         return 0
 
-    def add_pull_slope(table, i, a, y, memory, out):
+    def add_barrier_free_slope(block, i, a, y, memory, out):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         m = steps.actions
-        law.add_pull_slope(
-            game, problem_in(table), i, a, floats_at(y, m), floats_at(memory, steps.memory),
+        law.add_barrier_free_slope(
+            game, problem_in(block), i, a, floats_at(y, m), floats_at(memory, steps.memory),
             floats_at(out, m),
         )  # fmt: skip
         return 0
 
-    def own_profile(table, i, y, memory, profile):
+    def own_profile(block, i, y, memory, profile):
         _ = source
-        steps = steps_in(table)
+        steps = steps_in(block)
         m = steps.actions
         return law.own_profile(
-            problem_in(table), i, floats_at(y, m), floats_at(memory, steps.memory),
+            problem_in(block), i, floats_at(y, m), floats_at(memory, steps.memory),
             floats_at(profile, m),
         )  # fmt: skip
 
-    def settle(table, ahead, held):
+    def memory_outputs(block, prediction, held):
         _ = source
-        m = steps_in(table).actions
-        law.settle(floats_at(ahead, m), floats_at(held, m))
+        m = steps_in(block).actions
+        law.memory_outputs(floats_at(prediction, m), floats_at(held, m))
         return 0
 
     found = {
         functions.PREPARE: callback(_whole(*[_whole] * 5), prepare),
-        functions.PULLS: callback(_whole(*[_whole] * 6), pulls),
-        functions.ADD_PULL_SLOPE: callback(_whole(*[_whole] * 6), add_pull_slope),
-        functions.SETTLE: callback(_whole(*[_whole] * 3), settle),
+        functions.BARRIER_FREE_TERMS: callback(_whole(*[_whole] * 6), barrier_free_terms),
+        functions.ADD_BARRIER_FREE_SLOPE: callback(_whole(*[_whole] * 6), add_barrier_free_slope),
+        functions.MEMORY_OUTPUTS: callback(_whole(*[_whole] * 3), memory_outputs),
     }
     if alone:
         found[functions.OWN_PROFILE] = callback(_real(*[_whole] * 5), own_profile)
@@ -205,9 +205,9 @@ def solve(equation: ModuleType) -> Any:
     """
     source = source_key()
 
-    def solve(table, memory, profile, now, solver, length):
+    def solve(block, memory, profile, now, solver, length):
         _ = source
-        steps, problem = steps_in(table), problem_in(table)
+        steps, problem = steps_in(block), problem_in(block)
         views = solver_in(floats_at(solver, length), problem.order, steps.constraints, steps.states)
         return equation.solve(
             problem, floats_at(memory, steps.memory), law_work_at(profile, now, steps.actions),
@@ -222,18 +222,20 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
     """What mode implicit does at a control instant, for all laws and games.
 
     Args:
-        plant: module that predicts, :mod:`gne_mj.plants.held_map` and its like.
+        plant: module that predicts, :mod:`gne_mj.plants.zero_order_hold` and its like.
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
         at: where MuJoCo keeps what, for a plant that asks it.
     """
     source = source_key(plant, faults)
 
-    def act(table, room, time, step, state, memory, model, data):
+    def act(block, workspace, time, step, state, memory, model, data):
         _ = source
-        steps = steps_in(table)
-        parts = parts_in(table, loop_room_in(floats_at(room, loop_room_length(steps)), steps))
+        steps = steps_in(block)
+        parts = parts_in(
+            block, loop_workspace_in(floats_at(workspace, loop_workspace_length(steps)), steps)
+        )
         good = implicit.act(
-            faults, plant, (at, model, data, table), parts, Instant(time, step, 0),
+            faults, plant, (at, model, data, block), parts, Instant(time, step, 0),
             floats_at(state, steps.actions * steps.states), floats_at(memory, steps.memory),
         )  # fmt: skip
         return 1 if good else 0

@@ -76,19 +76,19 @@ def residual(problem, first, last, memory, work, solver):
     low, high = data.offsets[first], data.offsets[first + 1]
     for a in range(low, high):
         solver.mixed[a] = solver.trial[a]
-    functions.pulls(problem, first, last, solver.mixed, memory, solver.residual)
+    functions.barrier_free_terms(problem, first, last, solver.mixed, memory, solver.residual)
     for a in range(low, high):
         solver.residual[a] += (solver.mixed[a] - solver.base[a]) * solver.stiff[a]
     slot = 0
     for entry in range(data.own_pointer[first], data.own_pointer[first + 1]):
         k = data.own_index[entry]
         look_along(problem, k, first, work, solver)
-        room = -games.constraint(data, k, work.profile) - data.tightening[k]
-        if not room > 0.0:
-            work.now.shell = k
-            work.now.shell_value = -room
+        slack = -games.constraint(data, k, work.profile) - data.tightening[k]
+        if not slack > 0.0:
+            work.now.tightened = k
+            work.now.tightened_value = -slack
             return False
-        solver.inverse[k] = 1.0 / room
+        solver.inverse[k] = 1.0 / slack
         for a in range(low, high):
             slope = games.constraint_gradient(data, k, a, work.profile)
             solver.jacobian[slot] = slope
@@ -106,7 +106,7 @@ def assemble(problem, first, last, b, memory, work, solver):
     for a in range(low, high):
         for c in range(2 * b + 1):
             band[a - low, c] = 0.0
-        functions.add_pull_slope(problem, first, a, solver.mixed, memory, solver.row)
+        functions.add_barrier_free_slope(problem, first, a, solver.mixed, memory, solver.row)
         for member in range(data.cost_pointer[first], data.cost_pointer[first + 1]):
             j = data.cost_index[member]
             for c in range(at[j], at[j + 1]):

@@ -12,7 +12,7 @@ from gne_mj.numbers import Numbers
 from gne_mj.records import dtype_of
 
 
-class Seen(Numbers):
+class MonitorNumbers(Numbers):
     """A monitor's single numbers; times in s."""
 
     started: float  # 1 once something was observed
@@ -31,7 +31,7 @@ class Seen(Numbers):
     saturated: float  # 1 once an input was limited
     saturated_time: float  # when that was first
     saturated_action: float
-    saturated_demand: float
+    saturated_command: float
     exit_between: float  # 1: the exit was not at a control instant
     # Mode implicit
     solutions: float  # inputs that were solved for
@@ -51,7 +51,7 @@ class Seen(Numbers):
 class Monitor(NamedTuple):
     """A monitor in native code; in Python the numbers are beside the arrays (:func:`fresh`)."""
 
-    numbers: Seen
+    numbers: MonitorNumbers
     worst: Annotated[np.ndarray, "p"]  # each constraint's greatest value
     worst_time: Annotated[np.ndarray, "p"]
     peak: Annotated[np.ndarray, "m"]  # of |u| that was asked for
@@ -98,10 +98,10 @@ def forget_exit(monitor):
 
 
 @kernel
-def compare(monitor, time, y, ahead):
+def compare(monitor, time, y, prediction):
     """Note how far the outputs y (m,) are from those predicted for this control instant."""
     for r in range(len(y)):
-        distance = abs(y[r] - ahead[r])
+        distance = abs(y[r] - prediction[r])
         if not distance <= monitor.prediction:
             monitor.prediction = distance
             monitor.prediction_time = time
@@ -132,9 +132,9 @@ def observe(monitor, figures, time, work, before, u, storage):
         figures: the whole of it, changed.
         time: now, in s.
         work: of the loop, with outputs y (m,), constraint values g (p,) and what the law asks
-            for, demand (m,).
+            for, the commanded one (m,).
         before: the input that acted until now (m,); used only if there was an earlier observation.
-        u: the input that acts from now on (m,), demand within the actuators' limits.
+        u: the input that acts from now on (m,), the commanded one within the actuators' limits.
         storage: V now.
     """
     first = monitor.started == 0.0
@@ -163,12 +163,12 @@ def observe(monitor, figures, time, work, before, u, storage):
         figures.energy[r] += 0.25 * elapsed * (last_u + before[r]) * (last_y + y)
         figures.last_y[r] = y
         figures.last_u[r] = u[r]
-        magnitude = abs(work.demand[r])
+        magnitude = abs(work.commanded[r])
         if magnitude > figures.peak[r]:
             figures.peak[r] = magnitude
             figures.peak_time[r] = time
-        if u[r] != work.demand[r] and monitor.saturated == 0.0:
+        if u[r] != work.commanded[r] and monitor.saturated == 0.0:
             monitor.saturated = 1.0
             monitor.saturated_time = time
             monitor.saturated_action = r
-            monitor.saturated_demand = work.demand[r]
+            monitor.saturated_command = work.commanded[r]

@@ -2,11 +2,12 @@
 
 MuJoCo evaluates control at every stage of its integrator. The callback counts these evaluations
 itself: the first one of each step measures, acts and observes exactly as the ODE loop does
-(:func:`gne_mj.loops.ode.look`), and writes a row if one is due; later ones, in mode `continuous`,
-only act. In that mode the law's memory is in ``act``, moved by MuJoCo's integrator at the rates
-that a second callback gives; in the held modes it is in ``userdata``, where nothing but the law
-moves it. What else is kept from call to call is in ``userdata`` as well; both are part of MuJoCo's
-state. userdata holds [mark, address of the table, the fleet's own, the loop's room].
+(:func:`gne_mj.loops.ode.control_step`), and writes a row if one is due; later ones, in mode
+`continuous`, only act. In that mode the law's memory is in ``act``, moved by MuJoCo's integrator at
+the rates that a second callback gives; in the held modes it is in ``userdata``, where nothing but
+the law moves it. What else is kept from call to call is in ``userdata`` as well; both are part of
+MuJoCo's state. userdata holds [mark, address of the parameter block, the fleet's own, the loop's
+workspace].
 """
 
 from functools import cache
@@ -25,20 +26,21 @@ from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import NO_SIZES
 from gne_mj.loops.feedback import Sizes as LoopSizes
 from gne_mj.loops.layout import (
-    ROOM,
+    SCRATCH,
     Instant,
-    Room,
     Setup,
     Steps,
+    Workspace,
+    parameter_arrays,
     parts_in,
     problem_in,
     steps_in,
     steps_of,
-    table_arrays,
 )
-from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, look
+from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, control_step
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
+from gne_mj.parameter_block import ParameterBlock, integers
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.mujoco import PLACES, STAGES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import (
@@ -55,29 +57,30 @@ from gne_mj.plants.native_mujoco import (
     field,
     forces_lost,
     offsets,
+    parameter_block_of,
     set_number,
     state_functions,
     step_address,
-    table_of,
     timed_step,
 )
 from gne_mj.records import by_name, dtype_of, in_array
-from gne_mj.table import Table, integers
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
 
 
-class MujocoRoom(NamedTuple):
+class MujocoWorkspace(NamedTuple):
     """What changes in a run, in userdata."""
 
-    loop: Room
+    loop: Workspace
     state: Annotated[np.ndarray, "m * states"]  # flat, at the step's start
     later: Annotated[np.ndarray, "m * states"]  # and at a later stage
     memory: Annotated[np.ndarray, "held"]  # the law's, in the held modes
 
 
-_length, _room_in = in_array(MujocoRoom, "m p agents states held history solver", **ROOM)
+_length, _workspace_in = in_array(
+    MujocoWorkspace, "m p agents states held history solver", **SCRATCH
+)
 
 
 @kernel
@@ -87,52 +90,52 @@ def held_memory(s):
 
 
 @kernel
-def mujoco_room_length(s):
-    """Entries of the room of a loop of these sizes, as a table has them."""
+def mujoco_workspace_length(s):
+    """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
     return _length(
         s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history, s.solver
     )
 
 
 @kernel
-def mujoco_room_in(userdata, start, s):
-    """The views of a room that begins there."""
-    return _room_in(
+def mujoco_workspace_in(userdata, start, s):
+    """The views of a workspace that begins there."""
+    return _workspace_in(
         userdata, start, s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history,
         s.solver,
     )  # fmt: skip
 
 
-def room_of(userdata: NDArray[np.float64], start: int, s: Steps) -> Any:
+def workspace_of(userdata: NDArray[np.float64], start: int, s: Steps) -> Any:
     """The same as Python knows it, by name."""
     dtype = dtype_of(
-        MujocoRoom, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-        held=held_memory(s), history=s.history, solver=s.solver, **ROOM,
+        MujocoWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
+        held=held_memory(s), history=s.history, solver=s.solver, **SCRATCH,
     )  # fmt: skip
     return by_name(userdata[start:], dtype)
 
 
 class Place(NamedTuple):
-    """Where a simulation's numbers are: addresses, and what the fleet's table says."""
+    """Where a simulation's numbers are: addresses, and what the fleet's parameter block says."""
 
     at: Offsets
-    table: int
+    parameter_block: int
     model: int
     data: int
     sizes: Sizes
 
 
 @kernel
-def place_of(at, table, model, data):
+def place_of(at, parameter_block, model, data):
     """The place of a simulation that is ours."""
-    return Place(at, table, model, data, sizes_in(table))
+    return Place(at, parameter_block, model, data, sizes_in(parameter_block))
 
 
 @kernel
-def room_at(place, steps):
-    """A simulation's room."""
+def workspace_at(place, steps):
+    """A simulation's workspace."""
     userdata = field(place.data, place.at.userdata, place.sizes.nuserdata)
-    return mujoco_room_in(userdata, place.sizes.room, steps)
+    return mujoco_workspace_in(userdata, place.sizes.workspace, steps)
 
 
 def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
@@ -142,37 +145,37 @@ def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
     def control(model, data):
         _ = source
         model, data = address_of(model), address_of(data)
-        table = table_of(at, model, data)
-        if table <= 0:
+        parameter_block = parameter_block_of(at, model, data)
+        if parameter_block <= 0:
             return
-        place = place_of(at, table, model, data)
-        steps = steps_in(table)
-        room = room_at(place, steps)
-        continuous, progress = steps.mode == CONTINUOUS, room.loop.progress
+        place = place_of(at, parameter_block, model, data)
+        steps = steps_in(parameter_block)
+        workspace = workspace_at(place, steps)
+        continuous, progress = steps.mode == CONTINUOUS, workspace.loop.progress
         act = field(data, at.act, place.sizes.na)
-        memory = act[place.sizes.memory :] if continuous else room.memory
+        memory = act[place.sizes.memory :] if continuous else workspace.memory
         step, stage = np.int64(progress.step), np.int64(progress.stage)
         last = stage + 1 == steps.evaluations
         progress.step = step + 1 if last else step
         progress.stage = 0 if last else stage + 1
         if stage > 0 and not continuous:
             return
-        parts, work = parts_in(table, room.loop), room.loop.work
+        parts, work = parts_in(parameter_block, workspace.loop), workspace.loop.work
         monitor, divided, h = parts.monitor, work.division, parts.clock.h
         time, length, state = (
             division.begins(divided, step, h),
             division.piece(divided, h),
-            room.state,
+            workspace.state,
         )
         if stage > 0:
             time += length if stage == 3 else 0.5 * length
-            state = room.later
+            state = workspace.later
         if stage > 0 or divided.known == division.NOTHING:
-            fleet.gather(at, data, table, state)
+            fleet.gather(at, data, parameter_block, state)
         userdata = field(data, at.userdata, place.sizes.nuserdata)
         storage = fleet.stored(parts.channels, state, userdata) if stage == 0 else 0.0
         where = (address_in(progress), place.model, data)
-        good = monitor.exit == watch.INSIDE and look(
+        good = monitor.exit == watch.INSIDE and control_step(
             faults, where, parts, Instant(time, step, stage), storage, state, memory
         )
         block = np.int64(progress.recorder)
@@ -181,10 +184,10 @@ def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
             record(block, faults, parts, step, Present(state, memory, qpos))
         if good and continuous:
             division.note(stage, parts.problem, work)
-        places, ctrl = integers(table, PLACES), field(data, at.ctrl, place.sizes.nu)
-        acts = faults.push(parts.problem, parts.clock, step, work.u, work.acts)
-        for r in range(len(acts)):
-            ctrl[fleet.actuator_of(places, r)] = acts[r] if good else 0.0
+        places, ctrl = integers(parameter_block, PLACES), field(data, at.ctrl, place.sizes.nu)
+        applied = faults.push(parts.problem, parts.clock, step, work.u, work.applied)
+        for r in range(len(applied)):
+            ctrl[fleet.actuator_of(places, r)] = applied[r] if good else 0.0
 
     return callback(CALLBACK, control)
 
@@ -196,14 +199,16 @@ def _remember_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
     def remember(model, data, actuator):
         _ = source
         model, data = address_of(model), address_of(data)
-        table = table_of(at, model, data)
-        if table <= 0:
+        parameter_block = parameter_block_of(at, model, data)
+        if parameter_block <= 0:
             return 0.0
-        place = place_of(at, table, model, data)
+        place = place_of(at, parameter_block, model, data)
         rates = field(data, at.act_dot, place.sizes.na)[place.sizes.memory :]
-        work = room_at(place, steps_in(table)).loop.work
+        work = workspace_at(place, steps_in(parameter_block)).loop.work
         memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
-        functions.rate(problem_in(table), faults.choose(work.y, work.seen), memory, rates)
+        functions.rate(
+            problem_in(parameter_block), faults.choose(work.y, work.measurement), memory, rates
+        )
         return rates[0] if len(rates) == 1 else 0.0  # MuJoCo takes the one of a single entry
 
     return callback(ACTIVATION, remember)
@@ -302,10 +307,14 @@ def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
     def advance(machine, count):
         _ = source
         model, data = machine.model, machine.data
-        table = table_of(at, model, data)
-        place, steps = place_of(at, table, model, data), steps_in(table)
-        room = room_at(place, steps)
-        parts, progress, state = parts_in(table, room.loop), room.loop.progress, room.state
+        parameter_block = parameter_block_of(at, model, data)
+        place, steps = place_of(at, parameter_block, model, data), steps_in(parameter_block)
+        workspace = workspace_at(place, steps)
+        parts, progress, state = (
+            parts_in(parameter_block, workspace.loop),
+            workspace.loop.progress,
+            workspace.state,
+        )
         memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
         divided, h, moving = parts.work.division, parts.clock.h, steps.mode == CONTINUOUS
         step, done, result = np.int64(progress.step), 0, UNDER_WAY
@@ -317,10 +326,10 @@ def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
                     break
                 good = parts.monitor.exit == watch.INSIDE
                 if good:
-                    fleet.refresh(model, data, table)
-                    fleet.gather(at, data, table, state)
+                    fleet.refresh(model, data, parameter_block)
+                    fleet.gather(at, data, parameter_block, state)
                     end = Instant(division.ends(divided, step, h), step, division.END)
-                    good = look(faults, (0, model, data), parts, end, 0.0, state, memory)
+                    good = control_step(faults, (0, model, data), parts, end, 0.0, state, memory)
                 result = end_piece(faults, machine, parts, step, steps.evaluations, good)
             else:
                 result = whole_step(place, machine, parts, step)
@@ -342,17 +351,17 @@ def build(at: Offsets, fleet: ModuleType, faults: ModuleType) -> tuple[Any, ...]
     Args:
         at: where MuJoCo keeps what.
         fleet: the module that reads and drives the robots, as :mod:`gne_mj.plants.mujoco` does.
-        faults: module of kernels, as :func:`gne_mj.loops.ode.look` has it.
+        faults: module of kernels, as :func:`gne_mj.loops.ode.control_step` has it.
     """
     return tuple(make(at, fleet, faults) for make in (_control_of, _remember_of, _advance_of))
 
 
 def machine_of(model: mujoco.MjModel, data: mujoco.MjData, saved: NDArray[np.float64]) -> Machine:
-    """What moves this simulation; ``saved`` as :func:`room_for_states` makes it."""
+    """What moves this simulation; ``saved`` as :func:`workspace_for_states` makes it."""
     return Machine(step_address(), *state_functions(), model._address, data._address, saved)
 
 
-def room(
+def workspace(
     game: Game, agents: Agents, memory: int, mode: int, sizes: LoopSizes = NO_SIZES
 ) -> tuple[int, int]:
     """Entries of userdata, and of act, that a plant must leave for this game's loop.
@@ -368,20 +377,26 @@ def room(
     return int(needed), moved
 
 
-def mujoco_table(plant: "FleetPlant", setup: Setup, agents: Agents, memory: int) -> Table:
-    """The table of a run: the plant's places and sizes, the robots' numbers, and the rest."""
-    arrays = table_arrays(plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator])
-    return Table(arrays)
+def mujoco_parameter_block(
+    plant: "FleetPlant", setup: Setup, agents: Agents, memory: int
+) -> ParameterBlock:
+    """The parameter block of a run: the plant's places and sizes, the robots' numbers, and the
+    rest."""
+    arrays = parameter_arrays(
+        plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator]
+    )
+    return ParameterBlock(arrays)
 
 
 class MujocoLoop(ClosedLoop):
     """The closed loop of a fleet in MuJoCo.
 
     Args:
-        plant: the fleet, reset to its start, with :func:`room` in its userdata and for the memory.
+        plant: the fleet, reset to its start, with :func:`workspace` in its userdata and for the
+        memory.
         setup: what the run is made of.
         memory: the law's, at the start.
-        faults: module of kernels, see :func:`gne_mj.loops.ode.look`.
+        faults: module of kernels, see :func:`gne_mj.loops.ode.control_step`.
     """
 
     def __init__(
@@ -393,15 +408,19 @@ class MujocoLoop(ClosedLoop):
     ) -> None:
         self.plant = plant
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
-        self._table = mujoco_table(plant, setup, plant.agents, len(memory))
+        self._parameter_block = mujoco_parameter_block(plant, setup, plant.agents, len(memory))
         self._faulty = faults is not faultless
-        data, sizes = plant.data, steps_of(self._table)
-        room = room_of(data.userdata, plant.sizes.room, sizes)
-        self._progress, self.monitor, self._u = room.loop, room.loop.monitor, room.loop.u
-        self._memory = put_start(data, self._table, setup.clock.mode, memory)
+        data, sizes = plant.data, steps_of(self._parameter_block)
+        workspace = workspace_of(data.userdata, plant.sizes.workspace, sizes)
+        self._progress, self.monitor, self._u = (
+            workspace.loop,
+            workspace.loop.monitor,
+            workspace.loop.u,
+        )
+        self._memory = put_start(data, self._parameter_block, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._remembers = moved  # by MuJoCo's integrator
-        self._machine = machine_of(plant.model, data, room_for_states(plant.model))
+        self._machine = machine_of(plant.model, data, workspace_for_states(plant.model))
 
     @property
     def _step(self) -> int:
@@ -440,9 +459,9 @@ class MujocoLoop(ClosedLoop):
         if recorder.done[0]:
             return recorder.samples(0)
         none = np.full((1, len(self._u)), np.nan)
-        struck = none[:, : len(self._u) * self._faulty]
+        faulty_rows = none[:, : len(self._u) * self._faulty]
         qpos = data.qpos[None, : self.plant.configuration].copy()
-        return Samples(state[None], none, self._memory[None].copy(), struck, struck, qpos)
+        return Samples(state[None], none, self._memory[None].copy(), faulty_rows, faulty_rows, qpos)
 
     def present(self) -> Present:
         """See the base class."""
@@ -450,7 +469,9 @@ class MujocoLoop(ClosedLoop):
         return Present(self.plant.state, self._memory.copy(), qpos)
 
     def _adopt(self, setup: Setup) -> None:
-        self._table = mujoco_table(self.plant, setup, self.plant.agents, len(self._memory))
+        self._parameter_block = mujoco_parameter_block(
+            self.plant, setup, self.plant.agents, len(self._memory)
+        )
 
     def push(self, force: NDArray[np.float64]) -> None:
         """See the base class; forces are MuJoCo's qfrc_applied at the outputs' joints."""
@@ -469,7 +490,7 @@ class MujocoLoop(ClosedLoop):
             raise EngineError(
                 "the loop's MuJoCo data was reset: make a new loop to start from there"
             )
-        userdata[:USERDATA_HEADER] = LOOP_MARK, self._table.address
+        userdata[:USERDATA_HEADER] = LOOP_MARK, self._parameter_block.address
         recorder = Recorder(
             1, rows, (agents.channels, agents.states), len(self._memory), self._faulty,
             self.plant.configuration, first=self._step, every=every,
@@ -484,7 +505,7 @@ def observe(plant: "FleetPlant", control: Any, progress: Any) -> None:
     Args:
         plant: with mjData of a loop.
         control: the loop's callback.
-        progress: of the loop, as its room in userdata has it.
+        progress: of the loop, as its workspace in userdata has it.
 
     The plant's callbacks must be installed.
     """
@@ -495,18 +516,18 @@ def observe(plant: "FleetPlant", control: Any, progress: Any) -> None:
     progress.step, progress.stage = step, 0.0
 
 
-def room_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
+def workspace_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
     """Two rows for what a step of MuJoCo starts from."""
     return np.zeros((2, mujoco.mj_stateSize(model, STATE)))
 
 
 def put_start(
-    data: mujoco.MjData, table: Table, mode: int, memory: NDArray[np.float64]
+    data: mujoco.MjData, parameter_block: ParameterBlock, mode: int, memory: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Make mjData the start of a run; returns the memory."""
     data.userdata[:] = 0.0
     place = data.act if mode == CONTINUOUS and len(memory) else data.userdata
     held: NDArray[np.float64] = place[len(place) - len(memory) :]
     held[:] = memory
-    data.userdata[:USERDATA_HEADER] = LOOP_MARK, table.address
+    data.userdata[:USERDATA_HEADER] = LOOP_MARK, parameter_block.address
     return held

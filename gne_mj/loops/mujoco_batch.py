@@ -19,12 +19,12 @@ from gne_mj.loops.mujoco import (
     machine_of,
     observe,
     put_start,
-    room_for_states,
-    room_of,
+    workspace_for_states,
+    workspace_of,
 )
 from gne_mj.loops.ode import CONTINUOUS
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants.native_mujoco import callbacks, offsets
-from gne_mj.table import Table
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
@@ -58,13 +58,13 @@ class MujocoBatch(BatchLoop):
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
-        tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
+        parameter_blocks, sizes, recorder, monitors = begin(cases, span, self._faulty)
         blocks = recorder.addresses
 
         def one(run: int) -> bool:
             fleet = self._fleets.get()
             try:
-                progress = fleet.begin(cases[run], tables[run])
+                progress = fleet.begin(cases[run], parameter_blocks[run])
                 progress.recorder = blocks[run]
                 for done in range(0, span.steps, STRIDE):
                     if stopped():
@@ -93,10 +93,10 @@ class _Fleet:
 
     def __init__(self, plant: "FleetPlant") -> None:
         self.plant = plant
-        self.machine = machine_of(plant.model, plant.data, room_for_states(plant.model))
+        self.machine = machine_of(plant.model, plant.data, workspace_for_states(plant.model))
         self._parameters = plant.agents.parameters
 
-    def begin(self, case: Case, table: Table) -> Any:
+    def begin(self, case: Case, parameter_block: ParameterBlock) -> Any:
         """Make this the start of a run; returns its progress and monitor, by name."""
         plant = self.plant
         if not np.array_equal(case.parameters, self._parameters):
@@ -105,6 +105,6 @@ class _Fleet:
             mujoco.mj_setConst(plant.model, plant.data)
             self._parameters = case.parameters
         plant.reset(case.state)
-        sizes = steps_of(table)
-        put_start(plant.data, table, sizes.mode, case.memory)
-        return room_of(plant.data.userdata, plant.sizes.room, sizes).loop
+        sizes = steps_of(parameter_block)
+        put_start(plant.data, parameter_block, sizes.mode, case.memory)
+        return workspace_of(plant.data.userdata, plant.sizes.workspace, sizes).loop

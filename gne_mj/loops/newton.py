@@ -2,7 +2,7 @@
 
 For some agents' outputs y at the end of a control period it solves
 
-    (y - base) / slope + pull(y) + (gradient of the barrier at y) = 0,
+    (y - base) / slope + barrier_free(y) + (gradient of the barrier at y) = 0,
 
 where ``base + slope * u`` is what the plant reaches under the held input u. ``equation`` is the
 module that says which agents solve together and where their barriers look:
@@ -50,16 +50,16 @@ class SolverNumbers(Numbers):
     uses: float  # how often the factors were used
     leaves: float  # what they leave of an error
     rho: float  # the penalty that is solved for
-    stands: float  # the step (plus 1) that was solved for last
+    solved_step: float  # the step (plus 1) that was solved for last
 
 
-class Solver(NamedTuple):
+class InputSolver(NamedTuple):
     """Arrays of mode implicit, views into a loop's ``work.solver``."""
 
     numbers: SolverNumbers
     slope: Annotated[np.ndarray, "m"]  # dy+/du of each channel; kept from period to period
     stiff: Annotated[np.ndarray, "m"]  # 1 / slope
-    ahead: Annotated[np.ndarray, "m"]  # outputs expected at the next control instant; kept
+    prediction: Annotated[np.ndarray, "m"]  # outputs expected at the next control instant; kept
     # the input that was asked for last; kept, as the two before it
     held: Annotated[np.ndarray, "m"]
     before: Annotated[np.ndarray, "m"]
@@ -87,7 +87,7 @@ class Solver(NamedTuple):
 
 
 # Of m actions, p constraints, so many entries of dg/dy, and states of a channel
-solver_length, _views = in_array(Solver, "m p entries states b")
+solver_length, _views = in_array(InputSolver, "m p entries states b")
 
 
 @kernel
@@ -129,7 +129,7 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
             patience = PATIENCE
             if starts == 2:
                 return OUTSIDE
-            source = solver.anchor if starts == 0 else solver.ahead
+            source = solver.anchor if starts == 0 else solver.prediction
             copy(source[low:high], y[low:high])
             starts += 1
             continue

@@ -19,23 +19,23 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
-    ROOM,
+    SCRATCH,
     Instant,
-    Room,
     Setup,
     Steps,
-    ode_table,
+    Workspace,
+    ode_parameter_block,
     parts_in,
     steps_in,
     steps_of,
 )
 from gne_mj.loops.recorder import Recorder, record
 from gne_mj.native import callback, copy, kernel, source_key
+from gne_mj.parameter_block import floats_at
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import EULER, RK4
 from gne_mj.records import by_name, dtype_of, in_array
-from gne_mj.table import floats_at
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
@@ -45,13 +45,13 @@ CONTINUOUS, SAMPLED, IMPLICIT = range(3)
 @kernel
 def measure(channels, state, y):
     """Fill y (m,) with the outputs of a flat state: the channels' states, then the memory."""
-    states = channels.rest.shape[1]
+    states = channels.equilibrium_state.shape[1]
     for r in range(len(y)):
         y[r] = state[r * states + channels.output]
 
 
 @kernel
-def look(faults, place, parts, at, storage, state, memory):
+def control_step(faults, place, parts, at, storage, state, memory):
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
     At the end of a piece of a step, mode continuous, what the next piece begins with is evaluated
@@ -82,21 +82,23 @@ def look(faults, place, parts, at, storage, state, memory):
             if not instant:
                 monitor.exit_between = 1.0
             return False
-    if at.stage == division.END and not faults.KNOWN_AHEAD:
+    if at.stage == division.END and not faults.PREDICTION_KNOWN:
         divided.known = division.OUTPUTS
         return True
     if known == division.LAW:
         faults.deliver(problem, clock, at.step, work)
     elif instant:
-        if clock.mode != CONTINUOUS and work.now.stands < at.step:  # a control period has passed
+        if (
+            clock.mode != CONTINUOUS and work.now.memory_step < at.step
+        ):  # a control period has passed
             functions.propagate(problem, work.held, memory, work.scratch)
-            work.now.stands = at.step
+            work.now.memory_step = at.step
         faults.begin(parts, at, state, memory)
         if clock.mode == IMPLICIT:
             good = functions.act(problem, place, at.time, at.step, state, memory)
         else:
-            seen = faults.sense(problem, work, work.y, work.seen)
-            good = explicit_law(problem, at.time, stage, seen, memory, work, monitor)
+            measurement = faults.sense(problem, work, work.y, work.measurement)
+            good = explicit_law(problem, at.time, stage, measurement, memory, work, monitor)
         if not good:
             return False
         if at.stage == division.END:
@@ -114,7 +116,7 @@ def look(faults, place, parts, at, storage, state, memory):
 
 
 class Vectors(NamedTuple):
-    """What a loop of ODE agents has behind its :class:`Room`; states are flat, with the memory."""
+    """What an ODE loop has behind its :class:`Workspace`; states are flat, with the memory."""
 
     state: Annotated[np.ndarray, "m * states + memory"]
     trial: Annotated[np.ndarray, "m * states + memory"]  # at a stage, or at a piece's end
@@ -123,40 +125,40 @@ class Vectors(NamedTuple):
     spare: Annotated[np.ndarray, "max(m, 5 * states)"]  # for the agents' kernels
 
 
-class OdeRoom(NamedTuple):
+class OdeWorkspace(NamedTuple):
     """What changes in a run of ODE agents."""
 
-    loop: Room
+    loop: Workspace
     vectors: Vectors
 
 
 _SIZES = "m p agents states memory history solver"
-_length, _room_in = in_array(OdeRoom, _SIZES, **ROOM)
+_length, _workspace_in = in_array(OdeWorkspace, _SIZES, **SCRATCH)
 
 
 @kernel
-def ode_room_length(s):
-    """Entries of the room of a loop of these sizes, as a table has them."""
+def ode_workspace_length(s):
+    """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
     return _length(
         s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
     )  # fmt: skip
 
 
 @kernel
-def ode_room_in(flat, s):
-    """A room's views."""
-    return _room_in(
+def ode_workspace_in(flat, s):
+    """A workspace's views."""
+    return _workspace_in(
         flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
     )  # fmt: skip
 
 
-def rooms_of(flat: NDArray[np.float64], s: Steps) -> Any:
-    """Rooms (..., length) as Python knows them, by name."""
+def workspaces_of(flat: NDArray[np.float64], s: Steps) -> Any:
+    """Workspaces (..., length) as Python knows them, by name."""
     return by_name(
         flat,
         dtype_of(
-            OdeRoom, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-            memory=s.memory, history=s.history, solver=s.solver, **ROOM,
+            OdeWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
+            memory=s.memory, history=s.history, solver=s.solver, **SCRATCH,
         ),
     )  # fmt: skip
 
@@ -178,10 +180,10 @@ def piece_end(faults, parts, step, length, vectors):
             rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
             trial[r] = state[r] + length / 6.0 * rise
         return
-    acts = faults.push(parts.problem, parts.clock, step, parts.u, parts.work.acts)
-    size = channels.rest.size
+    applied = faults.push(parts.problem, parts.clock, step, parts.u, parts.work.applied)
+    size = channels.equilibrium_state.size
     copy(state[:size], trial[:size])
-    agents_functions.roll(channels, EULER, length, 1, trial, acts, vectors.spare)
+    agents_functions.roll(channels, EULER, length, 1, trial, applied, vectors.spare)
     for r in range(size, len(state)):  # Euler's method for the memory
         trial[r] = state[r] + length * k[0, r]
 
@@ -189,21 +191,21 @@ def piece_end(faults, parts, step, length, vectors):
 @kernel
 def rates_at(faults, parts, at, now, vectors):
     """Fill the rates at a stage, whose flat state is ``now``."""
-    size, out = parts.channels.rest.size, vectors.rates[at.stage]
+    size, out = parts.channels.equilibrium_state.size, vectors.rates[at.stage]
     work = parts.work
-    acts = faults.push(parts.problem, parts.clock, at.step, work.u, work.acts)
-    seen = faults.choose(work.y, work.seen)
+    applied = faults.push(parts.problem, parts.clock, at.step, work.u, work.applied)
+    measurement = faults.choose(work.y, work.measurement)
     if parts.clock.method == RK4:
-        agents_functions.rates(parts.channels, at.stage, now, acts, vectors.spare, out)
-    functions.rate(parts.problem, seen, now[size:], out[size:])
+        agents_functions.rates(parts.channels, at.stage, now, applied, vectors.spare, out)
+    functions.rate(parts.problem, measurement, now[size:], out[size:])
 
 
 @kernel
 def roll_on(faults, parts, step, state, spare):
     """Move the flat state by a step under the input held."""
     clock = parts.clock
-    acts = faults.push(parts.problem, clock, step, parts.u, parts.work.acts)
-    agents_functions.roll(parts.channels, clock.method, clock.h, 1, state, acts, spare)
+    applied = faults.push(parts.problem, clock, step, parts.u, parts.work.applied)
+    agents_functions.roll(parts.channels, clock.method, clock.h, 1, state, applied, spare)
 
 
 @kernel
@@ -245,18 +247,26 @@ def end_piece(faults, parts, vectors, step, stages, good):
 def build(faults: ModuleType = faultless) -> Any:
     """The native loop of all agents, laws and games: a C function.
 
-    It takes the addresses of a run's table and room, and moves the run on by so many steps, or,
-    if that is 0, observes the present state without moving on. It returns 0 once the run has left,
-    else 1.
+    It takes the addresses of a run's parameter block and workspace, and moves the run on by so many
+    steps, or, if that is 0, observes the present state without moving on. It returns 0 once the run
+    has left, else 1.
     """
     source = source_key()
 
-    def advance(table, address, count):
+    def advance(parameter_block, address, count):
         _ = source
-        sizes = steps_in(table)
-        room = ode_room_in(floats_at(address, ode_room_length(sizes)), sizes)
-        parts, progress, given = parts_in(table, room.loop), room.loop.progress, room.vectors
-        clock, divided, size = parts.clock, parts.work.division, parts.channels.rest.size
+        sizes = steps_in(parameter_block)
+        workspace = ode_workspace_in(floats_at(address, ode_workspace_length(sizes)), sizes)
+        parts, progress, given = (
+            parts_in(parameter_block, workspace.loop),
+            workspace.loop.progress,
+            workspace.vectors,
+        )
+        clock, divided, size = (
+            parts.clock,
+            parts.work.division,
+            parts.channels.equilibrium_state.size,
+        )
         if parts.monitor.exit != watch.INSIDE:
             return 0
         state, trial, spare = given.state, given.trial, given.spare
@@ -272,7 +282,7 @@ def build(faults: ModuleType = faultless) -> Any:
             for point in range(stages + 1 if moving else 1):
                 time, stage = go_to(faults, parts, vectors, step, point, stages)
                 at, now = Instant(time, step, stage), state if point == 0 else trial
-                good = look(faults, (address, 0, 0), parts, at, storage, now, now[size:])
+                good = control_step(faults, (address, 0, 0), parts, at, storage, now, now[size:])
                 if not good:
                     break
                 if stage == 0 and block > 0 and divided.position == 0.0:
@@ -311,7 +321,7 @@ class OdeLoop(ClosedLoop):
         setup: what the run is made of.
         state: (m, states) at the start.
         memory: the law's, at the start.
-        faults: module of kernels, see :func:`look`.
+        faults: module of kernels, see :func:`control_step`.
     """
 
     def __init__(
@@ -324,14 +334,14 @@ class OdeLoop(ClosedLoop):
     ) -> None:
         self._advance = build(faults).ctypes
         self._agents = agents
-        self._table = ode_table(setup, agents, len(memory))
+        self._parameter_block = ode_parameter_block(setup, agents, len(memory))
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
         self._faulty = faults is not faultless
-        sizes = steps_of(self._table)
-        self._flat = np.zeros(ode_room_length(sizes))
-        room = rooms_of(self._flat, sizes)
-        self._progress, self.monitor = room.loop, room.loop.monitor
-        self._state = room.vectors.state
+        sizes = steps_of(self._parameter_block)
+        self._flat = np.zeros(ode_workspace_length(sizes))
+        workspace = workspaces_of(self._flat, sizes)
+        self._progress, self.monitor = workspace.loop, workspace.loop.monitor
+        self._state = workspace.vectors.state
         self._state[:] = np.concatenate([state.ravel(), memory])
 
     @property
@@ -349,9 +359,12 @@ class OdeLoop(ClosedLoop):
         if len(rows.input):
             return rows
         state, memory, _ = (row[None] for row in self.present())
-        none = (np.full((1, row.shape[1]), np.nan) for row in (rows.input, rows.seen, rows.acts))
-        u, seen, acts = none
-        return Samples(state, u, memory, seen, acts, u[:, :0])
+        none = (
+            np.full((1, row.shape[1]), np.nan)
+            for row in (rows.input, rows.measurement, rows.applied)
+        )
+        u, measurement, applied = none
+        return Samples(state, u, memory, measurement, applied, u[:, :0])
 
     def present(self) -> Present:
         """See the base class."""
@@ -359,7 +372,7 @@ class OdeLoop(ClosedLoop):
         return Present(now[:size].reshape(self._shape), now[size:], now[:0])
 
     def _adopt(self, setup: Setup) -> None:
-        self._table = ode_table(setup, self._agents, self._memory)
+        self._parameter_block = ode_parameter_block(setup, self._agents, self._memory)
 
     def _run(self, rows: int, every: int, steps: int) -> Samples:
         recorder = Recorder(
@@ -368,6 +381,6 @@ class OdeLoop(ClosedLoop):
         )  # fmt: skip
         if rows > 0:
             self._progress.recorder = recorder.addresses[0]
-            self._advance(self._table.address, self._flat.ctypes.data, steps)
+            self._advance(self._parameter_block.address, self._flat.ctypes.data, steps)
             self._progress.recorder = 0.0
         return recorder.samples(0)

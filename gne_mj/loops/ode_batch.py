@@ -6,7 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
-from gne_mj.loops.ode import build, ode_room_length, rooms_of
+from gne_mj.loops.ode import build, ode_workspace_length, workspaces_of
 from gne_mj.native import call_integer, compiled
 
 PIECE = 8  # runs that a thread takes at a time
@@ -14,10 +14,10 @@ STRIDE = 20_000  # steps of each of them between looks at the user's wishes
 
 
 @compiled
-def _advance_each(advance, tables, rooms, steps):
-    """Move every run on, one after the other; addresses of tables and rooms."""
-    for run in range(len(tables)):
-        call_integer(advance, (tables[run], rooms[run], steps))
+def _advance_each(advance, parameter_blocks, workspaces, steps):
+    """Move every run on, one after the other; addresses of parameter blocks and workspaces."""
+    for run in range(len(parameter_blocks)):
+        call_integer(advance, (parameter_blocks[run], workspaces[run], steps))
 
 
 class OdeBatch(BatchLoop):
@@ -40,16 +40,21 @@ class OdeBatch(BatchLoop):
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
-        tables, sizes, recorder, monitors = begin(cases, span, self._faulty)
-        addresses = np.array([table.address for table in tables], dtype=np.int64)
+        parameter_blocks, sizes, recorder, monitors = begin(cases, span, self._faulty)
+        addresses = np.array(
+            [parameter_block.address for parameter_block in parameter_blocks], dtype=np.int64
+        )
         starts = np.stack([np.concatenate([c.state.ravel(), c.memory]) for c in cases])
-        length = ode_room_length(sizes)
+        length = ode_workspace_length(sizes)
 
         def piece(first: int) -> bool:
             part = slice(first, first + PIECE)
             flat = np.zeros((len(addresses[part]), length))
-            rooms = rooms_of(flat, sizes)
-            rooms.loop.recorder, rooms.vectors.state = recorder.addresses[part], starts[part]
+            workspaces = workspaces_of(flat, sizes)
+            workspaces.loop.recorder, workspaces.vectors.state = (
+                recorder.addresses[part],
+                starts[part],
+            )
             at = flat.ctypes.data + 8 * length * np.arange(len(flat))
             for done in range(0, span.steps, STRIDE):
                 if stopped():
@@ -58,7 +63,7 @@ class OdeBatch(BatchLoop):
                 _advance_each(self._advance.address, addresses[part], at, steps)
             recorder.heads.first[part] = span.last
             _advance_each(self._advance.address, addresses[part], at, 0)
-            monitors[part] = rooms.loop.monitor
+            monitors[part] = workspaces.loop.monitor
             return True
 
         with workers(self._threads) as pool:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from gne_mj.loops.base import Samples
 from gne_mj.native import copy, kernel
 from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
+from gne_mj.parameter_block import exact, integers_at
 from gne_mj.records import by_name, columns_in, count, shapes
-from gne_mj.table import exact, integers_at
 
 
 class Head(Numbers):
@@ -25,7 +25,7 @@ class Head(Numbers):
     done: int  # rows written
 
 
-HEADER = len(names_of(Head))  # the same as two pairs of a table
+HEADER = len(names_of(Head))  # the same as two pairs of a parameter block
 WORDS = HEADER + 2 * count(Samples)
 
 _head_in, _columns_in = numbers_in(Head), columns_in(Samples, HEADER // 2)
@@ -44,7 +44,7 @@ def record(block, faults, parts, step, now):
 
     Args:
         block: its address.
-        faults: module of kernels, see :func:`gne_mj.loops.ode.look`.
+        faults: module of kernels, see :func:`gne_mj.loops.ode.control_step`.
         parts: of the loop.
         step: which.
         now: :class:`gne_mj.loops.base.Present`, all flat, as at the step's start.
@@ -59,9 +59,9 @@ def record(block, faults, parts, step, now):
     write(columns.input, rows, row, parts.u)
     write(columns.memory, rows, row, now.memory)
     write(columns.configuration, rows, row, now.configuration)
-    width = len(columns.seen) // rows
+    width = len(columns.measurement) // rows
     at, end = row * width, (row + 1) * width
-    faults.record(parts, step, now.state, columns.seen[at:end], columns.acts[at:end])
+    faults.record(parts, step, now.state, columns.measurement[at:end], columns.applied[at:end])
     head.done = row + 1
 
 

@@ -21,8 +21,15 @@ from gne_mj.graph import Graph
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import Modes, add_from_modes, modes_of, to_modes
-from gne_mj.loops.feedback import Work, feedback
-from gne_mj.loops.layout import ROOM, Setup, channels_in, clock_in, ode_table, problem_in
+from gne_mj.loops.feedback import StepScratch, feedback
+from gne_mj.loops.layout import (
+    SCRATCH,
+    Setup,
+    channels_in,
+    clock_in,
+    ode_parameter_block,
+    problem_in,
+)
 from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, Method, method
@@ -61,7 +68,7 @@ class Steps(Numbers):
     rejected: float
 
 
-class Solver(NamedTuple):
+class RosenbrockState(NamedTuple):
     """Arrays that a step works on; n is the length of states and memory, w that of the modes."""
 
     trial: np.ndarray  # (n + w,) the flat vector at a stage
@@ -81,49 +88,53 @@ class Rows(NamedTuple):
     u: np.ndarray  # (rows, m)
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """What changes in a run besides, in one flat array."""
 
     progress: Steps
     monitor: watch.Monitor
-    exit: watch.Seen  # why the last stage failed
+    exit: watch.MonitorNumbers  # why the last stage failed
     u: Annotated[np.ndarray, "m"]  # input at the last step's start
-    work: Work
+    work: StepScratch
 
 
-_ROOM = ROOM | {"history": 0, "solver": 0}
-_length, _room_in = in_array(Room, "m p agents", **_ROOM)
+_SCRATCH = SCRATCH | {"history": 0, "solver": 0}
+_length, _workspace_in = in_array(Workspace, "m p agents", **_SCRATCH)
 
 
 class Run(NamedTuple):
     """What kernels of a run change."""
 
     progress: Steps
-    monitor: watch.Seen
+    monitor: watch.MonitorNumbers
     figures: watch.Monitor
-    exit: watch.Seen
+    exit: watch.MonitorNumbers
     u: np.ndarray
-    work: Work
-    solver: Solver
+    work: StepScratch
+    solver: RosenbrockState
 
 
 @kernel
-def run_in(table, flat, solver):
-    """What does not change in a run, and what does, from its table and room."""
-    fixed = Fixed(problem_in(table), channels_in(table), solver.modes, solver.method)
+def run_in(parameter_block, flat, solver):
+    """What does not change in a run, and what does, from its parameter block and workspace."""
+    fixed = Fixed(
+        problem_in(parameter_block), channels_in(parameter_block), solver.modes, solver.method
+    )
     data = fixed.problem.data
     m, p, agents = len(data.owner), len(data.member_pointer) - 1, len(data.offsets) - 1
-    room = _room_in(flat, 0, m, p, agents)
-    watched, figures = room.monitor.numbers, room.monitor
-    return fixed, Run(room.progress, watched, figures, room.exit, room.u, room.work, solver)
+    workspace = _workspace_in(flat, 0, m, p, agents)
+    watched, figures = workspace.monitor.numbers, workspace.monitor
+    return fixed, Run(
+        workspace.progress, watched, figures, workspace.exit, workspace.u, workspace.work, solver
+    )
 
 
 @kernel
-def look(fixed, run, time, state, latch, u):
+def control_step(fixed, run, time, state, latch, u):
     """Measure, act and observe; fill u. False, with the exit in ``latch``, if there is no input."""
     channels, work = fixed.channels, run.work
     measure(channels, state, work.y)
-    memory = state[channels.rest.size :]
+    memory = state[channels.equilibrium_state.size :]
     if not feedback(fixed.problem, time, 0, work.y, memory, work, latch, u):
         return False
     storage = agents_functions.stored(channels, state, run.solver.system.known)
@@ -177,7 +188,7 @@ def try_step(fixed, run, time, h, state):
     """
     problem, channels, method = fixed.problem, fixed.channels, fixed.method
     work, solver = run.work, run.solver
-    size, agents = channels.rest.size, len(problem.data.offsets) - 1
+    size, agents = channels.equilibrium_state.size, len(problem.data.offsets) - 1
     trial, k = solver.trial, solver.k
     run.exit.exit = watch.INSIDE
     if not prepare(fixed, h, solver.system):
@@ -197,7 +208,7 @@ def try_step(fixed, run, time, h, state):
                 return np.inf
         if stage < STAGES:
             solve_stage(fixed, h, stage, trial, solver.u, k, solver.system)
-    states = channels.rest.shape[1]
+    states = channels.equilibrium_state.shape[1]
     error = error_of(channels.output, agents, method, states, trial, solver)
     if not error <= 1.0:  # latched only if the run ends here
         watch.leave(run.exit, watch.DIVERGED, time, -1, -1, error, STAGES)
@@ -212,7 +223,7 @@ def look_ahead(fixed, run, time, h, state):
     moved on along the step of length h, until it is outside or a microsecond away.
     """
     problem, channels, work, solver = fixed.problem, fixed.channels, run.work, run.solver
-    y, trial, size = work.y, solver.trial, channels.rest.size
+    y, trial, size = work.y, solver.trial, channels.equilibrium_state.size
     while h < AHEAD * max(1.0, time):
         h *= 2.0
         for r in range(len(trial)):
@@ -232,7 +243,7 @@ def accept(fixed, run, h, state):
     """Move to the trial state, and keep what the dense output of the step needs."""
     problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
     progress, solver = run.progress, run.solver
-    at, states = problem.data.offsets, channels.rest.shape[1]
+    at, states = problem.data.offsets, channels.equilibrium_state.shape[1]
     m, agents = len(solver.u), len(at) - 1
     size, n = m * states, solver.dense.shape[1]
     copy(state[:n], solver.dense[0])
@@ -265,7 +276,7 @@ def step_on(fixed, run, state):
     """Take one accepted step from its end; False, with the exit latched, if there is none."""
     progress, monitor = run.progress, run.monitor
     time = progress.end
-    if not look(fixed, run, time, state, monitor, run.u):
+    if not control_step(fixed, run, time, state, monitor, run.u):
         return False
     monitor.steps = progress.accepted
     linearise(fixed, state, run.u, run.work, run.solver.system)
@@ -319,17 +330,17 @@ def build() -> tuple[Any, Any]:
     source = source_key()
 
     @compiled
-    def advance(table, room, solver, step, every, state, rows):
+    def advance(parameter_block, workspace, solver, step, every, state, rows):
         """Fill rows, each followed by ``every`` sample steps; how many, and the step then."""
         _ = source
-        fixed, run = run_in(table, room, solver)
-        progress, monitor, period = run.progress, run.monitor, clock_in(table).h
+        fixed, run = run_in(parameter_block, workspace, solver)
+        progress, monitor, period = run.progress, run.monitor, clock_in(parameter_block).h
         for sample in range(len(rows.u)):
             row, time = rows.state[sample], step * period
             interpolate(progress, time, solver.dense, row)
             # Outside between two states inside is the interpolation's doing and ends no run.
             latch = run.exit if progress.end > 0.0 else monitor
-            if not look(fixed, run, time, row, latch, rows.u[sample]):
+            if not control_step(fixed, run, time, row, latch, rows.u[sample]):
                 if progress.end == 0.0:
                     return sample, step
                 for r in range(len(run.u)):
@@ -343,13 +354,13 @@ def build() -> tuple[Any, Any]:
         return len(rows.u), step
 
     @compiled
-    def finish(table, room, solver, time, rows):
+    def finish(parameter_block, workspace, solver, time, rows):
         _ = source
-        fixed, run = run_in(table, room, solver)
+        fixed, run = run_in(parameter_block, workspace, solver)
         row, u, progress = rows.state[0], rows.u[0], run.progress
         interpolate(progress, time, solver.dense, row)
         latch = run.exit if progress.end > 0.0 else run.monitor
-        if not look(fixed, run, time, row, latch, u):
+        if not control_step(fixed, run, time, row, latch, u):
             for r in range(len(u)):
                 u[r] = np.nan
         run.monitor.steps = progress.accepted
@@ -394,10 +405,10 @@ class RosenbrockLoop(ClosedLoop):
         self._step = 0
         self._state = self._flat(modes, state, memory)
         sizes = {"m": m, "p": constraints, "agents": graph.agents}
-        self._room = np.zeros(_length(*sizes.values()))
-        room = by_name(self._room, dtype_of(Room, **sizes, **_ROOM))
-        self._progress, self.monitor = room, room.monitor
-        self._solver = Solver(
+        self._workspace = np.zeros(_length(*sizes.values()))
+        workspace = by_name(self._workspace, dtype_of(Workspace, **sizes, **_SCRATCH))
+        self._progress, self.monitor = workspace, workspace.monitor
+        self._solver = RosenbrockState(
             trial=np.zeros_like(self._state),
             k=np.zeros((STAGES, len(self._state))),
             dense=np.zeros((5, self._length)),
@@ -412,7 +423,7 @@ class RosenbrockLoop(ClosedLoop):
     def _take(self, setup: Setup) -> None:
         """Let this be what the loop and the law's functions read."""
         memory = self._length - math.prod(self._shape)
-        self._table = ode_table(setup, self._agents, memory)
+        self._parameter_block = ode_parameter_block(setup, self._agents, memory)
         self._epsilon = float(setup.problem.settings[EPSILON])
 
     def _flat(
@@ -445,14 +456,20 @@ class RosenbrockLoop(ClosedLoop):
         rows, done = self._rows(samples), 0
         if self.monitor.exit == watch.INSIDE:
             done, self._step = self._advance(
-                self._table.address, self._room, self._solver, self._step, every, self._state, rows
+                self._parameter_block.address,
+                self._workspace,
+                self._solver,
+                self._step,
+                every,
+                self._state,
+                rows,
             )
         return self._samples(rows.state[:done], rows.u[:done])
 
     def finish(self) -> Samples:
         """See the base class."""
         rows = self._rows(1)
-        self._finish(self._table.address, self._room, self._solver, self.time, rows)
+        self._finish(self._parameter_block.address, self._workspace, self._solver, self.time, rows)
         return self._samples(*rows)
 
     def _rows(self, count: int) -> Rows:
@@ -477,7 +494,7 @@ class RosenbrockLoop(ClosedLoop):
             state=states[:, :size].reshape(-1, *self._shape),
             input=inputs,
             memory=states[:, size:],
-            seen=inputs[:, :0],
-            acts=inputs[:, :0],
+            measurement=inputs[:, :0],
+            applied=inputs[:, :0],
             configuration=inputs[:, :0],
         )

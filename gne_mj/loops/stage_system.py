@@ -79,12 +79,12 @@ def linearise(fixed, state, u, work, system):
     Args:
         fixed: of the loop.
         state: the loop's flat vector.
-        u: (m,) input there; work.y and work.demand as the law has just left them.
+        u: (m,) input there; work.y and work.commanded as the law has just left them.
         work: scratch arrays.
         system: its local, own and filtered are filled.
     """
     problem, channels = fixed.problem, fixed.channels
-    data, states = problem.data, channels.rest.shape[1]
+    data, states = problem.data, channels.equilibrium_state.shape[1]
     at = data.offsets
     m, agents = len(u), len(at) - 1
     gain, rho = problem.settings[GAIN], problem.settings[RHO]
@@ -105,10 +105,10 @@ def linearise(fixed, state, u, work, system):
         copy(z[first:last], profile[first:last])
         for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
             k = data.own_index[entry]
-            room = -games.constraint(data, k, profile) - data.tightening[k]
-            weight = -gain * rho / room
+            slack = -games.constraint(data, k, profile) - data.tightening[k]
+            weight = -gain * rho / slack
             for a in range(first, last):
-                mine = games.constraint_gradient(data, k, a, profile) / room
+                mine = games.constraint_gradient(data, k, a, profile) / slack
                 for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
                     j = data.member_index[member]
                     target = filtered[a] if j == i else own[a]
@@ -117,7 +117,7 @@ def linearise(fixed, state, u, work, system):
                         second = games.constraint_hessian(data, k, a, b, profile)
                         target[b] += weight * (second + mine * other)
     for r in range(m):
-        if u[r] != work.demand[r]:  # an input at its limit does not answer
+        if u[r] != work.commanded[r]:  # an input at its limit does not answer
             for c in range(m):
                 own[r, c] = 0.0
                 filtered[r, c] = 0.0
@@ -128,7 +128,7 @@ def prepare(fixed, h, system):
     """Factorise for steps of length h from where the loop was linearised; False if singular."""
     channels, modes = fixed.channels, fixed.modes
     agents, m = system.spread.shape
-    epsilon, states = fixed.problem.settings[EPSILON], channels.rest.shape[1]
+    epsilon, states = fixed.problem.settings[EPSILON], channels.equilibrium_state.shape[1]
     s = 1.0 / (GAMMA * h)
     for a in range(agents - 1):
         for r in range(m):
@@ -192,7 +192,7 @@ def solve_stage(fixed, h, stage, trial, u, k, system):
         system: prepared for h.
     """
     problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
-    at, states = problem.data.offsets, channels.rest.shape[1]
+    at, states = problem.data.offsets, channels.equilibrium_state.shape[1]
     agents, m = system.spread.shape
     epsilon = problem.settings[EPSILON]
     s = 1.0 / (GAMMA * h)

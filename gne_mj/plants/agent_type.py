@@ -19,7 +19,7 @@ KERNELS = {
     "rate": ("q", "x", "u", "out"),
     "jacobian": ("q", "x", "out"),
     "equilibrium": ("q", "y", "out"),
-    "storage": ("q", "x", "rest"),
+    "storage": ("q", "x", "equilibrium_state"),
 }
 
 
@@ -117,8 +117,8 @@ def _made(rate: Any, storage: Any, states: int) -> dict[str, Any]:
         rate(q, x, u, out)
 
     @kernel
-    def storage_given(q, x, rest, known):
-        return storage(q, x, rest)
+    def storage_given(q, x, equilibrium_state, known):
+        return storage(q, x, equilibrium_state)
 
     made = (euler_step, shared, rate_given, storage_given)
     return {function.__name__: function for function in made}

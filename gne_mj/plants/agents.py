@@ -95,16 +95,18 @@ class Agents:
         _native(self.kind)[0](self.parameters, y, out)
         return out
 
-    def storage(self, state: ArrayLike, rest: ArrayLike) -> NDArray[np.float64]:
+    def storage(self, state: ArrayLike, equilibrium_state: ArrayLike) -> NDArray[np.float64]:
         """V^{x*} of each channel; states (..., m, states), equilibrium (m, states): (..., m)."""
         shape = (self.channels, self.states)
         state = np.ascontiguousarray(state, dtype=np.float64)
-        rest = np.ascontiguousarray(rest, dtype=np.float64)
-        if state.shape[-2:] != shape or rest.shape != shape:
+        equilibrium_state = np.ascontiguousarray(equilibrium_state, dtype=np.float64)
+        if state.shape[-2:] != shape or equilibrium_state.shape != shape:
             raise ValueError(f"states must be (..., {shape[0]}, {shape[1]}), not {state.shape}")
         out = np.empty(state.shape[:-1])
         rows = state.reshape(-1, *shape)
-        _native(self.kind)[1](self.parameters, rows, rest, out.reshape(len(rows), self.channels))
+        _native(self.kind)[1](
+            self.parameters, rows, equilibrium_state, out.reshape(len(rows), self.channels)
+        )
         return out
 
 
@@ -132,10 +134,10 @@ def _native(kind: ModuleType) -> tuple[Any, Any]:
             kind.equilibrium(parameters[r], y[r], out[r])
 
     @compiled
-    def storage(parameters, state, rest, out):
+    def storage(parameters, state, equilibrium_state, out):
         _ = source
         for sample in range(len(out)):
             for r in range(out.shape[1]):
-                out[sample, r] = kind.storage(parameters[r], state[sample, r], rest[r])
+                out[sample, r] = kind.storage(parameters[r], state[sample, r], equilibrium_state[r])
 
     return equilibrium, storage

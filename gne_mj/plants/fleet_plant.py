@@ -27,7 +27,7 @@ class FleetPlant(Plant):
         model, data: MuJoCo's own.
         places: where native code finds each channel's numbers, (m,) by name.
         sizes: of MuJoCo's arrays.
-        table_arrays: the fleet's arrays at the start of every table.
+        parameter_arrays: the fleet's arrays at the start of every table.
     """
 
     kernels: ModuleType
@@ -36,7 +36,7 @@ class FleetPlant(Plant):
     data: mujoco.MjData
     places: Any
     sizes: "Sizes"
-    table_arrays: list[NDArray[Any]]
+    parameter_arrays: list[NDArray[Any]]
 
     @property
     def configuration(self) -> int:

@@ -73,7 +73,7 @@ def shared(q, x):
 
 
 @kernel
-def pull(q, x, arctangent):
+def spring_force(q, x, arctangent):
     """Force of spring and damper on the appendage, in N (the main mass feels its opposite)."""
     return q[2] * x[0] + q[3] * arctangent + q[4] * (x[1] - x[2])
 
@@ -87,7 +87,7 @@ def rate(q, x, u, out):
 @kernel
 def rate_given(q, x, u, arctangent, out):
     """The same where the extension's arctangent is at hand."""
-    force = pull(q, x, arctangent)
+    force = spring_force(q, x, arctangent)
     out[0] = x[1] - x[2]
     out[1] = (u - force) / q[0]
     out[2] = force / q[1]
@@ -97,7 +97,7 @@ def rate_given(q, x, u, arctangent, out):
 @kernel
 def euler_step(q, x, u, h, out):
     """One semi-implicit Euler step, as MuJoCo's: velocities first, positions with the new ones."""
-    force = pull(q, x, np.arctan(x[0]))
+    force = spring_force(q, x, np.arctan(x[0]))
     velocity = x[1] + h * (u - force) / q[0]
     appendage = x[2] + h * force / q[1]
     out[0] = x[0] + h * (velocity - appendage)
@@ -134,19 +134,19 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
+def storage(q, x, equilibrium_state):
     """V^{x*}(x): since psi(0) = 0 at rest, the energy of the deviation."""
-    return storage_given(q, x, rest, np.arctan(x[0]))
+    return storage_given(q, x, equilibrium_state, np.arctan(x[0]))
 
 
 @kernel
-def storage_given(q, x, rest, arctangent):
+def storage_given(q, x, equilibrium_state, arctangent):
     """The same where the extension's arctangent is at hand."""
     extension = x[0]
     spring = 0.5 * q[2] * extension * extension + q[3] * (
         extension * arctangent - 0.5 * np.log(1.0 + extension * extension)
     )
-    main, appendage = x[1] - rest[1], x[2] - rest[2]
+    main, appendage = x[1] - equilibrium_state[1], x[2] - equilibrium_state[2]
     return spring + 0.5 * q[0] * main * main + 0.5 * q[1] * appendage * appendage
 
 

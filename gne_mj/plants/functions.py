@@ -22,8 +22,8 @@ from gne_mj.native import (
     shaped,
     source_key,
 )
+from gne_mj.parameter_block import floats_at
 from gne_mj.plants.agent_type import has_ode
-from gne_mj.table import floats_at
 
 EULER, RK4 = 0, 1
 METHODS = {"euler": EULER, "rk4": RK4}
@@ -57,10 +57,10 @@ def _compiled(agent: ModuleType) -> list[Any]:
             agent.rate_given(q[r], own, inputs[r], kept[r], rate[r * states : (r + 1) * states])
         return 0
 
-    def stored(parameters, m, rest, state, known):
+    def stored(parameters, m, equilibrium_state, state, known):
         _ = source
         q = shaped(floats_at(parameters, m * numbers), (m, numbers))
-        at_rest = shaped(floats_at(rest, m * states), (m, states))
+        at_rest = shaped(floats_at(equilibrium_state, m * states), (m, states))
         x, kept, total = floats_at(state, m * states), floats_at(known, m), 0.0
         for r in range(m):
             own = x[r * states : (r + 1) * states]
@@ -72,7 +72,7 @@ def _compiled(agent: ModuleType) -> list[Any]:
         _ = source
         q = shaped(floats_at(parameters, m * numbers), (m, numbers))
         for _step in range(steps):
-            held_step(
+            hold_step(
                 agent, q, states, method, h, floats_at(state, m * states), floats_at(u, m),
                 floats_at(scratch, 5 * states),
             )  # fmt: skip
@@ -96,7 +96,7 @@ def _compiled(agent: ModuleType) -> list[Any]:
 
 
 @kernel
-def held_step(agent, parameters, states, method, h, state, u, scratch):
+def hold_step(agent, parameters, states, method, h, state, u, scratch):
     """Move all channels by one step under the held input u (m,): the plant's discrete map.
 
     state is flat, channel after channel; scratch has at least 5 * states entries.
@@ -148,10 +148,13 @@ def stored(channels, state, known):
     return call_number(
         channels.functions[_STORED],
         (
-            address_in(parameters), len(parameters), address_in(channels.rest), address_in(state),
+            address_in(parameters),
+            len(parameters),
+            address_in(channels.equilibrium_state),
+            address_in(state),
             address_in(known),
         ),
-    )  # fmt: skip
+    )
 
 
 @kernel

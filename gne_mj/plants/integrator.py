@@ -69,9 +69,9 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
-    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
-    return 0.5 * (x[0] - rest[0]) ** 2
+def storage(q, x, equilibrium_state):
+    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``equilibrium_state``."""
+    return 0.5 * (x[0] - equilibrium_state[0]) ** 2
 
 
 @kernel
@@ -87,9 +87,9 @@ def rate_given(q, x, u, known, out):
 
 
 @kernel
-def storage_given(q, x, rest, known):
+def storage_given(q, x, equilibrium_state, known):
     """As :func:`storage`, likewise."""
-    return storage(q, x, rest)
+    return storage(q, x, equilibrium_state)
 
 
 @AGENTS.register

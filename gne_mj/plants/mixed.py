@@ -123,13 +123,13 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
+def storage(q, x, equilibrium_state):
     """V^{x*}(x) of the channel's type."""
     if q[0] == ROBOT:
-        return flexible_robot.storage(q[1:], x, rest)
+        return flexible_robot.storage(q[1:], x, equilibrium_state)
     if q[0] == INTEGRATOR:
-        return integrator.storage(q[1:], x[1:2], rest[1:2])
-    return pi_cascade.storage(q[1:], x[1:3], rest[1:3])
+        return integrator.storage(q[1:], x[1:2], equilibrium_state[1:2])
+    return pi_cascade.storage(q[1:], x[1:3], equilibrium_state[1:3])
 
 
 @kernel
@@ -150,11 +150,11 @@ def rate_given(q, x, u, known, out):
 
 
 @kernel
-def storage_given(q, x, rest, known):
+def storage_given(q, x, equilibrium_state, known):
     """As :func:`storage`, likewise."""
     if q[0] == ROBOT:
-        return flexible_robot.storage_given(q[1:], x, rest, known)
-    return storage(q, x, rest)
+        return flexible_robot.storage_given(q[1:], x, equilibrium_state, known)
+    return storage(q, x, equilibrium_state)
 
 
 @AGENTS.register

@@ -10,20 +10,21 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.errors import InvalidInput, named, nearest
 from gne_mj.native import kernel
 from gne_mj.numbers import dtype_in
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_actuator import make_force
-from gne_mj.plants.mjcf_ahead import (
+from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
+from gne_mj.plants.mjcf_prediction import (
     SENSOR_FUNCTIONS,
-    Ahead,
+    Prediction,
     ChannelPlace,
     actuator_of,
     gather,
     refresh,
 )
-from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
@@ -36,7 +37,6 @@ from gne_mj.plants.native_mujoco import (
     step_address,
 )
 from gne_mj.records import by_name
-from gne_mj.table import Table
 
 __all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
@@ -111,24 +111,24 @@ class MjcfPlant(FleetPlant):
         )
         self.places = by_name(flat, dtype_in(ChannelPlace))
         model = self.model
-        self._twin = mujoco.MjData(model)  # where mode implicit looks ahead
+        self._twin = mujoco.MjData(model)  # where mode implicit predicts
         self.sizes = Sizes(
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
             model.na - memory,
         )  # fmt: skip
-        ahead = Ahead(
+        prediction = Prediction(
             model.nsensordata, self._twin._address, KNOWN_STATE, step_address(),
             step_address("mj_copyState"),
             0 if self.measures_every_stage else step_address("mj_forward"),
             *(step_address(name) for name in SENSOR_FUNCTIONS),
         )  # fmt: skip
-        sizes = np.array([*self.sizes, *ahead], dtype=np.int64)
-        self.table_arrays = [flat, np.zeros(0), sizes]
-        self._table = Table(self.table_arrays)
+        sizes = np.array([*self.sizes, *prediction], dtype=np.int64)
+        self.parameter_arrays = [flat, np.zeros(0), sizes]
+        self._parameter_block = ParameterBlock(self.parameter_arrays)
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
         """The table's arrays; such robots have no numbers but those in their files."""
-        return self.table_arrays
+        return self.parameter_arrays
 
     def model_fields(
         self, parameters: NDArray[np.float64]
@@ -241,7 +241,7 @@ class MjcfPlant(FleetPlant):
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
-        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
+        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
         self.data.ctrl[self.places.actuator] = u
         with callbacks():
             run_steps()(step_address(), self.model._address, self.data._address, steps)

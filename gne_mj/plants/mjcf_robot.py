@@ -80,7 +80,7 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
+def storage(q, x, equilibrium_state):
     """Not known: nothing is measured."""
     return 0.0
 

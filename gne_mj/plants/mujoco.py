@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.native import callback, compiled, kernel, source_key
 from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
+from gne_mj.parameter_block import ParameterBlock, floats, integers
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, compose, element_names
@@ -24,12 +25,11 @@ from gne_mj.plants.native_mujoco import (
     callbacks,
     field,
     offsets,
+    parameter_block_of,
     step_address,
-    table_of,
     timed_step,
 )
 from gne_mj.records import by_name, in_numbers
-from gne_mj.table import Table, floats, integers
 
 INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
 STAGES = {"euler": 1, "rk4": 4}  # evaluations of the dynamics in one step
@@ -56,7 +56,7 @@ class Sizes(NamedTuple):
     nu: int
     nuserdata: int
     na: int
-    room: int  # a loop's, in userdata
+    workspace: int  # a loop's, in userdata
     memory: int  # in act
 
 
@@ -77,11 +77,11 @@ def place_of(places, r):
 
 
 @kernel
-def gather(at, data, table, state):
+def gather(at, data, parameter_block, state):
     """Fill the flat state (m channels of flexible_robot.STATES) from mjData."""
-    sizes = sizes_in(table)
+    sizes = sizes_in(parameter_block)
     qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
-    places = integers(table, PLACES)
+    places = integers(parameter_block, PLACES)
     for r in range(len(places) // PLACE):
         place = place_of(places, r)
         position = qpos[place.main_q]
@@ -92,7 +92,7 @@ def gather(at, data, table, state):
 
 
 @kernel
-def refresh(model, data, table):
+def refresh(model, data, parameter_block):
     """Bring sensors up to date: none is read."""
 
 
@@ -106,10 +106,10 @@ def actuator_of(places, r):
 def stored(channels, state, userdata):
     """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
     total = 0.0
-    for r in range(len(channels.rest)):
+    for r in range(len(channels.equilibrium_state)):
         x = state[4 * r : 4 * r + 4]
         total += flexible_robot.storage_given(
-            channels.parameters[r], x, channels.rest[r], userdata[ARCTANGENTS + r]
+            channels.parameters[r], x, channels.equilibrium_state[r], userdata[ARCTANGENTS + r]
         )
     return total
 
@@ -122,22 +122,22 @@ def passive_callback(at: Offsets) -> Any:
     def passive(model, data):
         _ = source
         struct = address_of(data)
-        table = abs(table_of(at, address_of(model), struct))
-        if table == 0:
+        parameter_block = abs(parameter_block_of(at, address_of(model), struct))
+        if parameter_block == 0:
             return
-        sizes = sizes_in(table)
+        sizes = sizes_in(parameter_block)
         qpos = field(struct, at.qpos, sizes.nq)
         force = field(struct, at.qfrc_passive, sizes.nv)
-        places, coefficient = integers(table, PLACES), floats(table, ATAN)
+        places, coefficient = integers(parameter_block, PLACES), floats(parameter_block, ATAN)
         kept = field(struct, at.userdata, ARCTANGENTS + len(coefficient))
         for r in range(len(coefficient)):
             place = place_of(places, r)
             extension = qpos[place.main_q] - qpos[place.appendage_q]
             arctangent = np.arctan(extension)
             kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
-            pull = coefficient[r] * arctangent
-            force[place.main_v] -= pull
-            force[place.appendage_v] += pull
+            spring_force = coefficient[r] * arctangent
+            force[place.main_v] -= spring_force
+            force[place.appendage_v] += spring_force
 
     return callback(CALLBACK, passive)
 
@@ -199,10 +199,10 @@ class MujocoPlant(FleetPlant):
                 memory=memory,
             )
         self.data = mujoco.MjData(self.model)
-        self.table_arrays = self._table_arrays()
-        self._table = Table(self.table_arrays)
+        self.parameter_arrays = self._parameter_arrays()
+        self._parameter_block = ParameterBlock(self.parameter_arrays)
 
-    def _table_arrays(self) -> list[NDArray[Any]]:
+    def _parameter_arrays(self) -> list[NDArray[Any]]:
         def names(what: str) -> list[str]:
             return element_names(what, self.agents.channels, self.agents.dimension)
 
@@ -218,8 +218,8 @@ class MujocoPlant(FleetPlant):
         self.places.appendage_v = [joint.dofadr[0] for joint in appendage]
         self.places.actuator = [self.model.actuator(name).id for name in names("force")]
         model = self.model
-        room = ARCTANGENTS + self.agents.channels
-        self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, room, 0)
+        workspace = ARCTANGENTS + self.agents.channels
+        self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
         return [
             flat,
             np.ascontiguousarray(self.agents.parameters[:, 3]),
@@ -228,7 +228,7 @@ class MujocoPlant(FleetPlant):
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
         """The table's arrays for agents with numbers of their own, as in a batch of runs."""
-        places, _, sizes = self.table_arrays
+        places, _, sizes = self.parameter_arrays
         return [places, np.ascontiguousarray(agents.parameters[:, 3]), sizes]
 
     def model_fields(
@@ -289,7 +289,7 @@ class MujocoPlant(FleetPlant):
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
-        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._table.address
+        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
         self.data.ctrl[self.places.actuator] = u
         with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)

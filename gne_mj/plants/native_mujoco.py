@@ -48,7 +48,7 @@ class Header(Numbers):
     """What userdata begins with. All zero, as after a reset, means "not started"."""
 
     mark: float  # whose simulation this is
-    table: float  # its address
+    parameter_block: float  # its address
 
 
 USERDATA_HEADER = len(names_of(Header))
@@ -290,7 +290,7 @@ def timed_step(at, mj_step, model, data):
 
 
 @kernel
-def table_of(at, model, data):
+def parameter_block_of(at, model, data):
     """Address of a simulation's table, given both structs' addresses.
 
     0 for a simulation that is not ours; negative for that of a plant without a loop.
@@ -299,9 +299,9 @@ def table_of(at, model, data):
         return np.int64(0)
     header = _header_in(field(data, at.userdata, USERDATA_HEADER), 0)
     if header.mark == LOOP_MARK:
-        return np.int64(header.table)
+        return np.int64(header.parameter_block)
     if header.mark == PLANT_MARK:
-        return -np.int64(header.table)
+        return -np.int64(header.parameter_block)
     return np.int64(0)
 
 
@@ -336,7 +336,7 @@ LOST = {
 _LOST = tuple(LOST)
 
 
-def lost_words(kind: int) -> str:
+def lost_text(kind: int) -> str:
     """What has become of a motion after one of these warnings, and what to do."""
     return (
         f"MuJoCo {LOST[kind]}, so that what follows would not be the model's motion: see to its"
@@ -368,7 +368,7 @@ def check_warnings(data: mujoco.MjData) -> None:
     """
     for kind in LOST:
         if data.warning[kind].number and np.all(np.isfinite(data.qvel)):
-            raise EngineError(f"by {data.time:.6g} s {lost_words(kind)}")
+            raise EngineError(f"by {data.time:.6g} s {lost_text(kind)}")
 
 
 _installed = threading.Lock()

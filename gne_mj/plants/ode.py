@@ -16,7 +16,9 @@ class Channels(NamedTuple):
     """A group of agents for native code, read-only."""
 
     parameters: Annotated[np.ndarray, "m, n // m"]  # (m, numbers of the agent type)
-    rest: Annotated[np.ndarray, "m, n // m"]  # (m, states) equilibrium, from which V is measured
+    equilibrium_state: Annotated[
+        np.ndarray, "m, n // m"
+    ]  # (m, states) equilibrium, from which V is measured
     functions: Annotated[np.ndarray, "n", int]  # addresses, see gne_mj.plants.functions
     output: int  # which of a channel's states is its output
 

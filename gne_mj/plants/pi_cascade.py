@@ -74,10 +74,10 @@ def equilibrium(q, y, out):
 
 
 @kernel
-def storage(q, x, rest):
-    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``rest``."""
+def storage(q, x, equilibrium_state):
+    """V^{x*}(x), the Bregman divergence of V from the equilibrium ``equilibrium_state``."""
     r = q[1] / (q[0] - q[1])
-    output, integral = x[0] - rest[0], x[1] - rest[1]
+    output, integral = x[0] - equilibrium_state[0], x[1] - equilibrium_state[1]
     return 0.5 * (output * output + r * (output - integral) ** 2)
 
 
@@ -94,9 +94,9 @@ def rate_given(q, x, u, known, out):
 
 
 @kernel
-def storage_given(q, x, rest, known):
+def storage_given(q, x, equilibrium_state, known):
     """As :func:`storage`, likewise."""
-    return storage(q, x, rest)
+    return storage(q, x, equilibrium_state)
 
 
 @AGENTS.register

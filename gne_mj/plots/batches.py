@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from gne_mj.batch_variables import figures
 from gne_mj.plots.style import STYLE, line_style, pyplot
+from gne_mj.run_metrics import SUCCESSES
 from gne_mj.variables import Panel
-from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gne_mj.files import refuse_existing, written
 from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style, pyplot
+from gne_mj.run_metrics import SUCCESSES
 from gne_mj.trajectory import Trajectory
-from gne_mj.verdicts import SUCCESSES
 
 if TYPE_CHECKING:
     import xarray

@@ -16,8 +16,7 @@ from gne_mj.loops import functions
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
-from gne_mj.loops.layout import Clock as LoopClock
-from gne_mj.loops.layout import Setup
+from gne_mj.loops.layout import LoopClock, Setup
 from gne_mj.loops.link import link, penalty
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.plants.functions import METHODS
@@ -58,7 +57,7 @@ class Assembly(SystemData):
                 over which an agent's output does not rise with its input, mode implicit.
         """
         loop = self._closed_loop(clock, plant)
-        loop.keeps = self
+        loop.kept_alive = self
         return loop
 
     def _closed_loop(self, clock: Clock, plant: "FleetPlant | None") -> ClosedLoop:
@@ -84,7 +83,7 @@ class Assembly(SystemData):
 
     @property
     def _others(self) -> dict[int, Any]:
-        of_mode = mode_of(self).ahead(self)
+        of_mode = mode_of(self).prediction(self)
         if self.schedule is None:
             return dict(of_mode)
         return {**of_mode, functions.PENALTY: penalty(self.schedule.fall)}
@@ -158,11 +157,11 @@ class Assembly(SystemData):
             clock: how to step.
             decorated: keep what is for the eye only; MJCF robots keep all in any case.
         """
-        from gne_mj.loops.mujoco import room
+        from gne_mj.loops.mujoco import workspace
         from gne_mj.plants.fleet_plant import build_fleet
 
         mode = mode_of(self)
-        userdata, memory = room(
+        userdata, memory = workspace(
             self.game, self.agents, len(self.loop_memory), mode.native, self._sizes
         )
         plant = build_fleet(

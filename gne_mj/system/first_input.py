@@ -10,8 +10,8 @@ from gne_mj.faults import Saturation, strikes_messages
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
-from gne_mj.loops.layout import Clock as Steps
-from gne_mj.loops.layout import Setup, problem_and_table
+from gne_mj.loops.layout import LoopClock as Steps
+from gne_mj.loops.layout import Setup, problem_and_parameter_block
 from gne_mj.plain import raise_pending
 from gne_mj.system.clock import Clock
 from gne_mj.system.system import System
@@ -26,7 +26,7 @@ def law_at_start(system: System) -> Array:
     """
     game, problem, memory = system.game, problem_at_start(system), system.loop_memory.copy()
     setup = Setup(problem, system.agents.equilibrium(system.start), Steps(1.0, 1, 0, 0))
-    problem, _table = problem_and_table(setup, system.agents, len(memory))
+    problem, _parameter_block = problem_and_parameter_block(setup, system.agents, len(memory))
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now.penalty = rho

@@ -12,13 +12,13 @@ from gne_mj.graph import Graph
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
+from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.constants import SAMPLED, told
 from gne_mj.theory.coupling import needed_connectivity
-from gne_mj.theory.demand import limited
-from gne_mj.theory.held import Held
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
 from gne_mj.theory.theorem import HELD, Theorem
+from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
 CONVENTION = "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2, where the paper's definition has mu/2"
 
@@ -66,7 +66,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     """
     check_count("agents.count", system.game.actions, MOST_EXAMINED, "the actions of all")
     theorem = Theorem(system)
-    held = Held(system, clock) if mode_of(system).promises else None
+    held = ZeroOrderHold(system, clock) if mode_of(system).promises else None
     law, pieces = system.law, forecast(system, clock)
     known = system.known_equilibrium
     return Guarantees(
@@ -90,7 +90,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "penalised": None if known is None else known.action.tolist(),
             **theorem.epsilon,
         },
-        inputs=(theorem if held is None else held).demand.report(),
+        inputs=(theorem if held is None else held).commanded_input.report(),
         periods={
             "push": _at_both(system, push_period),
             "linear": _at_both(system, linear_period),

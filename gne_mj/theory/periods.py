@@ -62,7 +62,7 @@ def least_rho(system: System, period: float, *, reserve: float = 1.25) -> float:
     """
     highest = system.rho if system.schedule is None else system.schedule.start
 
-    def keeps(rho: float) -> bool:
+    def kept(rho: float) -> bool:
         there = replace(system, rho=rho, schedule=None)
         known = there.known_equilibrium
         if known is None:
@@ -71,11 +71,11 @@ def least_rho(system: System, period: float, *, reserve: float = 1.25) -> float:
         return longest is None or longest >= reserve * period
 
     low, high = 1e-9, highest
-    if keeps(low) or not keeps(high):
-        return low if keeps(low) else high
+    if kept(low) or not kept(high):
+        return low if kept(low) else high
     while high / low > 1.02:
         middle = float(np.sqrt(low * high))
-        if keeps(middle):
+        if kept(middle):
             high = middle
         else:
             low = middle

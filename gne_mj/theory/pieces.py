@@ -7,10 +7,10 @@ import numpy as np
 from gne_mj.loops import division
 from gne_mj.loops import monitor as watch
 from gne_mj.plain import raise_pending
+from gne_mj.run_metrics import EXITS
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import STABLE
 from gne_mj.theory.periods import linear_period
-from gne_mj.verdicts import EXITS
 
 
 @dataclass(frozen=True)

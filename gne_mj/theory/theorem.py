@@ -15,16 +15,16 @@ from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
 from gne_mj.theory.assumption import FAILS, Assumption
+from gne_mj.theory.commanded_input import CommandedInput, limited
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.convexity import convex_constraints, own_convexity
 from gne_mj.theory.coupling import Coupling, coupling
-from gne_mj.theory.demand import Demand, limited
 from gne_mj.theory.disturbances import estimate_error
 from gne_mj.theory.gain import Gain, required_gain
 from gne_mj.theory.spectra import DENSE
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
-HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.held
+HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.zero_order_hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +92,11 @@ class Theorem:
         return "own" if own else "complete", coupling(self.slopes, graph, 1.0)
 
     @cached_property
-    def demand(self) -> Demand:
+    def commanded_input(self) -> CommandedInput:
         """What the law, as it reads, asks of the actuators at the start."""
-        return Demand(self.system, np.abs(law_at_start(self.system)), "the law at the start")
+        return CommandedInput(
+            self.system, np.abs(law_at_start(self.system)), "the law at the start"
+        )
 
     @cached_property
     def epsilon(self) -> dict[str, Any]:
@@ -157,12 +159,14 @@ class Theorem:
         if self.system.faults:
             found.append("the scenario has faults, and the theorems have none")
         mode = mode_of(self.system)
-        if not mode.promises and limited(self.system) and self.demand.exceeded:
-            found.append(f"{self.demand.exceeded}, and the theorems have inputs without limits")
-        if not mode.held and np.any(self.demand.asked >= LARGEST_INPUT):
+        if not mode.promises and limited(self.system) and self.commanded_input.exceeded:
             found.append(
-                f"the law at the start asks for {np.max(self.demand.asked):.3g}, and a run ends as"
-                f" diverged from {LARGEST_INPUT:g} on"
+                f"{self.commanded_input.exceeded}, and the theorems have inputs without limits"
+            )
+        if not mode.held and np.any(self.commanded_input.asked >= LARGEST_INPUT):
+            found.append(
+                f"the law at the start asks for {np.max(self.commanded_input.asked):.3g}, and a run"
+                f" ends as diverged from {LARGEST_INPUT:g} on"
             )
         return tuple(found)
 

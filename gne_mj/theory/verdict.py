@@ -2,13 +2,13 @@
 
 from gne_mj.system import mode_of
 from gne_mj.theory.assumption import ASSUMED
-from gne_mj.theory.demand import limited
-from gne_mj.theory.held import Held
+from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.pieces import Pieces
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
+from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
 
-def guaranteed(theorem: Theorem, held: Held | None = None) -> list[str]:
+def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]:
     """What the theorem gives."""
     system = theorem.system
     limit = _limit(theorem)
@@ -71,7 +71,7 @@ def measured(theorem: Theorem, pieces: Pieces | None = None) -> list[str]:
 
 
 def not_certified(
-    theorem: Theorem, held: Held | None = None, pieces: Pieces | None = None
+    theorem: Theorem, held: ZeroOrderHold | None = None, pieces: Pieces | None = None
 ) -> list[str]:
     """What cannot be certified, and why."""
     found = list(theorem.obstacles)

@@ -2,10 +2,10 @@
 
 From MuJoCo's model and state come drawing commands and one array of poses (`mirror.py`, which
 serves any model and any ``meshcat.Visualizer``). With a game's quantities, bounds and messages they
-make up a scene of stages, one a system (`stage.py`, `fleet.py`, `scene.py`). A live page is fed by
-a session in the simulation's own thread through a server on the loopback interface (`session.py`,
-`server.py`). A replay is the same numbers in one pack (`replay.py`, `pack.py`), with the page
-around it or beside it (`html.py`, `page/`).
+make up a scene of stages, one a system (`shown_system.py`, `fleet.py`, `scene.py`). A live page is
+fed by a session in the simulation's own thread through a server on the loopback interface
+(`session.py`, `server.py`). A replay is the same numbers in one pack (`replay.py`, `pack.py`), with
+the page around it or beside it (`html.py`, `page/`).
 """
 
 from gne_mj.extras import need

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from gne_mj.scenario import Scenario
-from gne_mj.view.stage import Stage
+from gne_mj.view.shown_system import ShownSystem
 
 DECADES = 100.0  # a positive number's slider goes so many times up and down
 REACH = 5.0  # m/s, how far a velocity's slider goes up and down
@@ -88,19 +88,19 @@ def controls_of(scenario: Scenario) -> list[Control]:
     return found
 
 
-def pushes_of(stages: list[Stage]) -> list[dict[str, Any]]:
+def pushes_of(shown_systems: list[ShownSystem]) -> list[dict[str, Any]]:
     """Whose agents have push buttons: robots that MuJoCo moves."""
     found = []
-    for stage in stages:
-        system = stage.system
-        if system.engine != "mujoco" or stage.fleet is None:
+    for shown_system in shown_systems:
+        system = shown_system.system
+        if system.engine != "mujoco" or shown_system.fleet is None:
             continue
         axes = max(system.game.sizes)
         found.append(
             {
                 "system": system.name,
                 "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
-                "unit": _push_unit(stage),
+                "unit": _push_unit(shown_system),
                 "force": PUSH_FORCE,
                 "duration": PUSH_DURATION,
             }
@@ -108,10 +108,10 @@ def pushes_of(stages: list[Stage]) -> list[dict[str, Any]]:
     return found
 
 
-def _push_unit(stage: Stage) -> str:
+def _push_unit(shown_system: ShownSystem) -> str:
     """Of forces at the outputs' joints."""
-    assert stage.fleet is not None
-    plant = stage.fleet.plant
+    assert shown_system.fleet is not None
+    plant = shown_system.fleet.plant
     joints = plant.output_joints[plant.output_joints >= 0]
     kinds = plant.model.jnt_type[plant.model.dof_jntid[joints]]
     hinges = kinds == mujoco.mjtJoint.mjJNT_HINGE

@@ -67,7 +67,7 @@ class Fleet:
 
     @property
     def places(self) -> dict[str, Any]:
-        """Where the page finds each agent's body, see :meth:`gne_mj.view.stage.Stage.meta`."""
+        """Where the page finds each agent's body, see ``ShownSystem.meta``."""
         model, mirror = self.plant.model, self.mirror
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

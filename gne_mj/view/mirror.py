@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, kernel
 from gne_mj.view.shapes import (
+    DrawnPart,
     Group,
     Json,
     Matrix,
-    Part,
     coil,
     height_field,
     material,
@@ -96,7 +96,7 @@ class Mirror:
         self._rest[: len(self._bodies), LENGTH] = 1.0
         paths = np.full(model.nbody, world, dtype=object)
         paths[self._bodies] = self.items[: len(self._bodies)]
-        parts: dict[str, list[Part]] = {}
+        parts: dict[str, list[DrawnPart]] = {}
         tints = {model.geom(name).id for name in tinted}
         for geom in _shown(model, "geom"):
             path = paths[model.geom_bodyid[geom]] + ("/tint" if geom in tints else "")
@@ -187,7 +187,7 @@ class Mirror:
                 for path, (_, other) in zip(paths, names, strict=True)
             ]
 
-    def _parts(self, what: str, number: int) -> list[Part]:
+    def _parts(self, what: str, number: int) -> list[DrawnPart]:
         """A geom or site as a mesh of its body's group; none if it cannot be drawn."""
         element = getattr(self.model, what)(number)
         drawn = self._shape(element, int(getattr(self.model, f"{what}_dataid")[number]))
@@ -200,7 +200,7 @@ class Mirror:
         else:
             place = getattr(self._data, what)(number)
             at[:3, :3], at[:3, 3] = place.xmat.reshape(3, 3), place.xpos
-        return [Part(element.name or f"{what}_{number}", geometry, surface, at @ own)]
+        return [DrawnPart(element.name or f"{what}_{number}", geometry, surface, at @ own)]
 
     def _shape(self, element: Any, number: int) -> tuple[Json, Matrix, Json] | None:
         """Geometry (of mesh or height field ``number``), its own matrix, and material."""
@@ -277,7 +277,7 @@ class Mirror:
         straight = ~self._is_fixed() & (model.tendon_num == 2)
         return set(np.flatnonzero(straight & (model.tendon_stiffness > 0)).tolist())
 
-    def _segment(self, tendon: int, *, coiled: bool) -> Part:
+    def _segment(self, tendon: int, *, coiled: bool) -> DrawnPart:
         model = self.model
         width = float(model.tendon_width[tendon])
         if coiled:
@@ -288,7 +288,7 @@ class Mirror:
             geometry, matrix = tube(width)
         rgba = _colours(model, model.tendon_rgba[[tendon]], model.tendon_matid[[tendon]])[0]
         name = model.tendon(tendon).name or f"tendon_{tendon}"
-        return Part(name, geometry, material(rgba), matrix)
+        return DrawnPart(name, geometry, material(rgba), matrix)
 
 
 def _colours(model: mujoco.MjModel, rgba: Any, matid: Any) -> NDArray[np.float64]:

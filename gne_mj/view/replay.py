@@ -14,7 +14,7 @@ from gne_mj.scenario import load_scenario
 from gne_mj.trajectory import Trajectory
 from gne_mj.view.pack import packed_small
 from gne_mj.view.scene import Scene
-from gne_mj.view.stage import Arrays, Stage, is_line
+from gne_mj.view.shown_system import Arrays, ShownSystem, is_line
 
 if TYPE_CHECKING:
     import xarray
@@ -39,9 +39,9 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
         )
     scenario = load_scenario(json.loads(source))
     clock = scenario.clock()
-    stages = [Stage(system, clock) for system in scenario.system_objects()]
-    names = ", ".join(stage.system.name for stage in stages)
-    return scene_pack(Scene(stages, title or names, clock.duration), trajectory)
+    shown_systems = [ShownSystem(system, clock) for system in scenario.system_objects()]
+    names = ", ".join(shown_system.system.name for shown_system in shown_systems)
+    return scene_pack(Scene(shown_systems, title or names, clock.duration), trajectory)
 
 
 def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
@@ -50,17 +50,22 @@ def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
     Raises:
         InvalidInput: its robots have other joints than the scene's.
     """
-    datasets = {stage.system.name: trajectory[stage.system.name] for stage in scene.stages}
+    datasets = {
+        shown_system.system.name: trajectory[shown_system.system.name]
+        for shown_system in scene.shown_systems
+    }
     time = _times(list(datasets.values()))
     values = {name: _values(data, time) for name, data in datasets.items()}
     arrays: Arrays = {"time": time, **scene.arrays(values)}
-    for stage in scene.stages:
-        ended = float(datasets[stage.system.name]["time"][-1])
-        cut(arrays, stage.system.name, time > ended + 1e-9)
-        left = outcome(trajectory.reports[stage.system.name])
+    for shown_system in scene.shown_systems:
+        ended = float(datasets[shown_system.system.name]["time"][-1])
+        cut(arrays, shown_system.system.name, time > ended + 1e-9)
+        left = outcome(trajectory.reports[shown_system.system.name])
         if left["exit_agents"]:
-            mark_outside(arrays, stage.system.name, left["exit_agents"], time >= ended - 1e-9)
-        arrays |= _messages(stage, np.minimum(time, ended))
+            mark_outside(
+                arrays, shown_system.system.name, left["exit_agents"], time >= ended - 1e-9
+            )
+        arrays |= _messages(shown_system, np.minimum(time, ended))
     poses = scene.poses(values).reshape(len(time), -1)
     varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
     arrays["pose_base"] = poses[0]
@@ -155,10 +160,10 @@ def mark_outside(arrays: Arrays, name: str, agents: Sequence[int], rows: NDArray
         share[inside, agent - 1] = np.inf
 
 
-def _messages(stage: Stage, time: NDArray[np.float64]) -> Arrays:
+def _messages(shown_system: ShownSystem, time: NDArray[np.float64]) -> Arrays:
     """Messages since the sample before."""
-    steps = [0, *(stage.clock.steps(t) for t in time)]
-    rows = [stage.messages(*pair) for pair in pairwise(steps)]
+    steps = [0, *(shown_system.clock.steps(t) for t in time)]
+    rows = [shown_system.messages(*pair) for pair in pairwise(steps)]
     return {key: np.stack([row[key] for row in rows]) for key in rows[0]} if rows else {}
 
 

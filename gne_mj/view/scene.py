@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.view.stage import Arrays, Stage, Values
+from gne_mj.view.shown_system import Arrays, ShownSystem, Values
 
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
 
@@ -15,26 +15,26 @@ class Scene:
     """What a page shows of several systems.
 
     Args:
-        stages: one a system.
+        shown_systems: one a system.
         title: of the page.
         duration: of the run, in s.
     """
 
-    def __init__(self, stages: Sequence[Stage], title: str, duration: float) -> None:
-        self.stages, self.title, self.duration = stages, title, duration
+    def __init__(self, shown_systems: Sequence[ShownSystem], title: str, duration: float) -> None:
+        self.shown_systems, self.title, self.duration = shown_systems, title, duration
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the scene; see :mod:`gne_mj.view`."""
         items: list[str] = []
         systems = []
-        for stage in self.stages:
-            about = stage.meta()
-            if stage.fleet is not None:
+        for shown_system in self.shown_systems:
+            about = shown_system.meta()
+            if shown_system.fleet is not None:
                 about["anchors"] = [len(items) + anchor for anchor in about["anchors"]]
                 about["tints"] = [[f"{ROOT}/{path}" for path in each] for each in about["tints"]]
-                items.extend(f"{ROOT}/{item}" for item in stage.fleet.mirror.items)
+                items.extend(f"{ROOT}/{item}" for item in shown_system.fleet.mirror.items)
             systems.append(about)
-        clock = self.stages[0].clock
+        clock = self.shown_systems[0].clock
         return {
             "title": self.title,
             "duration": self.duration,
@@ -45,17 +45,17 @@ class Scene:
 
     def draw(self, visualizer: Any) -> None:
         """Draw all fleets into a ``meshcat.Visualizer``."""
-        for stage in self.stages:
-            if stage.fleet is not None:
-                stage.fleet.mirror.draw(visualizer)
+        for shown_system in self.shown_systems:
+            if shown_system.fleet is not None:
+                shown_system.fleet.mirror.draw(visualizer)
 
     def poses(self, values: Mapping[str, Values]) -> NDArray[np.float64]:
         """(T, K, 8) of all items at samples, from the variables of each system by its name."""
         found = []
-        for stage in self.stages:
-            if stage.fleet is not None:
-                mirror = stage.fleet.mirror
-                rows = stage.fleet.qpos(values[stage.system.name])
+        for shown_system in self.shown_systems:
+            if shown_system.fleet is not None:
+                mirror = shown_system.fleet.mirror
+                rows = shown_system.fleet.qpos(values[shown_system.system.name])
                 found.append(np.stack([mirror.poses(row) for row in rows]))
         if not found:
             samples = len(next(iter(values.values()))["action"])
@@ -65,6 +65,6 @@ class Scene:
     def arrays(self, values: Mapping[str, Values]) -> Arrays:
         """What the page draws besides at samples, of all systems."""
         found: Arrays = {}
-        for stage in self.stages:
-            found |= stage.arrays(values[stage.system.name])
+        for shown_system in self.shown_systems:
+            found |= shown_system.arrays(values[shown_system.system.name])
         return found

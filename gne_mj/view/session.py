@@ -24,7 +24,7 @@ from gne_mj.view.pack import pack
 from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.view.scene import Scene
 from gne_mj.view.server import Browser, Server
-from gne_mj.view.stage import Stage
+from gne_mj.view.shown_system import ShownSystem
 from gne_mj.view.trial import Trials
 
 FRAME = 1 / 60  # s between frames, at best
@@ -66,12 +66,12 @@ class Session:
         self._controls = {control.key: control for control in controls_of(scenario)}
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
-        stages = [
-            Stage(run.system, self.simulation.clock, getattr(run.loop, "plant", None))
+        shown_systems = [
+            ShownSystem(run.system, self.simulation.clock, getattr(run.loop, "plant", None))
             for run in self.simulation.runs.values()
         ]
-        self._scene = Scene(stages, title, self.simulation.clock.duration)
-        self._pushes = pushes_of(stages)
+        self._scene = Scene(shown_systems, title, self.simulation.clock.duration)
+        self._pushes = pushes_of(shown_systems)
         self.server = Server(title, port=port, received=self._receive)
         self._scene.draw(self.visualizer)
 
@@ -362,9 +362,9 @@ class Session:
         arrays = {name: row[0] for name, row in rows.items()}
         arrays["poses"] = self._scene.poses(values)[0]
         step = simulation.clock.steps(time)
-        for stage in self._scene.stages:
-            own = simulation.runs[stage.system.name].loop.time
-            arrays |= stage.messages(
+        for shown_system in self._scene.shown_systems:
+            own = simulation.runs[shown_system.system.name].loop.time
+            arrays |= shown_system.messages(
                 self._messages_from, max(self._messages_from, simulation.clock.steps(own))
             )
         self._messages_from = step

@@ -38,7 +38,7 @@ UPRIGHT: Matrix = np.array(
 )
 
 
-class Part(NamedTuple):
+class DrawnPart(NamedTuple):
     """One mesh of a group.
 
     Attributes:
@@ -64,7 +64,7 @@ class Group(Object):
         parts: the meshes.
     """
 
-    def __init__(self, parts: list[Part]) -> None:
+    def __init__(self, parts: list[DrawnPart]) -> None:
         self.parts = parts
 
     def lower(self) -> Json:

@@ -34,12 +34,12 @@ from turns import in_turns, row
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, feedback
-from gne_mj.loops.layout import Clock as Steps
+from gne_mj.loops.layout import LoopClock as Steps
 from gne_mj.loops.layout import (
     Setup,
-    loop_room_in,
-    loop_room_length,
-    ode_table,
+    loop_workspace_in,
+    loop_workspace_length,
+    ode_parameter_block,
     parts_in,
     steps_in,
     steps_of,
@@ -123,19 +123,19 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         one.equilibrium.action, no_propagator(), functions=one.functions,
     )  # fmt: skip
     setup = Setup(problem, one.state, Steps(1.0, 1, CONTINUOUS, EULER))
-    table = ode_table(setup, one.agents, 0)
-    address, memory = table.address, np.zeros(0)
-    room = np.zeros(loop_room_length(steps_of(table)))
+    parameter_block = ode_parameter_block(setup, one.agents, 0)
+    address, memory = parameter_block.address, np.zeros(0)
+    room = np.zeros(loop_workspace_length(steps_of(parameter_block)))
     start, u = np.ascontiguousarray(_some_state()[1::3]), np.zeros(n)
 
     @njit(error_model="numpy", _nrt=False)
-    def control(table, room, y, memory, u):
-        parts = parts_in(table, loop_room_in(room, steps_in(table)))
+    def control(parameter_block, room, y, memory, u):
+        parts = parts_in(parameter_block, loop_workspace_in(room, steps_in(parameter_block)))
         return feedback(parts.problem, 0.0, 0, y, memory, parts.work, parts.monitor, u)
 
     @njit(error_model="numpy", _nrt=False)
-    def loop(table, room, y, memory, u, count):
-        parts = parts_in(table, loop_room_in(room, steps_in(table)))
+    def loop(parameter_block, room, y, memory, u, count):
+        parts = parts_in(parameter_block, loop_workspace_in(room, steps_in(parameter_block)))
         for _ in range(count):
             feedback(parts.problem, 0.0, 0, y, memory, parts.work, parts.monitor, u)
             for r in range(len(y)):
@@ -148,14 +148,14 @@ def our_calls() -> tuple[Callable[[], float], Callable[[], float]]:
         raise ArithmeticError("our law is not what is meant to be measured")
 
     def from_python() -> float:
-        assert table.arrays
+        assert parameter_block.arrays
         began = time.perf_counter()
         for _ in range(CALLS):
             control(address, room, start, memory, u)
         return (time.perf_counter() - began) / CALLS
 
     def in_loop() -> float:
-        assert table.arrays  # which the problem knows by address
+        assert parameter_block.arrays  # which the problem knows by address
         y, count = start.copy(), 50 * EVALUATIONS
         began = time.perf_counter()
         loop(address, room, y, memory, u, count)

@@ -73,7 +73,7 @@ def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[fl
     last states (runs, N, 4).
     """
     structure = Structure(one, clock, CORES)
-    table = structure.table(one, one.setup(clock))
+    table = structure.parameter_block(one, one.setup(clock))
     cases = [
         Case(state, one.loop_memory, one.agents.parameters, table, one.closed_loop)
         for state in states

@@ -25,7 +25,7 @@ from gne_mj.controllers import FullyDistributed
 from gne_mj.controllers.propagation import no_propagator
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.layout import Clock, Setup
+from gne_mj.loops.layout import LoopClock, Setup
 from gne_mj.loops.link import link
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.rosenbrock import RosenbrockLoop
@@ -68,7 +68,7 @@ class Twin:
 
     def loop(self, rtol: float) -> RosenbrockLoop:
         """Our loop, at its start."""
-        clock = Clock(0.05, 1, CONTINUOUS, RK4)
+        clock = LoopClock(0.05, 1, CONTINUOUS, RK4)
         setup = Setup(self.problem, np.zeros((N, self.states)), clock)
         return RosenbrockLoop(
             self.agents, setup, self.graph, self.start, self.memory, rtol, 1e-3 * rtol

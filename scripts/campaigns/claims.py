@@ -83,9 +83,9 @@ def _tally(checks: list[Check]) -> dict[str, Any]:
 
 def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
     """Markdown tables: verdicts, claims by kind, and each contradiction; how many there are."""
-    verdicts = Counter((row["mode"], row["verdict"]) for row in rows)
+    run_metrics = Counter((row["mode"], row["verdict"]) for row in rows)
     lines = ["| mode | verdict | systems |", "|---|---|---|"]
-    lines += [f"| {mode} | {verdict} | {n} |" for (mode, verdict), n in sorted(verdicts.items())]
+    lines += [f"| {mode} | {verdict} | {n} |" for (mode, verdict), n in sorted(run_metrics.items())]
     checked, against = Counter[str](), Counter[str]()
     for row in rows:
         checked.update(row["checked"])

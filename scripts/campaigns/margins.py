@@ -22,7 +22,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.scenario import load_scenario
 from gne_mj.system import Clock, System
 from gne_mj.theory import search_push
-from gne_mj.theory.held import Held
+from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
 RUNS_A_JOB = 50
 BROKEN = "left at an instant"
@@ -54,7 +54,7 @@ def _job(key: tuple[int, int]) -> Counter[str]:
         except InvalidInput:
             counts[f"{kind}, refused (disturbances use up a bound)"] += 1
             continue
-        if not Held(system, clock).promised:
+        if not ZeroOrderHold(system, clock).promised:
             counts[f"{kind}, refused (slope not certified)"] += 1
             continue
         late = sensor_delay(system.faults) > 0
@@ -150,7 +150,7 @@ def ratios() -> list[str]:
                 lines.append(f"| {period:g} | {push:g} | refused: {error.expected} | |")
                 continue
             clock = scenario.clock()
-            certified = Held(system, clock).largest_push() or 0.0
+            certified = ZeroOrderHold(system, clock).largest_push() or 0.0
             found = search_push(replace(system, engine="ode"), clock)
             least = found.smallest_breaking_push
             shown = "none" if least is None else f"{least:.4g}"

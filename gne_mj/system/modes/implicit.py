@@ -3,8 +3,8 @@
 At a control instant u = law(y+) is solved for the outputs y+ at the next one, as the plant's model
 predicts them under u (:mod:`gne_mj.loops.implicit`): by all agents together
 (:mod:`gne_mj.loops.joint`) or each by itself (:mod:`gne_mj.loops.local`). What that promises is in
-docs/held-inputs.md and :mod:`gne_mj.theory.held`. It needs the law's pull with its derivative, and
-outputs that rise with their inputs over a period.
+docs/held-inputs.md and :mod:`gne_mj.theory.zero_order_hold`. It needs the law's barrier-free part
+with its derivative, and outputs that rise with their inputs over a period.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from gne_mj.loops.feedback import Order
 from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import IMPLICIT
 from gne_mj.margins import influence
-from gne_mj.plants import held_map
+from gne_mj.plants import zero_order_hold
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.base import Plant
 from gne_mj.plants.ode import OdePlant
@@ -50,14 +50,17 @@ class Implicit(Mode):
         """All together, unless agents keep to their shares or the law's barriers are their own."""
         return local if system.decentralised or system.law.alone else joint
 
-    def ahead(self, system: SystemData) -> Mapping[int, Any]:
+    def prediction(self, system: SystemData) -> Mapping[int, Any]:
         """The law's pull, the equation's solver, and what is done at a control instant."""
-        plant: ModuleType = held_map
+        plant: ModuleType = zero_order_hold
         at: Any = ()
         if not has_ode(system.agents.kind):
-            from gne_mj.plants import mjcf_ahead, native_mujoco  # late: MuJoCo is slow to import
+            from gne_mj.plants import (
+                mjcf_prediction,
+                native_mujoco,
+            )  # late: MuJoCo is slow to import
 
-            plant, at = mjcf_ahead, native_mujoco.offsets()
+            plant, at = mjcf_prediction, native_mujoco.offsets()
         equation = self.equation(system)
         alone = equation.ALONE
         return {
@@ -99,8 +102,8 @@ class Implicit(Mode):
             raise InvalidInput(
                 "mode",
                 self.name,
-                "this law does not define 'pull' and its derivative, which mode 'implicit' solves"
-                " with; use mode 'sampled'",
+                "this law does not define 'barrier_free' and its derivative, which mode 'implicit'"
+                " solves with; use mode 'sampled'",
             )
 
     def check_faults(self, system: SystemData) -> None:

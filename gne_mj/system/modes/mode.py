@@ -44,10 +44,10 @@ class Mode:
         name: in scenario files and reports.
         native: what a loop does, one of CONTINUOUS, SAMPLED and IMPLICIT of
             :mod:`gne_mj.loops.ode`: evaluate the law at every stage, evaluate it at control
-            instants, or call what :meth:`ahead` gives at control instants.
+            instants, or call what :meth:`prediction` gives at control instants.
         held: whether an input acts for a whole control period.
         promises: whether inputs are solved for such that the outputs which they lead to are inside
-            (:mod:`gne_mj.theory.held` says when that is certain).
+            (:mod:`gne_mj.theory.zero_order_hold` says when that is certain).
         section: of a run's report, for :meth:`report`; empty for none.
         figures: that batches keep of each run.
     """
@@ -65,7 +65,7 @@ class Mode:
         """The module that says who solves together; None where nothing is solved."""
         return None
 
-    def ahead(self, system: SystemData) -> Mapping[int, Any]:
+    def prediction(self, system: SystemData) -> Mapping[int, Any]:
         """C functions that its loops call, by their entry in :mod:`gne_mj.loops.functions`."""
         return {}
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from typing import Any
 
-from gne_mj.summary import bounds_in_words
+from gne_mj.summary import bounds_text
 from gne_mj.theory.guarantees import Guarantees
 from gne_mj.theory.theorem import CONDITIONAL
 
 _WIDTH = 20
 
 
-def words(guarantees: Guarantees) -> list[str]:
+def report_text(guarantees: Guarantees) -> list[str]:
     """The report on one system, line by line."""
     g = guarantees.to_dict()
     lines = [f"\n{g['system']['name']}: {_what(g['system'])}"]
@@ -50,7 +50,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
         yield "estimates' start", _estimates(start["estimates"])
-    yield "epsilon of y*", bounds_in_words(g["equilibrium"])
+    yield "epsilon of y*", bounds_text(g["equilibrium"])
     yield "inputs", _inputs(g["inputs"])
     yield "sampling", _periods(g)
     if g["division"] is not None:

@@ -27,7 +27,7 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     copy(state[: len(trial)], trial)  # a law's memory may follow
     roll(channels, clock, trial, u, scratch)
     for r in range(len(u)):
-        out[r] = trial[r * channels.rest.shape[1] + channels.output]
+        out[r] = trial[r * channels.equilibrium_state.shape[1] + channels.output]
 
 
 @kernel

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers_in
+from gne_mj.parameter_block import integers
 from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import call, call_state, field, timed_step
 from gne_mj.records import in_numbers
-from gne_mj.table import integers
 
 
-class Ahead(NamedTuple):
+class Prediction(NamedTuple):
     """What such fleets need besides, behind :class:`gne_mj.plants.mujoco.Sizes` in SIZES."""
 
     nsensordata: int
@@ -43,7 +43,8 @@ class ChannelPlace(Numbers):
 
 
 PLACE = len(names_of(ChannelPlace))
-ahead_in, _place_in = in_numbers(Ahead, SIZES, len(Sizes._fields)), numbers_in(ChannelPlace)
+prediction_in = in_numbers(Prediction, SIZES, len(Sizes._fields))
+_place_in = numbers_in(ChannelPlace)
 
 
 @kernel
@@ -53,12 +54,12 @@ def place_of(places, r):
 
 
 @kernel
-def gather(at, data, table, state):
+def gather(at, data, parameter_block, state):
     """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
-    sizes = sizes_in(table)
+    sizes = sizes_in(parameter_block)
     qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
-    sensordata = field(data, at.sensordata, ahead_in(table).nsensordata)
-    places = integers(table, PLACES)
+    sensordata = field(data, at.sensordata, prediction_in(parameter_block).nsensordata)
+    places = integers(parameter_block, PLACES)
     for r in range(len(places) // PLACE):
         place = place_of(places, r)
         source, position = place.output, place.position
@@ -67,13 +68,13 @@ def gather(at, data, table, state):
 
 
 @kernel
-def refresh(model, data, table):
+def refresh(model, data, parameter_block):
     """Bring sensors of velocities up to date, which are of the last step's start."""
-    ahead = ahead_in(table)
-    if ahead.forward != 0:
-        call(ahead.position, model, data)
-        call(ahead.velocity, model, data)
-        call(ahead.sensors, model, data)
+    prediction = prediction_in(parameter_block)
+    if prediction.forward != 0:
+        call(prediction.position, model, data)
+        call(prediction.velocity, model, data)
+        call(prediction.sensors, model, data)
 
 
 @kernel
@@ -91,21 +92,21 @@ def roll(channels, clock, state, u, scratch):
 def predict(context, channels, clock, state, u, out, trial, scratch):
     """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
 
-    The arguments are as :func:`gne_mj.plants.held_map.predict` has them, but that it starts from
-    the simulation itself and not from ``state``.
+    The arguments are as :func:`gne_mj.plants.zero_order_hold.predict` has them, but that it starts
+    from the simulation itself and not from ``state``.
     """
-    at, model, data, table = context
-    ahead, places = ahead_in(table), integers(table, PLACES)
-    twin = ahead.twin
-    call_state(ahead.copy, model, data, twin, ahead.known)
-    ctrl = field(twin, at.ctrl, sizes_in(table).nu)
+    at, model, data, parameter_block = context
+    prediction, places = prediction_in(parameter_block), integers(parameter_block, PLACES)
+    twin = prediction.twin
+    call_state(prediction.copy, model, data, twin, prediction.known)
+    ctrl = field(twin, at.ctrl, sizes_in(parameter_block).nu)
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]
     for _ in range(clock.period):
-        timed_step(at, ahead.step, model, twin)
-    if ahead.forward != 0:  # sensors are of the last step's start
-        call(ahead.forward, model, twin)
-    gather(at, twin, table, trial)
+        timed_step(at, prediction.step, model, twin)
+    if prediction.forward != 0:  # sensors are of the last step's start
+        call(prediction.forward, model, twin)
+    gather(at, twin, parameter_block, trial)
     for r in range(len(u)):
         out[r] = trial[2 * r]
 

@@ -21,7 +21,7 @@ def limited(system: System) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Demand:
+class CommandedInput:
     """Inputs at the start.
 
     Args:

@@ -20,7 +20,7 @@ Arrays = dict[str, NDArray[Any]]
 Values = Mapping[str, NDArray[np.float64]]
 
 
-class Stage:
+class ShownSystem:
     """One system as a page shows it: a fleet of robots in their MJCF, or bars.
 
     Args:
@@ -123,7 +123,11 @@ class Stage:
         system, game = self.system, self.system.game
         if system.law.graph is not None:
             return [[i + 1, j + 1] for i, j in system.law.graph.edges]
-        pairs = {(min(i, j), max(i, j)) for i, seen in enumerate(game.in_cost) for j in seen}
+        pairs = {
+            (min(i, j), max(i, j))
+            for i, measurement in enumerate(game.in_cost)
+            for j in measurement
+        }
         pairs |= {(i, j) for members in game.in_constraint for i in members for j in members}
         return [[i + 1, j + 1] for i, j in sorted(pairs) if i < j]
 

@@ -15,14 +15,14 @@ from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import Clock, System
 from gne_mj.system.first_input import first_input, law_at_start
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
+from gne_mj.theory.commanded_input import CommandedInput, limited
 from gne_mj.theory.convexity import convex_constraints, own_convexity
-from gne_mj.theory.demand import Demand, limited
 from gne_mj.theory.disturbances import strength
 from gne_mj.theory.theorem import Theorem
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class ZeroOrderHold:
     """The conditions of the promise for one system on one clock.
 
     Args:
@@ -47,12 +47,12 @@ class Held:
         return influence(system.agents, clock.timestep, system.integrator, steps, delay)
 
     @cached_property
-    def demand(self) -> Demand:
+    def commanded_input(self) -> CommandedInput:
         """The first input: as a run solves for it where there are limits, else as the law reads."""
         system = self.system
         if not limited(system):
-            return Demand(system, np.abs(law_at_start(system)), "the law at the start")
-        return Demand(system, first_input(system, self.clock), "the first period")
+            return CommandedInput(system, np.abs(law_at_start(system)), "the law at the start")
+        return CommandedInput(system, first_input(system, self.clock), "the first period")
 
     @property
     def conditions(self) -> tuple[Assumption, ...]:
@@ -102,14 +102,14 @@ class Held:
 
         Besides the errors and delay of sensors that are declared, or that faults make.
         """
-        struck, m = strength(self.system), self.system.game.actions
+        declared, m = strength(self.system), self.system.game.actions
         bound = self.system.disturbance or Disturbance(np.zeros(m), np.zeros(m))
-        effect = self._influence(max(bound.delay, struck.delay))
+        effect = self._influence(max(bound.delay, declared.delay))
         if effect is None:
             return None
         if self.system.decentralised:
             return 0.0
-        besides = Disturbance(np.zeros(m), np.maximum(bound.noise, struck.noise))
+        besides = Disturbance(np.zeros(m), np.maximum(bound.noise, declared.noise))
         return largest_push(self.system.game, effect, besides, self.system.game.margins)
 
     def _law(self) -> Assumption:
@@ -164,7 +164,7 @@ class Held:
     def _inputs(self) -> Assumption:
         if not limited(self.system):
             return Assumption("inputs", MET, "delivered as asked for")
-        exceeded = self.demand.exceeded
+        exceeded = self.commanded_input.exceeded
         if exceeded is not None:
             return Assumption("inputs", FAILS, f"{exceeded}: a limit is met at once")
         return Assumption(
@@ -174,18 +174,18 @@ class Held:
     def _disturbances(self) -> Assumption:
         label, system = "disturbances", self.system
         bound = system.disturbance
-        struck = strength(system)
+        declared = strength(system)
         if bound is None:
-            if np.any(struck.push) or np.any(struck.noise):
+            if np.any(declared.push) or np.any(declared.noise):
                 return Assumption(label, FAILS, "there are faults and no [margin] that covers them")
-            return Assumption(label, MET, _harmless(struck.delay))
+            return Assumption(label, MET, _harmless(declared.delay))
         if system.decentralised:
             return Assumption(
                 label, FAILS, "shares of slacks leave no room for disturbances: no margin is known"
             )
         for what, given, most in (
-            ("push", struck.push, bound.push),
-            ("noise", struck.noise, bound.noise),
+            ("push", declared.push, bound.push),
+            ("noise", declared.noise, bound.noise),
         ):
             if np.any(given > most * (1.0 + 1e-12)):
                 worst = int(np.argmax(given - most))
@@ -196,11 +196,11 @@ class Held:
                     f" {int(system.game.agent_of_action[worst]) + 1}, and the margin covers"
                     f" {most[worst]:.4g}",
                 )
-        if struck.delay > bound.delay:
+        if declared.delay > bound.delay:
             return Assumption(
                 label,
                 FAILS,
-                f"sensors are {struck.delay} periods late, and the margin covers {bound.delay}",
+                f"sensors are {declared.delay} periods late, and the margin covers {bound.delay}",
             )
         why = "the barrier is tightened by what they can do within a control period"
         if system.game.tested:

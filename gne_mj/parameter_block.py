@@ -1,4 +1,5 @@
-"""Tables of arrays that native code reaches by one address: read-only to it, unless it says so.
+"""Parameter blocks of arrays that native code reaches by one address: read-only to it, unless it
+says so.
 
 A callback gets two pointers and nothing else, and a loop over many runs wants one number a run.
 Both find their arrays through the address of a block of (address, length) pairs.
@@ -16,11 +17,11 @@ from gne_mj.errors import EngineError
 from gne_mj.native import array_at, intrinsic_or, load_word
 
 
-class Table:
+class ParameterBlock:
     """Arrays that native code reads, as one block of (address, length) pairs.
 
-    The arrays are kept alive as long as the table is; so keep the plant or loop that made a
-    simulation for as long as that simulation, or a copy of it, is stepped with its callbacks.
+    The arrays are kept alive as long as the parameter block is; so keep the plant or loop that made
+    a simulation for as long as that simulation, or a copy of it, is stepped with its callbacks.
 
     Attributes:
         arrays: as they were given.
@@ -60,20 +61,20 @@ def _array(item: Any, address: int, length: int) -> NDArray[Any]:
     return np.ctypeslib.as_array((item * int(length)).from_address(int(address)))
 
 
-def _indexed(item: Any, table: int, index: int) -> NDArray[Any]:
-    """An array of a table, in plain Python."""
-    return _array(item, *_array(ctypes.c_int64, table + 16 * index, 2))
+def _indexed(item: Any, parameter_block: int, index: int) -> NDArray[Any]:
+    """An array of a parameter block, in plain Python."""
+    return _array(item, *_array(ctypes.c_int64, parameter_block + 16 * index, 2))
 
 
-@intrinsic_or(lambda table, index: _indexed(ctypes.c_double, table, index))
-def floats(typingctx: Any, table: Any, index: Any) -> Any:
-    """The float array at this index of the table at an address."""
+@intrinsic_or(lambda parameter_block, index: _indexed(ctypes.c_double, parameter_block, index))
+def floats(typingctx: Any, parameter_block: Any, index: Any) -> Any:
+    """The float array at this index of the parameter block at an address."""
     return _entry(types.float64)
 
 
-@intrinsic_or(lambda table, index: _indexed(ctypes.c_int64, table, index))
-def integers(typingctx: Any, table: Any, index: Any) -> Any:
-    """The integer array at this index of the table at an address."""
+@intrinsic_or(lambda parameter_block, index: _indexed(ctypes.c_int64, parameter_block, index))
+def integers(typingctx: Any, parameter_block: Any, index: Any) -> Any:
+    """The integer array at this index of the parameter block at an address."""
     return _entry(types.int64)
 
 
@@ -81,8 +82,10 @@ def _entry(item: types.Type) -> Any:
     kind = types.Array(item, 1, "C")
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        table, index = arguments
-        pair = builder.add(table, builder.mul(index, context.get_constant(types.intp, 16)))
+        parameter_block, index = arguments
+        pair = builder.add(
+            parameter_block, builder.mul(index, context.get_constant(types.intp, 16))
+        )
         length = builder.add(pair, context.get_constant(types.intp, 8))
         return array_at(
             context, builder, kind, load_word(builder, pair), load_word(builder, length)
