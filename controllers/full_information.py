@@ -12,7 +12,7 @@ from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.table import LawTable
 from gne_mj.controllers.theorem import LawTheorem
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS
 

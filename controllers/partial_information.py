@@ -37,7 +37,7 @@ from gne_mj.controllers.law import (
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.controllers.theorem import LawTheorem
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS

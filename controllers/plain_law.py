@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.settings import COUNT
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import kernel
 from gne_mj.plain import call_out, callable_address
 

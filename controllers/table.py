@@ -7,7 +7,7 @@ from pydantic import Field
 
 from gne_mj import graph as graphs
 from gne_mj.controllers.law import Law
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.registry import MODES
 from gne_mj.toml_table import Fills, Table
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import kernel
 from gne_mj.registry import SCHEDULES
 from gne_mj.toml_table import Fills, Table

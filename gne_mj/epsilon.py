@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from gne_mj import interior_point as method
 from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.interior_point import Free, Iterate, NewtonScratch, Path
 from gne_mj.plain import forgive_pending, raise_pending
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.loops import faults as native
 from gne_mj.loops.feedback import FAULT_KINDS, FaultNumbers, Faults

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.errors import InvalidInput, named
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.plants.agent_type import by_type, has_ode
 from gne_mj.plants.agents import Agents, input_columns
 

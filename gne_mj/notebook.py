@@ -19,7 +19,7 @@ def notebook_html(trajectory: Trajectory) -> str:
     tables = "".join(_table(name, report) for name, report in trajectory.reports.items())
     found = f'<div style="display:flex;flex-wrap:wrap;gap:2em">{tables}</div>'
     try:
-        from gne_mj.view import html_page
+        from gne_mj.viewer import html_page
 
         page = escape(html_page(trajectory), quote=True)
     except GneError as error:

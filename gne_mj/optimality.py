@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 
 # Relative to what it acts on: a push below is none, and likewise room for an action.
 NEGLIGIBLE = 1e-8

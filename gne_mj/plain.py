@@ -120,7 +120,7 @@ def check_numbers(game: Written, data: Any, y: Array) -> None:
 
     Args:
         game: whose functions.
-        data: its :class:`gne_mj.game.GameData`.
+        data: its :class:`gne_mj.game_model.GameData`.
         y: (m,), a copy.
 
     Raises:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops import monitor as watch
 
 SUCCESSES = ("converged", "completed")

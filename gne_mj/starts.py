@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gne_mj.equilibrium import middle
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 
 HALVINGS = 60
 DEPTHS = (1e-4, 1e-8)  # of an interior profile before it is moved, in lengths of the profile

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.quantity import Quantity

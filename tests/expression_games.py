@@ -6,7 +6,7 @@ import numpy as np
 from energy_kernels import energy_game
 
 from gne_mj.expressions import fixed, game
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import (
     cournot_game,
     osnr_game,

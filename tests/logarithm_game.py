@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 
 
 def game(count):

@@ -5,7 +5,7 @@ from types import ModuleType
 import coupled_game
 import numpy as np
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.plain import FUNCTIONS
 from gne_mj.system import System
 

@@ -18,7 +18,7 @@ from gne_mj.games import cournot_game, velocity_game
 from gne_mj.passivity import examine, plants_of
 from gne_mj.scenario import load_scenario, parse_value, shipped
 from gne_mj.simulation import Simulation
-from gne_mj.solve import parse_path
+from gne_mj.solutions import parse_path
 from gne_mj.system import Clock
 from gne_mj.toml_table import Table
 

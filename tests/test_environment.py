@@ -27,7 +27,7 @@ from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.environment import environment_of, law_policy, load_environment
 from gne_mj.environment.task import NotFinite, finite_costs
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import velocity_game
 from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.plain import FUNCTIONS

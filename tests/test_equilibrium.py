@@ -25,7 +25,7 @@ from gne_mj.equilibrium import (
     variational_equilibrium,
 )
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 
 OSNR = osnr_game(**ten_channels())

@@ -61,7 +61,7 @@ def test_a_command_says_at_once_what_to_install(
 
 @pytest.mark.parametrize(
     ("module", "package", "extra"),
-    [("gne_mj.environment", "dm_control", "learning"), ("gne_mj.view", "meshcat", "view")],
+    [("gne_mj.environment", "dm_control", "learning"), ("gne_mj.viewer", "meshcat", "view")],
 )
 def test_a_part_says_so_when_it_is_imported(monkeypatch, missing, module, package, extra):
     monkeypatch.delitem(sys.modules, module, raising=False)

@@ -15,7 +15,7 @@ NOT_YET = {
     "controllers/estimates.py",
     "controllers/propagation.py",
     "gne_mj/banded.py",
-    "gne_mj/game.py",
+    "gne_mj/game_model.py",
     "gne_mj/game_functions.py",
     "gne_mj/games/osnr.py",
     "gne_mj/games/velocity_consensus.py",

@@ -16,9 +16,9 @@ from own_games import boxed, coupled
 
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.game import Game
 from gne_mj.game_check import examine
 from gne_mj.game_check.differences import derivative, steps
+from gne_mj.game_model import Game
 from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_game
 
 START = np.array([0.3, -0.4, 0.5, -0.2])
@@ -363,7 +363,7 @@ action = [0.1, -0.1]
 MINE = """
 import sys
 import numpy as np
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 
 def game(count):
     return Game(

@@ -15,7 +15,7 @@ from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.controllers.settings import GAIN
 from gne_mj.faults import SensorDelay
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import velocity_consensus_game
 from gne_mj.loops import implicit, joint, local
 from gne_mj.loops import monitor as watch

@@ -17,8 +17,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from gne_mj.plants.fleet import compile_model, compose
-from gne_mj.view.mirror import Mirror, rotations, transforms, turn_z_to
-from gne_mj.view.shapes import DrawnPart, Group, capsule, coil, material
+from gne_mj.viewer.mirror import Mirror, rotations, transforms, turn_z_to
+from gne_mj.viewer.shapes import DrawnPart, Group, capsule, coil, material
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "robot"
 

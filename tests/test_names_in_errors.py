@@ -35,7 +35,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
-from gne_mj.solve import parse_path, solve_system
+from gne_mj.solutions import parse_path, solve_system
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System
 from gne_mj.user_files import load_game, load_law

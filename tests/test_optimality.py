@@ -20,12 +20,12 @@ from gne_mj.equilibrium import (
     variational_equilibrium,
 )
 from gne_mj.errors import InvalidInput, SolverError, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops import monitor as watch
 from gne_mj.optimality import examine
 from gne_mj.run_metrics import check_numbers
 from gne_mj.scenario import load_scenario
-from gne_mj.solve import solve_system
+from gne_mj.solutions import solve_system
 from gne_mj.starts import interior_profile
 
 HERE = Path(__file__).parent

@@ -24,7 +24,7 @@ from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import FullInformation, PlainLaw
 from gne_mj.equilibrium import penalised_equilibrium, variational_equilibrium
 from gne_mj.errors import GneError, InvalidInput, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import velocity_game
 from gne_mj.games import velocity_synchronization as velocity
 from gne_mj.native import is_kernel

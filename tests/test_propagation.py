@@ -18,7 +18,7 @@ from gne_mj.controllers.propagation import (
     propagator,
     scratch_length,
 )
-from gne_mj.game import GameData
+from gne_mj.game_model import GameData
 from gne_mj.native import compiled, source_key
 
 NOTHING = np.zeros(0, dtype=np.int64)

@@ -10,7 +10,7 @@ from builders import clock, integrators
 from gne_mj import plots
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from gne_mj.game import GameData
+from gne_mj.game_model import GameData
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.layout import Run, Steps
 from gne_mj.loops.newton import InputSolver, SolverNumbers, solver_length

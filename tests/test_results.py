@@ -12,7 +12,7 @@ from batch_plans import ODE, contents, small
 from commands import COMMAND, environment, gne_here
 
 import gne_mj.exit_map
-import gne_mj.solve
+import gne_mj.solutions
 from gne_mj.batches import Store, execute, make_plan, store
 from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.simulation import Simulation, interruption
@@ -59,7 +59,7 @@ def test_who_comes_second_keeps_its_results_under_another_name(command, tmp_path
 
     what, name = {
         "run": (Simulation, "run"),
-        "solve": (gne_mj.solve, "solve_system"),
+        "solve": (gne_mj.solutions, "solve_system"),
         "map": (gne_mj.exit_map, "exit_map"),
     }[command[0]]
     with meanwhile(monkeypatch, what, name, act):

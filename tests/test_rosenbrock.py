@@ -27,7 +27,7 @@ from gne_mj import banded
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InfeasibleStart
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels
 from gne_mj.loops import monitor as watch
 from gne_mj.loops import rodas

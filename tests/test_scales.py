@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium, variational_equilibrium
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import cournot_game, osnr_game, velocity_game
 from gne_mj.optimality import examine
 

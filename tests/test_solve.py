@@ -8,7 +8,7 @@ import pytest
 from commands import gne_here as gne
 
 import reference
-from gne_mj import solve as solving
+from gne_mj import solutions
 from gne_mj.equilibrium import penalised_equilibrium
 from gne_mj.errors import InvalidInput
 from gne_mj.scenario import load_scenario
@@ -20,7 +20,7 @@ def system(name="desired-velocity"):
 
 def test_the_shipped_desires_make_two_bounds_bind():
     """By hand: with gaps 2 and 4 on their bounds, +1 and -1, three free velocities are left."""
-    solution = solving.solve_system(system())
+    solution = solutions.solve_system(system())
     assert solution.holds
     assert solution.optimality.weakly_active == ()
     assert [solution.game.constraint_names[k] for k in solution.optimality.active] == [
@@ -42,7 +42,7 @@ def test_the_shipped_desires_make_two_bounds_bind():
 
 def test_what_the_lemma_says_is_what_is_measured():
     each = system()
-    solution = solving.solve_system(each, rhos=(0.1, 0.01), path_rhos=(1e-3, 1e-4))
+    solution = solutions.solve_system(each, rhos=(0.1, 0.01), path_rhos=(1e-3, 1e-4))
     game = each.game
     for point in (*solution.penalised, *solution.path):
         rho, y = point.equilibrium.rho, point.equilibrium.action
@@ -55,11 +55,11 @@ def test_what_the_lemma_says_is_what_is_measured():
 
 
 def test_without_a_rho_the_systems_own():
-    assert [p.equilibrium.rho for p in solving.solve_system(system()).penalised] == [0.1]
+    assert [p.equilibrium.rho for p in solutions.solve_system(system()).penalised] == [0.1]
 
 
 def test_equal_ratios():
-    rhos = solving.parse_path("1:1e-6:7")
+    rhos = solutions.parse_path("1:1e-6:7")
     assert np.allclose(rhos, 10.0 ** -np.arange(7.0), rtol=1e-12)
 
 
@@ -68,7 +68,7 @@ def test_equal_ratios():
 )
 def test_paths_that_are_none(text):
     with pytest.raises(InvalidInput, match="FROM:TO:COUNT"):
-        solving.parse_path(text)
+        solutions.parse_path(text)
 
 
 def test_in_words():

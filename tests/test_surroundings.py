@@ -12,7 +12,7 @@ import gne_mj
 from gne_mj.batches import Progress
 from gne_mj.cli import batches, output
 from gne_mj.errors import InvalidInput
-from gne_mj.view import write_html
+from gne_mj.viewer import write_html
 
 MAIN = "import sys; from gne_mj.cli import main; sys.argv[0] = 'gne-mj'; main()"
 SHORT = ("--set", "plant.engine=ode", "--set", "simulation.duration=0.05")

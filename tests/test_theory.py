@@ -29,7 +29,7 @@ from gne_mj import graph as graphs
 from gne_mj.cli import app
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade

@@ -15,7 +15,7 @@ from commands import gne_here
 
 from gne_mj.equilibrium import penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.plain import number_of
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -13,8 +13,8 @@ from gne_mj.batches import execute
 from gne_mj.batches.report import summary, write_report
 from gne_mj.scenario import load_scenario
 from gne_mj.variables import AXIS, SIGNALS, Column, Panel, Variable, declared
-from gne_mj.view import Session, replay_pack
-from gne_mj.view.pack import unpack
+from gne_mj.viewer import Session, replay_pack
+from gne_mj.viewer.pack import unpack
 
 SHORT = {"simulation.duration": 0.2}
 COORDINATES = {"time", "agent", "constraint_name", "component", "owner", "axis"}

@@ -14,7 +14,7 @@ from browser import Recorded
 import gne_mj
 from gne_mj.notebook import notebook_html
 from gne_mj.scenario import load_scenario
-from gne_mj.view import Session, serve, write_html
+from gne_mj.viewer import Session, serve, write_html
 
 READY = "window.gne && window.gne.ready"
 CLOSE = 1e-6  # m
@@ -220,7 +220,7 @@ def test_agents_in_a_violated_constraint_are_red_without_any_share(page, recorde
 
 
 def test_one_browser_too_many_is_told_so(page, monkeypatch):
-    monkeypatch.setattr("gne_mj.view.server.BROWSERS", 0)
+    monkeypatch.setattr("gne_mj.viewer.server.BROWSERS", 0)
     with session() as live:
         page.goto(live.server.url)
         page.locator("#lost").wait_for(state="visible")

@@ -28,7 +28,7 @@ LIVE = [*GNE, "run", "velocity-sync", "--view", "--set", "simulation.duration=10
 OWN = """
 import os, signal, sys, time
 import gne_mj
-from gne_mj.view import serve
+from gne_mj.viewer import serve
 server = serve(gne_mj.run("velocity-sync", {"simulation.duration": 0.1, "plant.engine": "ode"}))
 print("view", server.url, file=sys.stderr, flush=True)
 sys.stdin.readline()

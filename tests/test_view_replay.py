@@ -24,10 +24,10 @@ from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
-from gne_mj.view import html_page, replay_pack, write_html
-from gne_mj.view.html import page_file
-from gne_mj.view.pack import MAGIC, pack, packed_small, unpack
-from gne_mj.view.shown_system import ShownSystem, shares
+from gne_mj.viewer import html_page, replay_pack, write_html
+from gne_mj.viewer.html import page_file
+from gne_mj.viewer.pack import MAGIC, pack, packed_small, unpack
+from gne_mj.viewer.shown_system import ShownSystem, shares
 
 BASED = """<mujoco><worldbody>
   <body name="base"><geom size="0.1"/>
@@ -280,7 +280,7 @@ def test_systems_that_end_early_stay_and_their_lines_stop():
 
 
 def test_long_trajectories_are_thinned_and_keep_their_end(monkeypatch):
-    monkeypatch.setattr("gne_mj.view.replay.SAMPLES", 7)
+    monkeypatch.setattr("gne_mj.viewer.replay.SAMPLES", 7)
     trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})
     _, found = unpack(replay_pack(trajectory))
     assert len(found["time"]) == 7 + 1

@@ -12,8 +12,8 @@ from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from gne_mj.errors import InvalidInput
-from gne_mj.view.pack import pack
-from gne_mj.view.server import CONNECTIONS, UNSHOWN, Server
+from gne_mj.viewer.pack import pack
+from gne_mj.viewer.server import CONNECTIONS, UNSHOWN, Server
 
 
 @pytest.fixture

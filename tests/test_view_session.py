@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 import gne_mj
 from gne_mj.certificate import status_now
 from gne_mj.scenario import load_scenario
-from gne_mj.view import Session
-from gne_mj.view.controls import controls_of
-from gne_mj.view.pack import unpack
+from gne_mj.viewer import Session
+from gne_mj.viewer.controls import controls_of
+from gne_mj.viewer.pack import unpack
 
 ODE = {"plant.engine": "ode", "simulation.duration": 1.0}
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import kernel
 
 

@@ -16,7 +16,7 @@ from gne_mj.cli.signals import stopping
 if TYPE_CHECKING:
     from gne_mj.exit_map import Cell
     from gne_mj.scenario import Scenario
-    from gne_mj.solve import Solution
+    from gne_mj.solutions import Solution
     from gne_mj.system import Clock, System
     from gne_mj.theory.guarantees import Guarantees
 
@@ -45,13 +45,13 @@ def solve(
 
     --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
     """
-    from gne_mj import solve as solving
+    from gne_mj import solutions
     from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
 
     if path is not None and out is not None:
         need("plots", "the figure of a path")
-    path_rhos = [] if path is None else meaning("path", solving.parse_path, path)
+    path_rhos = [] if path is None else meaning("path", solutions.parse_path, path)
     results = Results(out)
     with working(as_json, PREPARING):
         loaded = load_scenario(source, settings(set_))
@@ -61,7 +61,7 @@ def solve(
         for built in every:
             if wanted in (None, built.name):
                 with loaded.naming(built.name):
-                    solutions.append(solving.solve_system(built, rhos or (), path_rhos))
+                    solutions.append(solutions.solve_system(built, rhos or (), path_rhos))
     report = json.dumps(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
@@ -75,18 +75,18 @@ def solve(
         emit(report)
     else:
         texts = [
-            "\n".join([*solving.summary(each), *_moved(moved.get(each.name))]) for each in solutions
+            "\n".join([*solutions.summary(each), *_moved(moved.get(each.name))])
+            for each in solutions
         ]
         print("\n\n".join(texts))
     raise typer.Exit(0 if all(each.holds for each in solutions) else 1)
 
 
 def _keep_paths(solutions: "list[Solution]", folder: Path) -> None:
-    from gne_mj import plots
-    from gne_mj import solve as solving
+    from gne_mj import plots, solutions
 
     for each in solutions:
-        solving.write_path(each, folder / f"{each.name}-path.csv")
+        solutions.write_path(each, folder / f"{each.name}-path.csv")
         plots.save_path(each, folder / f"{each.name}-path.png")
 
 
@@ -297,7 +297,7 @@ def map_(
     from gne_mj import exit_map as mapping
     from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
-    from gne_mj.solve import parse_path
+    from gne_mj.solutions import parse_path
 
     if out is not None:
         need("plots", "the figure of a map")

@@ -92,7 +92,7 @@ def paper(
 
 def _illustrate(trajectory: "Trajectory", folder: Path) -> None:
     from gne_mj import plots
-    from gne_mj.view import write_html
+    from gne_mj.viewer import write_html
 
     plots.save(trajectory, folder)
     write_html(trajectory, folder / "replay.html", "paper")

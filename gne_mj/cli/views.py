@@ -60,7 +60,7 @@ def view(
     else:
         raise InvalidInput("index", index, "it goes with a folder that `batch` wrote")
     if html is not None:
-        from gne_mj.view import html_page
+        from gne_mj.viewer import html_page
 
         page = html_page(trajectory, title)
         with written("html", html, replace=replace) as new:
@@ -99,7 +99,7 @@ def watch(
     factor = _speed(speed)
     with stopping() as stop, ExitStack() as page:
         with working(as_json, PREPARING):
-            from gne_mj.view import Session
+            from gne_mj.viewer import Session
 
             scenario = load_scenario(source, settings(changes))
             session = Session(scenario, _title(title), speed=factor, port=port or 0)
@@ -125,7 +125,7 @@ def _title(name: str) -> str:
 def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
     with stopping() as stop:
         with working(False, "preparing the replay"):
-            from gne_mj.view import serve
+            from gne_mj.viewer import serve
 
             server = serve(trajectory, title, port=port or 0)
         with _announced(server.url):
@@ -137,7 +137,7 @@ def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
 def _speed(given: str | None) -> float | None:
     """Times real time; None for as fast as possible."""
     from gne_mj.errors import InvalidInput
-    from gne_mj.view.session import FASTEST
+    from gne_mj.viewer.session import FASTEST
 
     if given == "max":
         return None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, nearest
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 
 Structure = Literal["full", "partial", "distributed"]

@@ -11,7 +11,7 @@ from dm_control.rl import control
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj import game_functions as games
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import compiled, source_key
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import raise_pending

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from gne_mj.environment.information import Information
 from gne_mj.environment.physics import FleetPhysics
 from gne_mj.errors import GneError, InvalidInput, UserCodeError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops.feedback import LARGEST_INPUT
 from gne_mj.system import System
 

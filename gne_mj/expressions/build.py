@@ -14,7 +14,7 @@ from gne_mj.expressions.claims import Claims, box, values
 from gne_mj.expressions.intervals import jacobian_bounds
 from gne_mj.expressions.nodes import Node
 from gne_mj.expressions.tracing import Bound, Fixed, Trace, sizes_of, trace
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.quantity import Quantity
 
 
@@ -48,7 +48,7 @@ def game(
             ``yield "energy", (y**2).sum() <= p.budget``.
         dimension: m_i, one number for all or one each.
         name: what the game is called; "own game" if left out.
-        action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game.Game`.
+        action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game_model.Game`.
         **parameters: numbers, or arrays of them; anything else, and what :func:`fixed` holds, is
             given to the functions as it is.
 

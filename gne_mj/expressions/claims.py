@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gne_mj.expressions.nodes import Node, evaluate
 from gne_mj.expressions.tracing import Bound
-from gne_mj.game import Box, ConstraintClass
+from gne_mj.game_model import Box, ConstraintClass
 
 _ABOVE = 3  # a degree that is not 0, 1 or 2
 _CONVEX = {"exp": 1, "expm1": 1, "log": -1, "log1p": -1, "sqrt": -1}  # or concave, if monotone

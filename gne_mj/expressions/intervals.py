@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.game import Box
+from gne_mj.game_model import Box
 
 _WIDER = 1e-12  # relative, beyond all rounding of some thousand operations
 _RISING = ("exp", "expm1", "log", "log1p", "sqrt", "arctan", "sinh", "tanh", "arcsinh")

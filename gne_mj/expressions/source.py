@@ -1,4 +1,4 @@
-"""The text of a module of kernels for a game's expressions (:mod:`gne_mj.game` lists them).
+"""The text of a module of kernels for a game's expressions (:mod:`gne_mj.game_model` lists them).
 
 Rolls are loops. A derivative in the direction of action ``a`` is formed from the top down: of a
 program in its own variables by :mod:`gne_mj.expressions.derivatives`, of its rolls by the chain

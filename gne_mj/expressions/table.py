@@ -9,7 +9,7 @@ from pydantic import Field
 from gne_mj.errors import InvalidInput
 from gne_mj.expressions.build import fixed, game
 from gne_mj.expressions.written import constraints_of, cost_of
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import Fills

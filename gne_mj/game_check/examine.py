@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.game import Game
 from gne_mj.game_check import claims, derivatives, members
 from gne_mj.game_check.functions import Functions
 from gne_mj.game_check.report import Comparison, Report
+from gne_mj.game_model import Game
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import UserCodeError
-from gne_mj.game import Game
 from gne_mj.game_check.differences import derivative, steps
+from gne_mj.game_model import Game
 from gne_mj.plain import not_a_number, number_of
 
 Array = NDArray[np.float64]

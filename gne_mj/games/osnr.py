@@ -19,7 +19,7 @@ from pydantic import Field
 
 from gne_mj.bounds import MOST_COUPLED, check_count
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Box, Game
+from gne_mj.game_model import Box, Game
 from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity

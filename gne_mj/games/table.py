@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.toml_table import Table
 
 

@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from gne_mj import graph as graphs
 from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Box, Game
+from gne_mj.game_model import Box, Game
 from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity

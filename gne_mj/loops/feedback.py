@@ -7,7 +7,7 @@ import numpy as np
 from gne_mj import game_functions as games
 from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import RHO, Now
-from gne_mj.game import GameData
+from gne_mj.game_model import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
@@ -168,7 +168,7 @@ def feedback(problem, time, stage, y, memory, work, monitor, u):
 
 @kernel
 def explicit_law(problem, time, stage, y, memory, work, monitor):
-    """Fill work.commanded by the law at y (m,), whose weights are given; False: it has no action."""
+    """Fill work.commanded by the law at y (m,), weights being given; False: it has no action."""
     tightened = int(work.now.tightened)
     if tightened >= 0:
         watch.leave(

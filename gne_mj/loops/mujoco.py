@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples

@@ -19,8 +19,8 @@ from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_prediction import (
     SENSOR_FUNCTIONS,
-    Prediction,
     ChannelPlace,
+    Prediction,
     actuator_of,
     gather,
     refresh,

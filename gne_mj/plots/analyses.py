@@ -8,7 +8,7 @@ import numpy as np
 
 from gne_mj.exit_map import Cell
 from gne_mj.plots.style import STYLE, line_style, pyplot
-from gne_mj.solve import Solution, bounds_of
+from gne_mj.solutions import Solution, bounds_of
 
 
 def save_path(solution: Solution, file: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from gne_mj import faults
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.margins import Disturbance
 from gne_mj.registry import FAULTS
 from gne_mj.toml_table import PerAgent, Table, per_agent

@@ -18,7 +18,7 @@ from gne_mj.controllers import Law
 from gne_mj.controllers.full_information import FullController
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InfeasibleStart, InvalidInput, named, nearest, part_of, renaming
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin

@@ -10,7 +10,7 @@ from gne_mj.bounds import check_room
 from gne_mj.controllers import Law
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import for_native, message_delay, sensor_delay, strikes_messages
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.native import INTERPRETED
 from gne_mj.plants.agent_type import has_ode, in_mujoco

@@ -12,7 +12,7 @@ from gne_mj.controllers import Law
 from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops import faultless
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance

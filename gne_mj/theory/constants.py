@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import UserCodeError
-from gne_mj.game import Box, Game
+from gne_mj.game_model import Box, Game
 from gne_mj.theory import spectra
 from gne_mj.theory.monotonicity import Bound, least_eigenvalue
 

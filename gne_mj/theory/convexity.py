@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from gne_mj.errors import UserCodeError
-from gne_mj.game import Box, Game
+from gne_mj.game_model import Box, Game
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.constants import EXACT, Slopes, profiles

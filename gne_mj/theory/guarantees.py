@@ -7,7 +7,7 @@ import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
 from gne_mj.errors import part_of
-from gne_mj.game import Box
+from gne_mj.game_model import Box
 from gne_mj.graph import Graph
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import largest_step

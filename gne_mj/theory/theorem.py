@@ -8,7 +8,7 @@ import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED
 from gne_mj.epsilon import epsilon_bounds
-from gne_mj.game import Box
+from gne_mj.game_model import Box
 from gne_mj.graph import complete
 from gne_mj.loops.feedback import LARGEST_INPUT
 from gne_mj.system import System, mode_of

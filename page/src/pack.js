@@ -1,4 +1,4 @@
-// Packs: a JSON header and arrays behind it, see gne_mj/view/pack.py.
+// Packs: a JSON header and arrays behind it, see gne_mj/viewer/pack.py.
 /** @import { Pack } from "./types.d.ts" */
 
 /**

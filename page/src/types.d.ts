@@ -1,4 +1,4 @@
-// What Python sends (gne_mj/view: scene.py, stage.py, replay.py, session.py, controls.py), and what
+// What Python sends (gne_mj/viewer: scene.py, shown_system.py, replay.py, session.py, controls.py), and what
 // modules of the page expect of each other.
 
 /** An object of three.js, which comes inside meshcat's bundle and has no types. */

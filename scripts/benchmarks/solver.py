@@ -22,7 +22,7 @@ from nashopt import GNEP, GNEP_LQ
 from scipy.optimize import root
 
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium, variational_equilibrium
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.scenario import load_scenario
 

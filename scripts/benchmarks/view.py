@@ -14,7 +14,7 @@ import numpy as np
 from turns import in_turns, row
 
 from gne_mj.scenario import load_scenario
-from gne_mj.view import Session
+from gne_mj.viewer import Session
 
 FLEETS = {5: 0.3, 100: 2.0, 500: 8.0}  # robots, ms allowed for a frame
 SECONDS = 0.4  # of one turn

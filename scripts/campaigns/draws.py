@@ -12,7 +12,7 @@ from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import (
     cournot_game,
     osnr_game,

@@ -15,7 +15,7 @@ from quadratic import Numbers, quadratic_game
 
 from gne_mj.controllers import FullInformation, FullyDistributed, Law, PartialInformation
 from gne_mj.errors import InvalidInput
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games import cournot_game, osnr_game, velocity_consensus_game, velocity_game
 from gne_mj.graph import Graph
 from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade

@@ -14,7 +14,7 @@ from types import ModuleType
 
 import numpy as np
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.native import kernel
 from gne_mj.plain import FUNCTIONS
 

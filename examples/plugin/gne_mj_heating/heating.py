@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.registry import GAMES

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from gne_mj.scenario import Scenario
-from gne_mj.view.shown_system import ShownSystem
+from gne_mj.viewer.shown_system import ShownSystem
 
 DECADES = 100.0  # a positive number's slider goes so many times up and down
 REACH = 5.0  # m/s, how far a velocity's slider goes up and down

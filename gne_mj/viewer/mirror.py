@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, kernel
-from gne_mj.view.shapes import (
+from gne_mj.viewer.shapes import (
     DrawnPart,
     Group,
     Json,

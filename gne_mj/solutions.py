@@ -19,7 +19,7 @@ from gne_mj.equilibrium import (
     variational_equilibrium,
 )
 from gne_mj.errors import InvalidInput, part_of
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.margins import of_the_set
 from gne_mj.optimality import FLAT, Optimality, examine
 from gne_mj.summary import bounds_text

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gne_mj.files import written
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.replay import replay_pack
+from gne_mj.viewer.replay import replay_pack
 
 _MESHCAT = "meshcat.min.js"  # the page's name for the bundle of the meshcat package
 _SETTINGS = '<script id="settings" type="application/json">{}</script>'
@@ -33,7 +33,7 @@ def html_page(trajectory: Trajectory, title: str | None = None) -> str:
         title: of the page; the systems' names if left out.
 
     Raises:
-        InvalidInput: see :func:`gne_mj.view.replay.replay_pack`.
+        InvalidInput: see :func:`gne_mj.viewer.replay.replay_pack`.
     """
     data = base64.b64encode(replay_pack(trajectory, title)).decode("ascii")
     text = _begin("file", title or "gne-mj replay")
@@ -74,7 +74,7 @@ def page_file(name: str) -> bytes:
         raise FileNotFoundError(name)
     if name == _MESHCAT:
         return (_meshcat_viewer() / "dist" / "main.min.js").read_bytes()
-    return files("gne_mj.view").joinpath("page", name).read_bytes()
+    return files("gne_mj.viewer").joinpath("page", name).read_bytes()
 
 
 def _begin(mode: str, title: str) -> str:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from gne_mj.errors import InvalidInput
 from gne_mj.scenario import load_scenario
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.pack import packed_small
-from gne_mj.view.scene import Scene
-from gne_mj.view.shown_system import Arrays, ShownSystem, is_line
+from gne_mj.viewer.pack import packed_small
+from gne_mj.viewer.scene import Scene
+from gne_mj.viewer.shown_system import Arrays, ShownSystem, is_line
 
 if TYPE_CHECKING:
     import xarray

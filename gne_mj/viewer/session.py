@@ -18,14 +18,14 @@ from gne_mj.scenario import Scenario, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System, mode_of
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.controls import Control, controls_of, pushes_of
-from gne_mj.view.pacer import Pacer
-from gne_mj.view.pack import pack
-from gne_mj.view.replay import cut, mark_outside, outcome, scene_pack
-from gne_mj.view.scene import Scene
-from gne_mj.view.server import Browser, Server
-from gne_mj.view.shown_system import ShownSystem
-from gne_mj.view.trial import Trials
+from gne_mj.viewer.controls import Control, controls_of, pushes_of
+from gne_mj.viewer.pacer import Pacer
+from gne_mj.viewer.pack import pack
+from gne_mj.viewer.replay import cut, mark_outside, outcome, scene_pack
+from gne_mj.viewer.scene import Scene
+from gne_mj.viewer.server import Browser, Server
+from gne_mj.viewer.shown_system import ShownSystem
+from gne_mj.viewer.trial import Trials
 
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can

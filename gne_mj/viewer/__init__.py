@@ -13,11 +13,11 @@ from gne_mj.extras import need
 need("view", "a page in the browser")
 
 from gne_mj.trajectory import Trajectory
-from gne_mj.view.html import html_page, write_html
-from gne_mj.view.mirror import Mirror
-from gne_mj.view.replay import replay_pack
-from gne_mj.view.server import Server
-from gne_mj.view.session import Session
+from gne_mj.viewer.html import html_page, write_html
+from gne_mj.viewer.mirror import Mirror
+from gne_mj.viewer.replay import replay_pack
+from gne_mj.viewer.server import Server
+from gne_mj.viewer.session import Session
 
 __all__ = ["Mirror", "Server", "Session", "html_page", "replay_pack", "serve", "write_html"]
 
@@ -31,6 +31,6 @@ def serve(trajectory: Trajectory, title: str = "gne-mj replay", *, port: int = 0
         port: 0 for any that is free.
 
     Raises:
-        InvalidInput: see :func:`gne_mj.view.replay.replay_pack`; the port is taken.
+        InvalidInput: see :func:`gne_mj.viewer.replay.replay_pack`; the port is taken.
     """
     return Server(title, replay=replay_pack(trajectory, title), port=port)

@@ -24,7 +24,7 @@ from tornado.httpserver import HTTPServer
 from tornado.websocket import WebSocketClosedError
 
 from gne_mj.errors import InvalidInput
-from gne_mj.view.html import page_file, served_page
+from gne_mj.viewer.html import page_file, served_page
 
 with warnings.catch_warnings():  # it imports a module of pyzmq that pyzmq warns of
     warnings.simplefilter("ignore", DeprecationWarning)

@@ -14,7 +14,7 @@ from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.system import Clock, System
-from gne_mj.view.mirror import Mirror
+from gne_mj.viewer.mirror import Mirror
 
 
 class Fleet:

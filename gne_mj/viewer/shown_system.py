@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.faults import for_native
-from gne_mj.game import Game
+from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.variables import Variable, declared
-from gne_mj.view.fleet import fleet_of
+from gne_mj.viewer.fleet import fleet_of
 
 Arrays = dict[str, NDArray[Any]]
 Values = Mapping[str, NDArray[np.float64]]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.view.shown_system import Arrays, ShownSystem, Values
+from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
 
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
 
@@ -24,7 +24,7 @@ class Scene:
         self.shown_systems, self.title, self.duration = shown_systems, title, duration
 
     def meta(self) -> dict[str, Any]:
-        """What JSON tells the page of the scene; see :mod:`gne_mj.view`."""
+        """What JSON tells the page of the scene; see :mod:`gne_mj.viewer`."""
         items: list[str] = []
         systems = []
         for shown_system in self.shown_systems:
