@@ -17,7 +17,7 @@ _SWITCHES = ("affine", "row_scaled", "smooth", "tested")
 
 
 def check_kinds(game: Any) -> None:
-    """Refuse fields of a :class:`gne_mj.game_model.Game` that are of another kind than they must be.
+    """Refuse fields of a :class:`gne_mj.game_model.Game` that are not of the kind they must be.
 
     Raises:
         InvalidInput: names the first of them.

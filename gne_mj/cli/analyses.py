@@ -45,7 +45,7 @@ def solve(
 
     --out keeps a JSON report and, of a path, a CSV table and a figure for each system.
     """
-    from gne_mj import solutions
+    from gne_mj import solutions as solving
     from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
 
@@ -61,7 +61,7 @@ def solve(
         for built in every:
             if wanted in (None, built.name):
                 with loaded.naming(built.name):
-                    solutions.append(solutions.solve_system(built, rhos or (), path_rhos))
+                    solving.append(solving.solve_system(built, rhos or (), path_rhos))
     report = json.dumps(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
@@ -75,8 +75,7 @@ def solve(
         emit(report)
     else:
         texts = [
-            "\n".join([*solutions.summary(each), *_moved(moved.get(each.name))])
-            for each in solutions
+            "\n".join([*solving.summary(each), *_moved(moved.get(each.name))]) for each in solutions
         ]
         print("\n\n".join(texts))
     raise typer.Exit(0 if all(each.holds for each in solutions) else 1)
@@ -86,7 +85,7 @@ def _keep_paths(solutions: "list[Solution]", folder: Path) -> None:
     from gne_mj import plots, solutions
 
     for each in solutions:
-        solutions.write_path(each, folder / f"{each.name}-path.csv")
+        solving.write_path(each, folder / f"{each.name}-path.csv")
         plots.save_path(each, folder / f"{each.name}-path.png")
 
 
