@@ -1,7 +1,7 @@
 """A user's own game, law or agent type: one Python file, of plain functions or of kernels.
 
 A game's file has ``game(count, **parameters)``, which returns a :class:`gne_mj.game_model.Game`;
-its functions are plain ones or all kernels (their names: :mod:`gne_mj.game_model`). A law's file has
+its functions are plain ones or all kernels (named in :mod:`gne_mj.game_model`). A law's file has
 ``law(game, graph, **parameters)``, which returns a :class:`gne_mj.controllers.Law`, or the plain
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
 for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; all of them take

@@ -51,7 +51,7 @@ def solve(
 
     if path is not None and out is not None:
         need("plots", "the figure of a path")
-    path_rhos = [] if path is None else meaning("path", solutions.parse_path, path)
+    path_rhos = [] if path is None else meaning("path", solving.parse_path, path)
     results = Results(out)
     with working(as_json, PREPARING):
         loaded = load_scenario(source, settings(set_))
@@ -82,7 +82,8 @@ def solve(
 
 
 def _keep_paths(solutions: "list[Solution]", folder: Path) -> None:
-    from gne_mj import plots, solutions
+    from gne_mj import plots
+    from gne_mj import solutions as solving
 
     for each in solutions:
         solving.write_path(each, folder / f"{each.name}-path.csv")
