@@ -8,12 +8,15 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import caching
+from numba.core.caching import IndexDataCacheFile
 
 
 def kept(compile: Callable[[bool], Any]) -> Any:
@@ -22,12 +25,34 @@ def kept(compile: Callable[[bool], Any]) -> Any:
     Args:
         compile: a decorator of numba's, told whether to keep machine code.
     """
+    with _older_versions_ignored():
+        try:
+            return compile(True)
+        except RuntimeError as error:
+            if "no locator available" not in str(error):
+                raise
+        return compile(_temporary())
+
+
+class _Index(IndexDataCacheFile):
+    """Which machine code is kept for a function: none where it is of modules that are gone."""
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            found: dict[Any, str] = super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+        return found
+
+
+@contextmanager
+def _older_versions_ignored() -> Iterator[None]:
+    """Numba reads an index before it asks whether the source is newer."""
+    caching.IndexDataCacheFile = _Index
     try:
-        return compile(True)
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-    return compile(_temporary())
+        yield
+    finally:
+        caching.IndexDataCacheFile = IndexDataCacheFile
 
 
 @cache

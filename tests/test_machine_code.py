@@ -1,11 +1,13 @@
 """Where machine code is kept if neither the package's folder nor a home can be written."""
 
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 import gne_mj
@@ -55,6 +57,16 @@ def test_it_is_kept_in_a_temporary_folder_and_that_is_said_once(locked, tmp_path
     )
     assert folder.stat().st_mode & 0o777 == 0o700
     assert list(folder.rglob("settings.twice-*.nbi"))
+
+
+def test_what_a_version_with_other_modules_left_is_made_anew(locked, tmp_path):
+    assert python(locked, COMPILE, NUMBA_CACHE_DIR=str(tmp_path)).stdout == "42\n"
+    (index,) = tmp_path.rglob("settings.twice-*.nbi")
+    version = pickle.dumps(numba.__version__, protocol=-1)
+    index.write_bytes(version + b"cgne_mj.no_more\nRecord\n.")
+    done = python(locked, COMPILE, NUMBA_CACHE_DIR=str(tmp_path))
+    assert (done.stdout, done.stderr) == ("42\n", "")
+    assert b"no_more" not in index.read_bytes(), "kept again"
 
 
 def test_a_folder_that_is_named_is_used_without_a_word(locked, tmp_path):

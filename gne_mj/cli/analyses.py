@@ -57,11 +57,11 @@ def solve(
         loaded = load_scenario(source, settings(set_))
         wanted = None if system is None else loaded.name_of(system)
         every, moved = loaded.inside_systems()
-        solutions = []
+        solutions: list[Solution] = []
         for built in every:
             if wanted in (None, built.name):
                 with loaded.naming(built.name):
-                    solving.append(solving.solve_system(built, rhos or (), path_rhos))
+                    solutions.append(solving.solve_system(built, rhos or (), path_rhos))
     report = json.dumps(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
