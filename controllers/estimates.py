@@ -45,11 +45,18 @@ def _relax(problem, m, memory):
             stays = np.exp(-problem.propagator.numbers[1] * (last - first))
             for r in range(m):
                 if problem.data.owner[r] != i:
-                    mean = 0.0
-                    for link in range(first, last):
-                        mean += memory[heard_at(problem, m, link) + r]
-                    mean /= last - first
+                    mean = _mean_heard(problem, m, i, r, memory)
                     memory[i * m + r] = mean + stays * (memory[i * m + r] - mean)
+
+
+@kernel
+def _mean_heard(problem, m, i, r, memory):
+    """What those that agent i hears said last of action r, on average."""
+    first, last = problem.graph.pointer[i], problem.graph.pointer[i + 1]
+    mean = 0.0
+    for link in range(first, last):
+        mean += memory[heard_at(problem, m, link) + r]
+    return mean / (last - first)
 
 
 @kernel

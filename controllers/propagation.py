@@ -115,12 +115,16 @@ def _apply_maps(data, maps, y, memory, scratch):
                 result[i] = y[r]
             for other in range(agents):
                 if other != j:
-                    error = memory[other * m + r] - y[r]
-                    column = maps[j, other]  # the maps are symmetric
-                    for i in range(agents):
-                        result[i] += column[i] * error
+                    # the maps are symmetric
+                    _add_multiple(maps[j, other], memory[other * m + r] - y[r], result)
             for i in range(agents):
                 memory[i * m + r] = result[i]
+
+
+@kernel
+def _add_multiple(column, scale, result):
+    for i in range(len(result)):
+        result[i] += column[i] * scale
 
 
 @kernel
@@ -143,25 +147,12 @@ def _apply_series(data, graph, propagator, y, memory, scratch):
         _clear_own(data, start, w, now)
         for r in range(size):
             total[r] = coefficients[0] * now[r]
+            before[r] = 0.0
         for term in range(1, len(coefficients)):
             # T_1 = x T_0, and T_k+1 = 2 x T_k - T_k-1, with x = 2 L_j / bound - 1
             scale = (2.0 if term == 1 else 4.0) / bound
             for i in range(agents):
-                first, last = graph.pointer[i], graph.pointer[i + 1]
-                diagonal = scale * (last - first) - 0.5 * scale * bound
-                new, old = after[i * w : (i + 1) * w], before[i * w : (i + 1) * w]
-                own = now[i * w : (i + 1) * w]
-                if term == 1:
-                    for c in range(w):
-                        new[c] = diagonal * own[c]
-                else:
-                    for c in range(w):
-                        new[c] = diagonal * own[c] - old[c]
-                for entry in range(first, last):
-                    j = graph.neighbour[entry]
-                    other = now[j * w : (j + 1) * w]
-                    for c in range(w):
-                        new[c] -= scale * other[c]
+                _term_of(graph, i, scale, bound, before, now, after)
             _clear_own(data, start, w, after)
             for r in range(size):
                 total[r] += coefficients[term] * after[r]
@@ -173,6 +164,23 @@ def _apply_series(data, graph, propagator, y, memory, scratch):
             row, error = memory[i * m + start : i * m + start + w], total[i * w : (i + 1) * w]
             for c in range(w):
                 row[c] = held[c] + error[c]
+
+
+@kernel
+def _term_of(graph, i, scale, bound, before, now, after):
+    """Fill agent i's part of the next term, from the last two; of the first, ``before`` is zero."""
+    w = len(now) // (len(graph.pointer) - 1)
+    first, last = graph.pointer[i], graph.pointer[i + 1]
+    diagonal = scale * (last - first) - 0.5 * scale * bound
+    new, old = after[i * w : (i + 1) * w], before[i * w : (i + 1) * w]
+    own = now[i * w : (i + 1) * w]
+    for c in range(w):
+        new[c] = diagonal * own[c] - old[c]
+    for entry in range(first, last):
+        j = graph.neighbour[entry]
+        other = now[j * w : (j + 1) * w]
+        for c in range(w):
+            new[c] -= scale * other[c]
 
 
 @kernel

@@ -76,26 +76,32 @@ def catch_up(band, first, last, n, b, pivots):
         swap(band, k, pivots[k], last, n, b)
         swap(band, k, pivots[k], first, k, b)
     for r in range(first + 1, n):
-        row, k = band[r, last - r + b : n - r + b], first
-        end = min(r, last)
-        while k < end:
-            f0, u0 = band[r, k - r + b], band[k, last - k + b : n - k + b]
-            if k + 4 <= end:
-                f1, f2, f3 = band[r, k - r + b + 1], band[r, k - r + b + 2], band[r, k - r + b + 3]
-                if f0 != 0.0 and f1 != 0.0 and f2 != 0.0 and f3 != 0.0:
-                    u1 = band[k + 1, last - k - 1 + b : n - k - 1 + b]
-                    u2 = band[k + 2, last - k - 2 + b : n - k - 2 + b]
-                    u3 = band[k + 3, last - k - 3 + b : n - k - 3 + b]
-                    for c in range(len(row)):
-                        row[c] = row[c] - f0 * u0[c] - f1 * u1[c] - f2 * u2[c] - f3 * u3[c]
-                    k += 4
-                    continue
-            if f0 != 0.0:
-                for c in range(len(row)):
-                    row[c] -= f0 * u0[c]
-            k += 1
+        reduce_row(band, r, first, last, n, b)
     for k in range(last - 1, first - 1, -1):
         swap(band, k, pivots[k], first, k, b)
+
+
+@kernel
+def reduce_row(band, r, first, last, n, b):
+    """Take multiples of the block's rows off row r, its columns from ``last`` on."""
+    row, k = band[r, last - r + b : n - r + b], first
+    end = min(r, last)
+    while k < end:
+        f0, u0 = band[r, k - r + b], band[k, last - k + b : n - k + b]
+        if k + 4 <= end:
+            f1, f2, f3 = band[r, k - r + b + 1], band[r, k - r + b + 2], band[r, k - r + b + 3]
+            if f0 != 0.0 and f1 != 0.0 and f2 != 0.0 and f3 != 0.0:
+                u1 = band[k + 1, last - k - 1 + b : n - k - 1 + b]
+                u2 = band[k + 2, last - k - 2 + b : n - k - 2 + b]
+                u3 = band[k + 3, last - k - 3 + b : n - k - 3 + b]
+                for c in range(len(row)):
+                    row[c] = row[c] - f0 * u0[c] - f1 * u1[c] - f2 * u2[c] - f3 * u3[c]
+                k += 4
+                continue
+        if f0 != 0.0:
+            for c in range(len(row)):
+                row[c] -= f0 * u0[c]
+        k += 1
 
 
 @kernel

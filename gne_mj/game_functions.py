@@ -37,10 +37,10 @@ def weigh(game, q, tightening, rho, y, g, weights):
     outside = -1
     for k in range(len(g)):
         value = game.constraint(q, k, y)
-        room = -value - tightening[k]
+        slack = -value - tightening[k]
         g[k] = value
-        weights[k] = rho / room
-        if not room > 0.0 and outside < 0:
+        weights[k] = rho / slack
+        if not slack > 0.0 and outside < 0:
             outside = k
     return outside
 
@@ -54,6 +54,11 @@ def compiled_functions(game: ModuleType) -> NDArray[np.int64]:
 def _compiled(game: ModuleType) -> list[Any]:
     """The C functions, in the order of their numbers; q and y are given by address and length."""
     source = source_key(game)
+    return [*_own_functions(game, source), *_functions_of_many(game, source)]
+
+
+def _own_functions(game: ModuleType, source: str) -> list[Any]:
+    """The module's six."""
 
     def cost(q, size, i, _a, _b, y, m):
         _ = source
@@ -81,6 +86,19 @@ def _compiled(game: ModuleType) -> list[Any]:
     def constraint_hessian(q, size, k, a, b, y, m):
         _ = source
         return game.constraint_hessian(floats_at(q, size), k, a, b, floats_at(y, m))
+
+    return [
+        callback(_OF_Y, cost),
+        callback(_OF_Y, cost_gradient),
+        callback(_OF_ROW, add_cost_hessian),
+        callback(_OF_Y, constraint),
+        callback(_OF_Y, constraint_gradient),
+        callback(_OF_Y, constraint_hessian),
+    ]
+
+
+def _functions_of_many(game: ModuleType, source: str) -> list[Any]:
+    """What is asked of many agents, or constraints, in one call."""
 
     def evaluate(q, size, tightening, p, rho, y, m, g, weights):
         _ = source
@@ -118,12 +136,6 @@ def _compiled(game: ModuleType) -> list[Any]:
         return 0
 
     return [
-        callback(_OF_Y, cost),
-        callback(_OF_Y, cost_gradient),
-        callback(_OF_ROW, add_cost_hessian),
-        callback(_OF_Y, constraint),
-        callback(_OF_Y, constraint_gradient),
-        callback(_OF_Y, constraint_hessian),
         callback(_WEIGHTS, evaluate),
         callback(_OF_MANY, values),
         callback(_OF_MANY, gradients),

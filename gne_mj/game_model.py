@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import ModuleType, SimpleNamespace
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ from gne_mj import game_functions as functions
 from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game_fields import check_kinds, checked_bounds
-from gne_mj.native import compiled, source_key
+from gne_mj.native import compiled, kernel, source_key
 from gne_mj.plain import Written, as_written, check_numbers, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
@@ -416,8 +416,10 @@ def _compress(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray
 @cache
 def _native() -> SimpleNamespace:
     """The array functions of all games, compiled at their first call."""
-    source = source_key()
+    return SimpleNamespace(**_values(source_key()), **_derivatives(source_key()))
 
+
+def _values(source: str) -> dict[str, Any]:
     @compiled
     def costs(data, profiles, out):
         _ = source
@@ -437,6 +439,10 @@ def _native() -> SimpleNamespace:
         for row in range(len(profiles)):
             functions.values(data, data.all_constraints, profiles[row], out[row])
 
+    return {"costs": costs, "pseudo_gradient": pseudo_gradient, "constraints": constraints}
+
+
+def _derivatives(source: str) -> dict[str, Any]:
     @compiled
     def pseudo_gradient_jacobian(data, y, out):
         _ = source
@@ -458,16 +464,12 @@ def _native() -> SimpleNamespace:
     @compiled
     def weighted_hessian(data, y, weights, out):
         _ = source
-        at = data.offsets
         for k in range(len(weights)):
             first, last = data.member_pointer[k], data.member_pointer[k + 1]
             for row in range(first, last):
                 for column in range(first, last):
                     i, j = data.member_index[row], data.member_index[column]
-                    for a in range(at[i], at[i + 1]):
-                        for b in range(at[j], at[j + 1]):
-                            second = functions.constraint_hessian(data, k, a, b, y)
-                            out[a, b] += weights[k] * second
+                    _add_block(data, k, i, j, y, weights[k], out)
 
     @compiled
     def constraint_hessian(data, y, k, own, out):
@@ -477,12 +479,18 @@ def _native() -> SimpleNamespace:
                 a, b = own[row], own[column]
                 out[row, column] = functions.constraint_hessian(data, k, a, b, y)
 
-    return SimpleNamespace(
-        costs=costs,
-        pseudo_gradient=pseudo_gradient,
-        constraints=constraints,
-        pseudo_gradient_jacobian=pseudo_gradient_jacobian,
-        constraint_jacobian=constraint_jacobian,
-        weighted_hessian=weighted_hessian,
-        constraint_hessian=constraint_hessian,
-    )
+    return {
+        "pseudo_gradient_jacobian": pseudo_gradient_jacobian,
+        "constraint_jacobian": constraint_jacobian,
+        "weighted_hessian": weighted_hessian,
+        "constraint_hessian": constraint_hessian,
+    }
+
+
+@kernel
+def _add_block(data, k, i, j, y, weight, out):
+    """out[a, b] += weight d2g_k/dy_a dy_b for the actions a of agent i, and b of agent j."""
+    at = data.offsets
+    for a in range(at[i], at[i + 1]):
+        for b in range(at[j], at[j + 1]):
+            out[a, b] += weight * functions.constraint_hessian(data, k, a, b, y)

@@ -378,94 +378,130 @@ def centre(data, free, rho, point, work):
 @kernel
 def follow(data, free, half_band, path, known, point, work, report):
     """Follow the path to path.last_rho, from point's y; the point becomes its end."""
-    count, constraints = 0, len(free.constraints)
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        count += data.offsets[i + 1] - data.offsets[i]
+    count, constraints = free_actions(data, free), len(free.constraints)
     b = min(half_band, max(count - 1, 0))
     find_entries(data, free, work)
-    rho, highest, whole, size = begin(data, free, count, b, path, known, point, work)
+    rho, highest, length, size = begin(data, free, count, b, path, known, point, work)
     if rho == 0.0:
         return OUTSIDE
-    least = max(scales.NARROWEST * whole, scales.largest_held(free, point.y))
-    length = whole
+    least = max(scales.NARROWEST * length, scales.largest_held(free, point.y))
     last = path.last_rho * size if path.to_zero else path.last_rho
-    distance, still = np.inf, False
-    before, stalled, slow, careful = np.inf, 0, 0, False
+    distance, before, stalled, slow, still, careful = np.inf, np.inf, 0, 0, False, False
     for iteration in range(LARGEST_COUNT):
-        residual = stationarity_error(count, work)
-        off, near_enough = spread(constraints, rho, point, work), False
+        near_enough, residual = False, stationarity_error(count, work)
+        off = spread(constraints, rho, point, work)
         if path.to_zero and path.last_rho * size < 0.5 * last:
             last = path.last_rho * size
         if not careful:
-            # On the way only nearness to the path matters.
-            while last < rho < np.inf and off <= 0.9:
-                if not residual <= max(10.0 * rho / size, path.tolerance):
-                    break
-                highest = 0.0
-                rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
-                off = spread(constraints, rho, point, work)
+            lower = lower_rho(constraints, rho, last, size, residual, path, point, work)
+            if lower < rho:
+                highest, rho, off = 0.0, lower, spread(constraints, lower, point, work)
             error = max(residual, off * (path.tolerance / path.spread))
-            report[ITERATIONS], report[ERROR], report[STATIONARITY] = iteration, error, residual
-            report[COMPLEMENTARITY], report[RHO] = complementarity(constraints, point), rho
+            report[ITERATIONS], report[STATIONARITY], report[RHO] = iteration, residual, rho
+            report[ERROR], report[COMPLEMENTARITY] = error, complementarity(constraints, point)
             if rho <= last:
                 stalled = stalled + 1 if error > 0.5 * before else 0
-                before = error
-                enough = ACCEPTED * path.tolerance
-                near_enough = residual <= enough and (
-                    still or off <= max(8.0 * path.spread, enough)
-                )
-                near_enough = near_enough or distance <= path.tolerance
+                near_enough = is_near_enough(path, residual, off, distance, still)
                 # A residual that is small beside steep terms, as by a pole, does not tell enough.
-                done = error <= path.tolerance and distance <= CENTRED
-                if done or (stalled >= 2 and near_enough):
-                    if not path.to_zero or not scales.sharpen(
-                        constraints, free, path.last_rho, length, point, work
-                    ):
-                        return CONVERGED
-                    before, stalled = np.inf, 0
+                centred = error <= path.tolerance and distance <= CENTRED
+                done = centred or (stalled >= 2 and near_enough)
+                if done and not sharper(constraints, free, path, length, point, work):
+                    return CONVERGED
+                before, stalled = (np.inf, 0) if done else (error, stalled)
         length = max(least, scales.largest_free(data, free, point.y))
         size = newton(data, free, count, rho, length, point, b, work)
         if size < 0.0:
             return SINGULAR
-        now = merit(count, constraints, rho, length, point, work)
         distance = local_length(constraints, point, work)
         still = distance <= CENTRED and longest_entry(count, work.step) <= ROUNDING * length
-        if careful:
-            keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
-        else:
+        keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
+        if not careful:
             keep, factor = min(TO_BOUNDARY, max(rho / size, residual)), np.inf
             share = longest(constraints, keep, point, work)
-        found = False
-        for _ in range(60):
-            move(data, free, share, point, work)
-            if inside(data, free, work.trial.y, work) and correct(
-                constraints, rho, keep, factor, point, work.trial, work
-            ):
-                evaluate(data, free, work.trial, work)
-                then = merit(count, constraints, rho, length, work.trial, work)
-                found = then <= (1.0 - 2.0 * DECREASE * share) * now or (
-                    (careful or max(residual, off) <= NEAR) and then < np.inf
-                )
-                if found:
-                    break
-            share *= 0.5
+        search = Search(count, rho, length, keep, factor, careful or max(residual, off) <= NEAR)
+        share, found = search_along(data, free, search, share, point, work)
+        if not found and near_enough:
+            return CONVERGED
         if found:
             accept(data, free, point, work.trial)
-        elif near_enough:
-            return CONVERGED
         slow = slow + 1 if careful or share < SHORT else 0
         if careful:
             careful = distance > CENTRED
-            lost = careful and slow >= LONG
-            rho = GROW * rho if lost else rho
+            lost, higher = careful and slow >= LONG, GROW * rho
         else:
             careful = lost = slow >= PATIENCE or not found
-            rho = max(rho, highest) if lost else rho
+            higher = max(rho, highest)
         if lost:
-            slow = 0
+            rho, slow = higher, 0
             centre(data, free, rho, point, work)
     return TOO_MANY
+
+
+@kernel
+def free_actions(data, free):
+    """How many actions move."""
+    count = 0
+    for entry in range(len(free.agents)):
+        i = free.agents[entry]
+        count += data.offsets[i + 1] - data.offsets[i]
+    return count
+
+
+@kernel
+def lower_rho(constraints, rho, last, size, residual, path, point, work):
+    """The lowest rho, ``last`` or higher, near whose place on the path the point is.
+
+    On the way only nearness to the path matters.
+    """
+    while last < rho < np.inf and spread(constraints, rho, point, work) <= 0.9:
+        if not residual <= max(10.0 * rho / size, path.tolerance):
+            break
+        rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
+    return rho
+
+
+@kernel
+def is_near_enough(path, residual, off, distance, still):
+    """Whether the end may be taken where rounding lets the residuals fall no more."""
+    enough = ACCEPTED * path.tolerance
+    near_enough = residual <= enough and (still or off <= max(8.0 * path.spread, enough))
+    return near_enough or distance <= path.tolerance
+
+
+@kernel
+def sharper(constraints, free, path, length, point, work):
+    """Whether shares of rho were lowered, where rho is to fall to 0: the path goes on."""
+    return path.to_zero and scales.sharpen(constraints, free, path.last_rho, length, point, work)
+
+
+class Search(NamedTuple):
+    """What a search along a step goes by."""
+
+    actions: int  # n
+    rho: float
+    length: float
+    keep: float  # see :func:`correct`
+    factor: float
+    any: bool  # whether any finite residual will do, near the path
+
+
+@kernel
+def search_along(data, free, search, share, point, work):
+    """Halve the share of the step until the residuals fall; that share, and whether they did."""
+    rho, length, constraints = search.rho, search.length, len(free.constraints)
+    now = merit(search.actions, constraints, rho, length, point, work)
+    for _ in range(60):
+        move(data, free, share, point, work)
+        if inside(data, free, work.trial.y, work) and correct(
+            constraints, rho, search.keep, search.factor, point, work.trial, work
+        ):
+            evaluate(data, free, work.trial, work)
+            then = merit(search.actions, constraints, rho, length, work.trial, work)
+            fallen = then <= (1.0 - 2.0 * DECREASE * share) * now
+            if fallen or (search.any and then < np.inf):
+                return share, True
+        share *= 0.5
+    return share, False
 
 
 @cache

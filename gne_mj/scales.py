@@ -113,25 +113,31 @@ def balance(count, constraints, free, highest, work):
 @kernel
 def add_costs(data, free, length, y, b, work):
     """Fill the band with the costs' second derivatives and the rows' sizes; the costs' size."""
-    at, position, band = data.offsets, free.position, work.band
-    greatest = 0.0
+    at, greatest = data.offsets, 0.0
     for entry in range(len(free.agents)):
         i = free.agents[entry]
         for a in range(at[i], at[i + 1]):
-            r, slopes = position[a], 0.0
-            for c in range(3 * b + 1):
-                band[r, c] = 0.0
+            r = free.position[a]
             games.add_cost_hessian(data, i, a, y, 1.0, work.hessian_row)
-            for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
-                j = data.cost_index[member]
-                for c in range(at[j], at[j + 1]):
-                    if position[c] >= 0:
-                        band[r, position[c] - r + b] += work.hessian_row[c]
-                        slopes += abs(work.hessian_row[c])
-                    work.hessian_row[c] = 0.0
-            work.unit[r] = work.terms[r] + length * slopes
+            work.unit[r] = work.terms[r] + length * take_row(data, free, i, r, b, work)
             greatest = max(greatest, work.unit[r])
     return greatest * length if greatest > 0.0 else 1.0
+
+
+@kernel
+def take_row(data, free, i, r, b, work):
+    """Move agent i's row of second derivatives to the band's row r; the sum of its magnitudes."""
+    at, position, band, slopes = data.offsets, free.position, work.band, 0.0
+    for c in range(3 * b + 1):
+        band[r, c] = 0.0
+    for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
+        j = data.cost_index[member]
+        for c in range(at[j], at[j + 1]):
+            if position[c] >= 0:
+                band[r, position[c] - r + b] += work.hessian_row[c]
+                slopes += abs(work.hessian_row[c])
+            work.hessian_row[c] = 0.0
+    return slopes
 
 
 @kernel

@@ -8,7 +8,7 @@ Parameters q = [N, P_0, a (N), b (N), c (N), n0 (N), Gamma (N x N, by rows, its 
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.resources import files
 from typing import Any, Literal
@@ -47,33 +47,18 @@ def osnr_game(
     agents = np.size(price)
     check_count("price", agents, MOST_COUPLED, "its channels")
     columns = {
-        "price": price,
-        "utility_weight": utility_weight,
-        "gain": gain,
+        "price": price, "utility_weight": utility_weight, "gain": gain,
         "noise_power": noise_power,
-    }
-    for key, values in columns.items():
-        array = np.asarray(values, dtype=np.float64)
-        if array.shape != (agents,):
-            raise InvalidInput(key, values, f"it must list {agents} numbers")
-        if not np.all(np.isfinite(array)) or not np.all(array > 0):
-            raise InvalidInput(key, values, "every entry must be positive and finite")
-    matrix = np.array(system_matrix, dtype=np.float64)
-    if matrix.shape != (agents, agents):
-        raise InvalidInput("system_matrix", matrix.shape, f"its shape must be ({agents}, {agents})")
-    np.fill_diagonal(matrix, 0.0)
-    if not np.all(np.isfinite(matrix)) or np.any(matrix < 0):
-        raise InvalidInput("system_matrix", "...", "no entry may be negative or not finite")
+    }  # fmt: skip
+    _check_columns(columns, agents)
+    matrix = _crosstalk(system_matrix, agents)
     if not (np.isfinite(total_power_limit) and total_power_limit > 0):
         raise InvalidInput("total_power_limit", total_power_limit, "it must be positive")
     everyone = list(range(agents))
     total = Quantity(
-        name="total_power",
-        long_name="total power",
-        unit="mW",
-        values=lambda y: np.sum(y, axis=1),
-        bound=total_power_limit,
-    )
+        name="total_power", long_name="total power", unit="mW",
+        values=lambda y: np.sum(y, axis=1), bound=total_power_limit,
+    )  # fmt: skip
     weight = np.prod([columns["utility_weight"], columns["gain"]], axis=0)
     noise, response = np.asarray(columns["noise_power"]), matrix + np.diag(columns["gain"])
     return Game(
@@ -101,6 +86,26 @@ def osnr_game(
         smooth=True,
         tested=True,
     )
+
+
+def _check_columns(columns: Mapping[str, Sequence[float]], agents: int) -> None:
+    for key, values in columns.items():
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != (agents,):
+            raise InvalidInput(key, values, f"it must list {agents} numbers")
+        if not np.all(np.isfinite(array)) or not np.all(array > 0):
+            raise InvalidInput(key, values, "every entry must be positive and finite")
+
+
+def _crosstalk(system_matrix: ArrayLike, agents: int) -> NDArray[np.float64]:
+    """The system matrix, checked, with a zero diagonal."""
+    matrix = np.array(system_matrix, dtype=np.float64)
+    if matrix.shape != (agents, agents):
+        raise InvalidInput("system_matrix", matrix.shape, f"its shape must be ({agents}, {agents})")
+    np.fill_diagonal(matrix, 0.0)
+    if not np.all(np.isfinite(matrix)) or np.any(matrix < 0):
+        raise InvalidInput("system_matrix", "...", "no entry may be negative or not finite")
+    return matrix
 
 
 def _jacobian_bounds(

@@ -13,6 +13,7 @@ where each agent's neighbours start (N + 1), neighbours].
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -54,52 +55,32 @@ def velocity_consensus_game(
         InvalidInput: a bad number or edge, or a connected part of the graph without a leader.
     """
     reference = _finite("reference_velocity", reference_velocity)
-    weight = _finite("leader_weight", leader_weight)
-    if np.any(weight < 0):
-        raise InvalidInput("leader_weight", leader_weight, "no entry may be negative")
+    weight = _weights(leader_weight)
     agents, dimension = len(weight), len(reference)
     pairs = _checked(edges, agents)
-    leaders = np.flatnonzero(weight > 0)
-    _check_leaders(pairs, weight)
-    bounds = np.concatenate(
-        [
-            _bounds("gap_bound", gap_bound, len(pairs), "edge"),
-            _bounds("leader_gap_bound", leader_gap_bound, len(leaders), "leader"),
-        ]
+    leaders = _leaders(pairs, weight)
+    of_edges = _bounds("gap_bound", gap_bound, len(pairs), "edge")
+    of_leaders = _bounds("leader_gap_bound", leader_gap_bound, len(leaders), "leader")
+    rows, bounds = (
+        [*pairs, *((int(i), agents) for i in leaders)],
+        np.concatenate([of_edges, of_leaders]),
     )
-    rows = [*pairs, *((int(i), agents) for i in leaders)]
-    neighbours: list[list[int]] = [[] for _ in weight]
-    for i, j in pairs:
-        neighbours[i].append(j)
-        neighbours[j].append(i)
-    first, second = np.array(rows).T
-
-    def distances(y: NDArray[np.float64]) -> NDArray[np.float64]:
-        points = np.empty((len(y), agents + 1, dimension))
-        points[:, :agents] = y.reshape(len(y), agents, dimension)
-        points[:, agents] = reference
-        return np.linalg.norm(points[:, first] - points[:, second], axis=2)
-
+    neighbours, (first, second) = _neighbours(pairs, agents), np.array(rows).T
+    gaps = Quantity(
+        name="gap", long_name="velocity gap", unit="m/s",
+        values=partial(_distances, first, second, reference), each="constraint",
+        symbol="|y_i - y_j|", bound=bounds,
+    )  # fmt: skip
+    each = np.column_stack([first, second, bounds]).ravel()
+    head = np.concatenate([[dimension, agents, len(rows)], reference, weight, each])
     return Game(
         name="velocity consensus",
         kernels=sys.modules[__name__],
-        parameters=np.concatenate(
-            [
-                [dimension, agents, len(rows)],
-                reference,
-                weight,
-                np.column_stack([first, second, bounds]).ravel(),
-                np.cumsum([0, *map(len, neighbours)]),
-                [j for members in neighbours for j in members],
-            ]
-        ),
+        parameters=np.concatenate([head, *_lists(neighbours)]),
         sizes=(dimension,) * agents,
         in_cost=[[i, *members] for i, members in enumerate(neighbours)],
         in_constraint=[[i] if j == agents else [i, j] for i, j in rows],
-        constraint_names=tuple(
-            f"gap of agent {i + 1} to v_0" if j == agents else f"gap of agents {i + 1} and {j + 1}"
-            for i, j in rows
-        ),
+        constraint_names=_constraint_names(rows, agents),
         action_name="velocity",
         action_unit="m/s",
         affine=True,
@@ -112,18 +93,47 @@ def velocity_consensus_game(
         smooth=True,
         tested=True,
         axes=("x", "y", "z")[:dimension] if 1 < dimension <= 3 else (),
-        quantities=(
-            Quantity(
-                name="gap",
-                long_name="velocity gap",
-                unit="m/s",
-                values=distances,
-                each="constraint",
-                symbol="|y_i - y_j|",
-                bound=bounds,
-            ),
-        ),
+        quantities=(gaps,),
     )
+
+
+def _lists(rows: Sequence[Sequence[int]]) -> list[NDArray[np.int64]]:
+    """Where each row begins, and all rows one behind the other."""
+    whole = [entry for row in rows for entry in row]
+    return [np.cumsum([0, *map(len, rows)]), np.array(whole, dtype=np.int64)]
+
+
+def _neighbours(pairs: Sequence[tuple[int, int]], agents: int) -> list[list[int]]:
+    """Of each agent those that it has an edge with."""
+    neighbours: list[list[int]] = [[] for _ in range(agents)]
+    for i, j in pairs:
+        neighbours[i].append(j)
+        neighbours[j].append(i)
+    return neighbours
+
+
+def _constraint_names(rows: Sequence[tuple[int, int]], agents: int) -> tuple[str, ...]:
+    return tuple(
+        f"gap of agent {i + 1} to v_0" if j == agents else f"gap of agents {i + 1} and {j + 1}"
+        for i, j in rows
+    )
+
+
+def _distances(
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    reference: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """|y_i - y_j| of each constraint, shape (len(y), p); agent N is the reference v_0."""
+    points = np.concatenate(
+        [
+            y.reshape(len(y), -1, len(reference)),
+            np.broadcast_to(reference, (len(y), 1, len(reference))),
+        ],
+        axis=1,
+    )
+    return np.linalg.norm(points[:, first] - points[:, second], axis=2)
 
 
 def _finite(key: str, given: Sequence[float]) -> NDArray[np.float64]:
@@ -163,7 +173,15 @@ def _symmetric(first: ArrayLike, second: ArrayLike, values: ArrayLike, vertices:
     return csr_array((np.asarray(values), pairs), shape=(vertices, vertices))
 
 
-def _check_leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) -> None:
+def _weights(leader_weight: Sequence[float]) -> NDArray[np.float64]:
+    weight = _finite("leader_weight", leader_weight)
+    if np.any(weight < 0):
+        raise InvalidInput("leader_weight", leader_weight, "no entry may be negative")
+    return weight
+
+
+def _leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Agents of positive weight, of which each connected part must have one."""
     graph = _symmetric(
         [i for i, _ in pairs], [j for _, j in pairs], np.ones(len(pairs)), len(weight)
     )
@@ -178,6 +196,7 @@ def _check_leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) ->
             "each connected part of the edges needs a leader, an agent of positive weight, and"
             f" that of agent{'s' * (len(apart) > 1)} {shown} has none",
         )
+    return np.flatnonzero(weight > 0)
 
 
 def _box(

@@ -48,14 +48,7 @@ def velocity_game(
         raise InvalidInput("gap_bound", gap_bound, "every bound must be positive and finite")
     if desired_velocity is None:
         desired_velocity = reference_velocity
-    desired = np.broadcast_to(np.asarray(desired_velocity, dtype=np.float64), (agents,))
-    if not np.all(np.isfinite(desired)):
-        raise InvalidInput("desired_velocity", desired_velocity, "every velocity must be finite")
-    weights = np.broadcast_to(np.asarray(desired_weight, dtype=np.float64), (agents,))
-    if not np.all(weights >= 0) or not np.all(np.isfinite(weights)):
-        raise InvalidInput(
-            "desired_weight", desired_weight, "every weight must be finite and not negative"
-        )
+    desired, weights = _wishes(agents, desired_velocity, desired_weight)
     reach = np.cumsum(bounds)
     gaps = Quantity(
         name="gap",
@@ -88,6 +81,21 @@ def velocity_game(
         smooth=True,
         tested=True,
     )
+
+
+def _wishes(
+    agents: int, desired_velocity: ArrayLike, desired_weight: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Desired velocities and their weights, one for each agent."""
+    desired = np.broadcast_to(np.asarray(desired_velocity, dtype=np.float64), (agents,))
+    if not np.all(np.isfinite(desired)):
+        raise InvalidInput("desired_velocity", desired_velocity, "every velocity must be finite")
+    weights = np.broadcast_to(np.asarray(desired_weight, dtype=np.float64), (agents,))
+    if not np.all(weights >= 0) or not np.all(np.isfinite(weights)):
+        raise InvalidInput(
+            "desired_weight", desired_weight, "every weight must be finite and not negative"
+        )
+    return desired, weights
 
 
 @kernel

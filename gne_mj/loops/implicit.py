@@ -39,25 +39,19 @@ def act(faults, plant, context, parts, at, state, memory):
         copy(solver.held, work.commanded)
         return True
     solver.numbers.solved_step = step + 1.0
-    if found > 0.0:
-        watch.compare(monitor, time, work.y, solver.prediction)
     faults.sense(problem, work, work.y, work.measurement)
     known = faults.sense_state(plant, parts, step, state, solver.state, solver.scratch)
-    if found == 0.0:
+    if found > 0.0:
+        watch.compare(monitor, time, work.y, solver.prediction)
+    else:
         find_slopes(plant, context, channels, clock, known, solver)
+        # inside for certain, as y(0) that is seen is not
+        copy(problem.equilibrium, solver.prediction)
     # where the inputs so far lead to
-    smooth = found >= 3.0
+    extrapolate(solver)
     for r in range(m):
         solver.anchor[r] = known[r * states + channels.output]
-        last, before, earlier = solver.held[r], solver.before[r], solver.earlier[r]
-        solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
-        solver.before[r], solver.earlier[r] = last, before
-    if found == 0.0:
-        copy(
-            problem.equilibrium, solver.prediction
-        )  # inside for certain, as y(0) that is seen is not
-    solver.numbers.found += 1.0
-    solver.numbers.steps = 0.0
+    solver.numbers.found, solver.numbers.steps = found + 1.0, 0.0
     map_prediction(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     ended, agreed, least = OUTSIDE, False, np.inf
@@ -85,15 +79,25 @@ def act(faults, plant, context, parts, at, state, memory):
             copy(solver.reached, solver.y)
             break
     functions.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
-    for r in range(m):
-        solver.prediction[r], work.commanded[r] = solver.y[r], solver.held[r]
+    copy(solver.y, solver.prediction)
+    copy(solver.held, work.commanded)
     functions.memory_outputs(problem, solver.prediction, work.held)
     watch.count_solution(monitor, time, solver.numbers.steps, agreed and ended < UNSOLVED, least)
     if ended == OUTSIDE:
-        constraint = int(work.now.tightened)
-        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, constraint, work.now.tightened_value, 0)
+        k, value = int(work.now.tightened), work.now.tightened_value
+        watch.leave(monitor, watch.ESTIMATE_LEFT, time, -1, k, value, 0)
         return False
     return usable(time, 0, work, monitor)
+
+
+@kernel
+def extrapolate(solver):
+    """Fill solver.u with what the last inputs lead to, by a parabola once there are three."""
+    smooth = solver.numbers.found >= 3.0
+    for r in range(len(solver.u)):
+        last, before, earlier = solver.held[r], solver.before[r], solver.earlier[r]
+        solver.u[r] = 3.0 * (last - before) + earlier if smooth else last
+        solver.before[r], solver.earlier[r] = last, before
 
 
 @kernel

@@ -105,20 +105,15 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
     Returns how it ended; solver.numbers.steps grows by the iterations taken.
     """
     at, numbers, b = problem.data.offsets, solver.numbers, problem.order.band[0]
-    target = work.now.penalty
+    target, patience = work.now.penalty, PATIENCE
     numbers.rho = target
-    patience = PATIENCE
     low, high = at[first], at[last]
-    n = high - low
     y, trial, step = solver.y, solver.trial, solver.step
     starts, length, norm, remaining = 0, 0.0, np.inf, np.inf
     for _ in range(MOST_EVALUATIONS):
-        if length == 0.0:
-            for r in range(low, high):
-                trial[r] = y[r]
-        else:
-            for r in range(low, high):
-                trial[r] = y[r] + length * step[equation.row_of(problem, first, r)]
+        copy(y[low:high], trial[low:high])
+        if length > 0.0:
+            add_step(equation, problem, first, length, step, trial[:high])
         patience -= 1
         if patience < 0 and numbers.rho < 1e12 * target:
             numbers.rho *= RAISE
@@ -126,17 +121,13 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
             copy(y[low:high], trial[low:high])
         good = equation.residual(problem, first, last, memory, work, solver)
         if length == 0.0 and not good:
-            patience = PATIENCE
             if starts == 2:
                 return OUTSIDE
             source = solver.anchor if starts == 0 else solver.prediction
             copy(source[low:high], y[low:high])
-            starts += 1
+            starts, patience = starts + 1, PATIENCE
             continue
-        size = 0.0
-        for r in range(low, high):
-            solver.old_step[equation.row_of(problem, first, r)] = -solver.residual[r]
-            size += solver.residual[r] * solver.residual[r]
+        size = put_residual(equation, problem, first, last, solver.residual, solver.old_step)
         if length > 0.0:
             if not (good and size <= (1.0 - DECREASE * length) * norm):
                 length *= 0.5
@@ -144,34 +135,18 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
                     return ROUNDED if remaining < GOOD_STEP else UNSOLVED
                 continue
             copy(trial[low:high], y[low:high])
-        norm = size
-        numbers.steps += 1.0
+        norm, numbers.steps = size, numbers.steps + 1.0
         usable = reuse and numbers.uses > 0.0 and numbers.rho == target
         if usable:
-            banded.solve_definite(solver.band, n, b, solver.old_step)
+            banded.solve_definite(solver.band, high - low, b, solver.old_step)
             if numbers.uses < MOST_USES:
                 remaining = equation.local_length(problem, first, last, solver.old_step, solver)
                 if remaining * max(numbers.leaves, remaining) <= ACCURATE:
                     numbers.uses += 1.0
-                    for r in range(low, high):
-                        y[r] += solver.old_step[equation.row_of(problem, first, r)]
-                    return SOLVED
-        equation.assemble(problem, first, last, b, memory, work, solver)
-        numbers.uses = 0.0
-        if not banded.factorise_definite(solver.band, n, b):
+                    return arrive(equation, problem, first, solver.old_step, y[:high])
+        if not find_step(equation, problem, first, last, memory, work, solver):
             return UNSOLVED
-        for r in range(low, high):
-            step[equation.row_of(problem, first, r)] = -solver.residual[r]
-        banded.solve_definite(solver.band, n, b, step)
-        if usable:
-            off, whole = 0.0, 0.0
-            for r in range(n):
-                off = max(off, abs(step[r] - solver.old_step[r]))
-                whole = max(whole, abs(step[r]))
-            numbers.leaves = min(2.0 * off / whole, 1.0) if whole > 0.0 else 1.0
-        else:
-            numbers.leaves = 1.0
-        numbers.uses = 1.0
+        numbers.leaves, numbers.uses = share_left(high - low, solver) if usable else 1.0, 1.0
         remaining = equation.local_length(problem, first, last, step, solver)
         if not remaining < np.inf:
             return UNSOLVED
@@ -180,7 +155,53 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
             numbers.rho = max(target, LOWER * numbers.rho)
             length, patience = 0.0, PATIENCE
         elif remaining <= LAST_STEP:
-            for r in range(low, high):
-                y[r] += step[equation.row_of(problem, first, r)]
-            return SOLVED
+            return arrive(equation, problem, first, step, y[:high])
     return UNSOLVED
+
+
+@kernel
+def arrive(equation, problem, first, step, y):
+    """Take the last step."""
+    add_step(equation, problem, first, 1.0, step, y)
+    return SOLVED
+
+
+@kernel
+def find_step(equation, problem, first, last, memory, work, solver):
+    """Factorise, and fill solver.step with Newton's; False if the matrix is not definite."""
+    at, b = problem.data.offsets, problem.order.band[0]
+    n = at[last] - at[first]
+    equation.assemble(problem, first, last, b, memory, work, solver)
+    solver.numbers.uses = 0.0
+    if not banded.factorise_definite(solver.band, n, b):
+        return False
+    put_residual(equation, problem, first, last, solver.residual, solver.step)
+    banded.solve_definite(solver.band, n, b, solver.step)
+    return True
+
+
+@kernel
+def add_step(equation, problem, first, length, step, y):
+    """Move the outputs y of agents from ``first`` to its end by so much of a step."""
+    for r in range(problem.data.offsets[first], len(y)):
+        y[r] += length * step[equation.row_of(problem, first, r)]
+
+
+@kernel
+def put_residual(equation, problem, first, last, residual, rows):
+    """Fill rows with the negative residual, in the equation's order; its squared norm."""
+    at, size = problem.data.offsets, 0.0
+    for r in range(at[first], at[last]):
+        rows[equation.row_of(problem, first, r)] = -residual[r]
+        size += residual[r] * residual[r]
+    return size
+
+
+@kernel
+def share_left(n, solver):
+    """What the step by old factors has left of the error, at most 1, from the step by new ones."""
+    off, whole = 0.0, 0.0
+    for r in range(n):
+        off = max(off, abs(solver.step[r] - solver.old_step[r]))
+        whole = max(whole, abs(solver.step[r]))
+    return min(2.0 * off / whole, 1.0) if whole > 0.0 else 1.0

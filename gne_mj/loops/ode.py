@@ -62,7 +62,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
     Args:
         faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
         place: see :func:`gne_mj.loops.functions.act`.
-        parts: of the loop; its input that acts is changed at stage 0.
+        parts: of the loop; its input is changed at stage 0.
         at: when; stages but the start, and division.END, are in mode continuous only.
         storage: V^{x*} of the agents now; read at stage 0.
         state, memory: there, flat; own actions are written into the law's memory, and in the held
@@ -85,12 +85,9 @@ def control_step(faults, place, parts, at, storage, state, memory):
     if at.stage == division.END and not faults.PREDICTION_KNOWN:
         divided.known = division.OUTPUTS
         return True
-    if known == division.LAW:
-        faults.deliver(problem, clock, at.step, work)
-    elif instant:
-        if (
-            clock.mode != CONTINUOUS and work.now.memory_step < at.step
-        ):  # a control period has passed
+    if instant and known != division.LAW:
+        # where a control period has passed
+        if clock.mode != CONTINUOUS and work.now.memory_step < at.step:
             functions.propagate(problem, work.held, memory, work.scratch)
             work.now.memory_step = at.step
         faults.begin(parts, at, state, memory)
@@ -104,6 +101,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
         if at.stage == division.END:
             divided.known = division.LAW
             return True
+    if instant:
         faults.deliver(problem, clock, at.step, work)
     else:
         copy(parts.u, work.u)
@@ -257,16 +255,9 @@ def build(faults: ModuleType = faultless) -> Any:
         _ = source
         sizes = steps_in(parameter_block)
         workspace = ode_workspace_in(floats_at(address, ode_workspace_length(sizes)), sizes)
-        parts, progress, given = (
-            parts_in(parameter_block, workspace.loop),
-            workspace.loop.progress,
-            workspace.vectors,
-        )
-        clock, divided, size = (
-            parts.clock,
-            parts.work.division,
-            parts.channels.equilibrium_state.size,
-        )
+        parts, progress = parts_in(parameter_block, workspace.loop), workspace.loop.progress
+        clock, divided, given = parts.clock, parts.work.division, workspace.vectors
+        size = parts.channels.equilibrium_state.size
         if parts.monitor.exit != watch.INSIDE:
             return 0
         state, trial, spare = given.state, given.trial, given.spare

@@ -108,19 +108,25 @@ def linearise(fixed, state, u, work, system):
             slack = -games.constraint(data, k, profile) - data.tightening[k]
             weight = -gain * rho / slack
             for a in range(first, last):
-                mine = games.constraint_gradient(data, k, a, profile) / slack
-                for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
-                    j = data.member_index[member]
-                    target = filtered[a] if j == i else own[a]
-                    for b in range(at[j], at[j + 1]):
-                        other = games.constraint_gradient(data, k, b, profile)
-                        second = games.constraint_hessian(data, k, a, b, profile)
-                        target[b] += weight * (second + mine * other)
+                add_barrier_row(data, i, k, a, slack, weight, profile, system)
     for r in range(m):
         if u[r] != work.commanded[r]:  # an input at its limit does not answer
             for c in range(m):
                 own[r, c] = 0.0
                 filtered[r, c] = 0.0
+
+
+@kernel
+def add_barrier_row(data, i, k, a, slack, weight, profile, system):
+    """Add what constraint k's barrier answers at action a of agent i to each of its members."""
+    at, mine = data.offsets, games.constraint_gradient(data, k, a, profile) / slack
+    for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
+        j = data.member_index[member]
+        target = system.filtered[a] if j == i else system.own[a]
+        for b in range(at[j], at[j + 1]):
+            other = games.constraint_gradient(data, k, b, profile)
+            second = games.constraint_hessian(data, k, a, b, profile)
+            target[b] += weight * (second + mine * other)
 
 
 @kernel
@@ -191,71 +197,105 @@ def solve_stage(fixed, h, stage, trial, u, k, system):
         k: (STAGES, length of the flat vector).
         system: prepared for h.
     """
-    problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
-    at, states = problem.data.offsets, channels.equilibrium_state.shape[1]
-    agents, m = system.spread.shape
-    epsilon = problem.settings[EPSILON]
-    s = 1.0 / (GAMMA * h)
-    filter_gain = 1.0 / (epsilon * s + 1.0)
-    size = m * states
-    at_z = size + agents * m
-    one, k_y, k_u = k[stage], system.k_y, system.k_u
-    # views of k[stage] and of the trial vector
-    k_x = one[:size].reshape((m, states))
-    k_e = one[size:at_z].reshape((agents, m))
-    k_z = one[at_z : at_z + m]
-    k_w = one[at_z + m :].reshape((agents - 1, m))
-    x = trial[:size].reshape((m, states))
-    z = trial[at_z : at_z + m]
-    w = trial[at_z + m :].reshape((agents - 1, m))
-    # right-hand sides, those of z and the modes times epsilon
-    functions.rates(channels, 1, trial, u, system.known, one)
-    for r in range(m):
-        k_y[r] = x[r, channels.output]
-        k_z[r] = k_y[r] - z[r]
-    for a in range(agents - 1):
-        for r in range(m):
-            k_w[a, r] = modes.rates[a, r] * (modes.rest[a, r] * k_y[r] - w[a, r])
-    for j in range(stage):
-        scale = method.rate[stage, j] / h
-        add_multiple(scale, k[j], one[:size])
-        add_multiple(epsilon * scale, k[j, at_z:], one[at_z:])
-    # the solution for k_u = 0 in x, and for k_y = 0 in z, the modes and the estimates
-    for r in range(m):
-        for a in range(states):
-            total = 0.0
-            for b in range(states):
-                total += system.resolvent[r, b, a] * k_x[r, b]
-            system.k_x[a] = total
-        copy(system.k_x, k_x[r])
-        k_y[r] = k_x[r, channels.output]
-        k_z[r] *= filter_gain
-    for a in range(agents - 1):
-        for r in range(m):
-            k_w[a, r] *= system.decay[a, r]
-    for i in range(agents):
-        for r in range(m):
-            k_e[i, r] = 0.0
-    add_from_modes(modes.vectors, k_w, k_e)
+    channels, modes = fixed.channels, fixed.modes
+    at, m = fixed.problem.data.offsets, len(u)
+    filter_gain = 1.0 / (fixed.problem.settings[EPSILON] * (1.0 / (GAMMA * h)) + 1.0)
+    now, k_y, k_u = parts_of(k[stage], fixed), system.k_y, system.k_u
+    right_hand_sides(fixed, h, stage, trial, u, k, system)
+    without_input(channels.output, modes, filter_gain, now, system)
     # what these leave over is for k_u
     for r in range(m):
         i = modes.owner[r]
         total = 0.0
         for c in range(m):
-            total += system.own[r, c] * k_e[i, c] + system.slope[r, c] * k_y[c]
+            total += system.own[r, c] * now.e[i, c] + system.slope[r, c] * k_y[c]
         for c in range(at[i], at[i + 1]):
-            total += system.filtered[r, c] * k_z[c]
+            total += system.filtered[r, c] * now.z[c]
         k_u[r] = total
     banded.solve(system.matrix, m, m - 1, system.pivot, k_u)
-    # what k_u and with it k_y add
+    add_input(channels.output, filter_gain, now, system)
+
+
+class VectorParts(NamedTuple):
+    """A flat vector of the loop by its parts."""
+
+    x: np.ndarray  # (m, states) of the agents
+    e: np.ndarray  # (N, m) estimates
+    z: np.ndarray  # (m,) filtered actions
+    w: np.ndarray  # (N - 1, m) the estimates' modes
+
+
+@kernel
+def parts_of(vector, fixed):
+    """Views into a flat vector."""
+    m, states = fixed.channels.equilibrium_state.shape
+    agents = len(fixed.problem.data.offsets) - 1
+    size = m * states
+    at_z = size + agents * m
+    return VectorParts(
+        vector[:size].reshape((m, states)),
+        vector[size:at_z].reshape((agents, m)),
+        vector[at_z : at_z + m],
+        vector[at_z + m :].reshape((agents - 1, m)),
+    )
+
+
+@kernel
+def right_hand_sides(fixed, h, stage, trial, u, k, system):
+    """Fill k[stage] with the stage's right-hand sides, those of z and the modes times epsilon."""
+    channels, modes, method, k_y = fixed.channels, fixed.modes, fixed.method, system.k_y
+    epsilon, one = fixed.problem.settings[EPSILON], k[stage]
+    at, now = parts_of(trial, fixed), parts_of(one, fixed)
+    functions.rates(channels, 1, trial, u, system.known, one)
+    for r in range(len(u)):
+        k_y[r] = at.x[r, channels.output]
+        now.z[r] = k_y[r] - at.z[r]
+    for a in range(len(now.w)):
+        for r in range(len(u)):
+            now.w[a, r] = modes.rates[a, r] * (modes.rest[a, r] * k_y[r] - at.w[a, r])
+    size = now.x.size
+    at_z = size + now.e.size
+    for j in range(stage):
+        scale = method.rate[stage, j] / h
+        add_multiple(scale, k[j], one[:size])
+        add_multiple(epsilon * scale, k[j, at_z:], one[at_z:])
+
+
+@kernel
+def without_input(output, modes, filter_gain, now, system):
+    """Solve for k_u = 0 in x, and for k_y = 0 in z, the modes and the estimates."""
+    m, states = now.x.shape
     for r in range(m):
         for a in range(states):
-            k_x[r, a] += k_u[r] * system.response[r, a]
-        k_y[r] = k_x[r, channels.output]
-        k_z[r] += filter_gain * k_y[r]
-    for i in range(agents):
+            total = 0.0
+            for b in range(states):
+                total += system.resolvent[r, b, a] * now.x[r, b]
+            system.k_x[a] = total
+        copy(system.k_x, now.x[r])
+        system.k_y[r] = now.x[r, output]
+        now.z[r] *= filter_gain
+    for a in range(len(now.w)):
         for r in range(m):
-            k_e[i, r] += system.spread[i, r] * k_y[r]
-    for a in range(agents - 1):
+            now.w[a, r] *= system.decay[a, r]
+    for i in range(len(now.e)):
         for r in range(m):
-            k_w[a, r] += system.pull[a, r] * k_y[r]
+            now.e[i, r] = 0.0
+    add_from_modes(modes.vectors, now.w, now.e)
+
+
+@kernel
+def add_input(output, filter_gain, now, system):
+    """Add what k_u, and with it k_y, does."""
+    m, states = now.x.shape
+    k_y, k_u = system.k_y, system.k_u
+    for r in range(m):
+        for a in range(states):
+            now.x[r, a] += k_u[r] * system.response[r, a]
+        k_y[r] = now.x[r, output]
+        now.z[r] += filter_gain * k_y[r]
+    for i in range(len(now.e)):
+        for r in range(m):
+            now.e[i, r] += system.spread[i, r] * k_y[r]
+    for a in range(len(now.w)):
+        for r in range(m):
+            now.w[a, r] += system.pull[a, r] * k_y[r]
