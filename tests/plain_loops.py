@@ -47,7 +47,7 @@ def parts_of(system, timing):
     scratch = work(m, p, game.agents, system._sizes)
     solver = solver_in(scratch.solver, setup.problem.order, p, states)
     kind = system.agents.kind
-    channels = Channels(system.agents.parameters, setup.rest, compiled_functions(kind), kind.OUTPUT)
+    channels = Channels(system.agents.parameters, setup.equilibrium_state, compiled_functions(kind), kind.OUTPUT)
     problem, parameter_block = layout.problem_and_parameter_block(
         setup, system.agents, len(system.loop_memory)
     )
@@ -65,7 +65,7 @@ def run_plain(system, timing, periods, plant=zero_order_hold):
     for k in range(periods):
         step = k * clock.period
         time = step * clock.h
-        scratch.y[:] = state.reshape(channels.rest.shape)[:, channels.output]
+        scratch.y[:] = state.reshape(channels.equilibrium_state.shape)[:, channels.output]
         assert inside(problem, time, 0, scratch.y, scratch, monitor)
         if k:
             functions.propagate(problem, scratch.held, memory, scratch.scratch)
@@ -76,5 +76,5 @@ def run_plain(system, timing, periods, plant=zero_order_hold):
         faults.deliver(problem, clock, step, scratch)
         row = (scratch.y, scratch.u, before, scratch.measurement)
         rows.append([array.copy() for array in row])
-        plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.rest.shape[1]))
+        plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.equilibrium_state.shape[1]))
     return Instants(*map(np.array, zip(*rows, strict=True)), monitor)

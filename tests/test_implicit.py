@@ -310,7 +310,7 @@ def test_a_period_over_which_outputs_fall_with_their_inputs_is_refused():
 def test_laws_without_what_the_mode_needs_are_refused():
     from gne_mj.scenario import load_scenario
 
-    with pytest.raises(InvalidInput, match="'pull'"):
+    with pytest.raises(InvalidInput, match="'barrier_free'"):
         load_scenario(
             "examples/law/scenario.toml",
             {"controller.mode": "implicit", "controller.file": "examples/law/damped_fast.py"},

@@ -288,7 +288,7 @@ def test_both_entries_of_an_action_count_in_its_length():
 
 
 def secant_solver(u, held, reached, prediction):
-    arrays = {"u": u, "held": held, "reached": reached, "ahead": prediction}
+    arrays = {"u": u, "held": held, "reached": reached, "prediction": prediction}
     return SimpleNamespace(
         **{name: np.array(values, dtype=float) for name, values in arrays.items()},
         slope=np.full(len(u), 0.5), stiff=np.full(len(u), 2.0),
@@ -336,7 +336,7 @@ def test_first_slopes_are_what_a_unit_input_adds():
             moved = state.copy()
             u = np.full(len(row), size)
             zero_order_hold.roll(parts.channels, parts.clock, moved, u, np.zeros(20))
-            row[:] = moved.reshape(parts.channels.rest.shape)[:, agent.OUTPUT]
+            row[:] = moved.reshape(parts.channels.equilibrium_state.shape)[:, agent.OUTPUT]
         assert parts.solver.slope == pytest.approx(reached[1] - reached[0])
 
 

@@ -305,12 +305,12 @@ def test_a_scenario_declares_bounds_and_certify_tells_what_they_cost():
         ({"simulation.control_period": 2.0, "margin": {"push": 0.01}}, "dy+/du > 0", "checked"),
     ],
 )  # fmt: skip
-def test_what_is_not_covered_is_named(changes, label, report_text):
+def test_what_is_not_covered_is_named(changes, label, words):
     scenario = load_scenario("velocity-sync", {**MARGIN, **changes})
     (system,) = scenario.system_objects()
     report = certify(system, scenario.clock())
     (condition,) = [c for c in report.held["conditions"] if c["label"] == label]
-    assert report_text in condition["why"]
+    assert words in condition["why"]
     assert condition["status"] != "met"
     assert report.held["promised"] == (condition["status"] == "assumed")
 
