@@ -67,22 +67,12 @@ def game(
         raise InvalidInput("count", count, "it must be a positive whole number")
     sizes = sizes_of(int(count), dimension)
     check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
-    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
-
     limits = boxes.limits_of(lower, upper, sizes)
     names = boxes.names_of(sizes, agent_name, axes)
     traced = trace(sizes, cost, constraints, parameters, limits, names)
-    try:
-        made, claims = make(traced), Claims(_roots(traced))
-    except RecursionError:
-        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
-    found = _found(traced, claims)
     return Game(
         name=name or "own game",
-        kernels=made.kernels,
-        parameters=made.q,
         sizes=sizes,
-        constraint_names=tuple(bound.name for bound in _all(traced)),
         action_name=action_name,
         action_unit=action_unit,
         agent_name=agent_name,
@@ -92,25 +82,35 @@ def game(
             *boxes.quantities(limits, sizes, action_name, action_unit, axes),
         ),
         tested=True,
-        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, made.q, sizes),
-        **found,
+        **_found(traced, cost),
     )
 
 
-def _found(traced: Trace, claims: Claims) -> dict[str, Any]:
+def _found(traced: Trace, cost: Callable[..., Any]) -> dict[str, Any]:
     """What follows from the expressions, by the names of a game's fields."""
+    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
+
+    try:
+        made, claims = make(traced), Claims(_roots(traced))
+    except RecursionError:
+        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
     owner, bounds = np.repeat(np.arange(len(traced.sizes)), traced.sizes), _all(traced)
     limits = [claims.gap_bound(bound) for bound in bounds]
     gaps = all(limit is not None for limit in limits)
     single = gaps and all(bound.gap is not None for bound in bounds)
     members = [_members(claims, bound, owner) for bound in bounds]
     costs = [_agents(claims, node, owner) for node in traced.costs]
+    affine = claims.affine(traced.costs)
     return {
+        "kernels": made.kernels,
+        "parameters": made.q,
+        "constraint_names": tuple(bound.name for bound in bounds),
         "in_cost": [[i, *(j for j in agents if j != i)] for i, agents in enumerate(costs)],
         "in_constraint": members,
         "owners": _owners(bounds, members),
         "equalities": _equalities(bounds),
-        "affine": claims.affine(traced.costs),
+        "affine": affine,
+        "jacobian_bounds": None if affine else jacobian_bounds(made.kernels, made.q, traced.sizes),
         "box": box(bounds, claims, len(owner)),
         "gap_bounds": np.array(limits, dtype=np.float64) if gaps else None,
         "affine_constraints": 2 * len(limits) if single else None,
