@@ -175,7 +175,7 @@ def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     found: list[Quantity] = []
     taken: set[str] = set()
     for stem, bounds in families.items():
-        kinds = {"": 1, "agent": agents, "constraint": len(traced.bounds)}
+        kinds = {"": 1, "agent": agents, "constraint": len(_all(traced))}
         each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
         name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
         if each is None or name in taken or not name.isidentifier():

@@ -16,7 +16,9 @@ from gne_mj.registry import GAMES
 from gne_mj.toml_table import Fills
 from gne_mj.user_files import load_module
 
-Limit = float | list[float] | list[list[float]]
+# Bounds of actions; tables have finite numbers only
+Bounded = float | Literal["none"]
+Limit = float | list[Bounded] | list[list[Bounded]]
 # What parameters cannot be called: the function's other arguments
 _TAKEN = {*inspect.signature(game).parameters} - {"parameters"}
 
@@ -37,7 +39,7 @@ class ExpressionsTable(GameTable):
     parameters: dict[str, Any] = Field({}, description="numbers of the formulas, by name")
     structure: dict[str, Any] = Field({}, description="what is no number to change: edges, lists")
     dimension: int | list[int] = Field(1, description="entries of an agent's action")
-    lower: Limit | None = Field(None, description="least action: one, or one an agent or entry")
+    lower: Limit | None = Field(None, description="least action: one for all, or one an agent or entry, or 'none'")
     upper: Limit | None = Field(None, description="greatest action, likewise")
     name: str = "own game"
     action_name: str = "action"
@@ -53,8 +55,8 @@ class ExpressionsTable(GameTable):
             cost,
             constraints,
             dimension=self.dimension,
-            lower=self.lower,
-            upper=self.upper,
+            lower=_numbers(self.lower, -np.inf),
+            upper=_numbers(self.upper, np.inf),
             name=self.name,
             action_name=self.action_name,
             action_unit=self.action_unit,
@@ -88,3 +90,10 @@ class ExpressionsTable(GameTable):
     def default_start(self, count: int) -> NDArray[np.float64]:
         """There is none."""
         raise InvalidInput("action", None, "a game of expressions has no default start: give one")
+
+
+def _numbers(limit: Any, nothing: float) -> Any:
+    """A bound of a table, ``nothing`` where it is "none"."""
+    if isinstance(limit, list):
+        return [_numbers(each, nothing) for each in limit]
+    return nothing if limit == "none" else limit
