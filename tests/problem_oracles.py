@@ -1,7 +1,7 @@
 """The classical problems once more, by hand, and a solver of their KKT conditions by SciPy.
 
-Costs are the examples' own functions, called with NumPy's numbers; constraints are written anew. All
-are affine. Nothing here knows the package.
+Costs are the examples' own functions, called with NumPy's numbers; constraints, all affine, are
+written anew. Nothing here knows the package.
 """
 
 from types import SimpleNamespace
@@ -13,13 +13,19 @@ INF = np.inf
 
 
 def _spread(y):
-    s = np.array([40, 35, 32]) - np.array([40 / 500, 35 / 400, 32 / 600]) * y.reshape(4, 3).sum(axis=0)
+    s = np.array([40, 35, 32]) - np.array([40 / 500, 35 / 400, 32 / 600]) * y.reshape(4, 3).sum(
+        axis=0
+    )
     d = s - np.roll(s, -1)
     return [*(d - 1), *(-d - 1)]
 
 
-_A3 = [lambda y: y[0] + y[1] + y[2] - 20, lambda y: y[0] + y[1] - y[2] - y[3] + y[6] - 5,
-       lambda y: y[3] - y[4] - y[1] - y[2] + y[5] - 7, lambda y: y[6] - y[0] - y[2] + y[3] - 4]  # fmt: skip
+_A3 = [
+    lambda y: y[0] + y[1] + y[2] - 20,
+    lambda y: y[0] + y[1] - y[2] - y[3] + y[6] - 5,
+    lambda y: y[3] - y[4] - y[1] - y[2] + y[5] - 7,
+    lambda y: y[6] - y[0] - y[2] + y[3] - 4,
+]
 _A3_OWNERS = [[0], [0], [1], [2]]
 
 
@@ -42,7 +48,9 @@ def rows(name, y, p):
         "a18": lambda: [*(y.reshape(4, 3).sum(axis=1) - [100, 50, 100, 50]), *_spread(y)],
         "harker": lambda: [y.sum() - 15],
         "rosen": lambda: [1 - y.sum()],
-        "rate": lambda: [*(y.reshape(3, 4).sum(axis=1) - 1), *(y.reshape(3, 4).sum(axis=0) - p.most)],
+        "rate": lambda: [
+            *(y.reshape(3, 4).sum(axis=1) - 1), *(y.reshape(3, 4).sum(axis=0) - p.most),
+        ],
         "transport": lambda: [y[1] + y[3] - p.K],
     }[name]()  # fmt: skip
     some = {"a1": [range(1, 10)], "a8": [[0, 1], [0, 1]]}
@@ -103,12 +111,12 @@ class Oracle:
                     self.G, self.own = np.vstack([self.G, row]), np.vstack([self.own, row])
                     self.h = np.append(self.h, sign * each)
 
-    def F(self, y):  # noqa: N802
+    def F(self, y):
         """The pseudo-gradient."""
         return pseudo_gradient(self.cost, y, self.p, self.sizes)
 
     def solve(self, y):
-        """A KKT point with one multiplier for each constraint, by Fischer and Burmeister's function."""
+        """A KKT point with one multiplier a constraint, by Fischer and Burmeister's function."""
         m = len(y)
 
         def residual(z):

@@ -5,8 +5,8 @@ Player 1 has bounds 0.3 and 0.5 and no part in the buffer's bound, which is the 
 Source: Facchinei and Kanzow, "Penalty methods for the solution of generalized Nash equilibrium
 problems", SIAM J. Optim. 20 (2010), preprint's appendix A.1; a variant of Kesselman, Leonardi and
 Bonifaci (2005).
-Published: right to two digits, since x_1 = 0.29924 is below its bound. Here x_1 = 0.3 and the others
-have 0.0694364..., where 0.3 + 8 x = (0.3 + 9 x)^2.
+Published: right to two digits, since x_1 = 0.29924 is below its bound. Here x_1 = 0.3 and the
+others have 0.0694364..., where 0.3 + 8 x = (0.3 + 9 x)^2.
 """
 
 from gne_mj.expressions import private
@@ -19,4 +19,4 @@ def cost(i, y, p):
 
 
 def constraints(y, p):
-    yield private(range(1, 10), y.sum() <= 1)
+    yield "buffer", private(range(1, 10), y.sum() <= 1)

@@ -1,10 +1,10 @@
 """A.13 River basin pollution: three producers keep two bounds on pollutants.
 
-Source: Facchinei and Kanzow (2010), preprint's appendix A.13; Haurie and Krawczyk (1997), Krawczyk and
-Uryasev (2000).
-Published: the variational (normalised) equilibrium, right to six digits: to all digits it is that of
-a first bound of 100.0000519. With a multiplier for each player there are others, such as
-(0, 6.4733, 22.2808).
+Source: Facchinei and Kanzow (2010), preprint's appendix A.13; Haurie and Krawczyk (1997), Krawczyk
+and Uryasev (2000).
+Published: the variational (normalised) equilibrium, right to six digits: to all digits it is that
+of a first bound of 100.0000519. With a multiplier for each player there are others, such as (0,
+6.4733, 22.2808).
 """
 
 PUBLISHED = [21.14480155732168, 16.02785326538717, 2.7259709656438]

@@ -1,6 +1,7 @@
 """A.15 Electricity market: three generating companies with 1, 2 and 3 units.
 
-Source: Facchinei and Kanzow (2010), preprint's appendix A.15; Contreras, Klusch and Krawczyk (2004).
+Source: Facchinei and Kanzow (2010), preprint's appendix A.15; Contreras, Klusch and Krawczyk
+(2004).
 Published: right to four digits; to all digits it solves F(x) + 1e-5 x = 0.
 """
 

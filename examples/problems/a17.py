@@ -1,8 +1,8 @@
 """A.17 Two players, of two variables and one, share two bounds.
 
 Source: Facchinei and Kanzow (2010), preprint's appendix A.17.
-Published: (0, 11, 8) to five digits: the variational one, where x_1 = 0 has the multiplier 0. There is
-a whole set of others.
+Published: (0, 11, 8) to five digits: the variational one, where x_1 = 0 has the multiplier 0. There
+is a whole set of others.
 """
 
 PUBLISHED = [0.00000737, 11.00002440, 7.99997560]

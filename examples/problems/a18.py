@@ -1,4 +1,4 @@
-"""A.18 Electricity market: two generators with two plants each sell in three regions with arbitrage.
+"""A.18 Electricity market: two firms with two plants each sell in three regions, with arbitrage.
 
 Prices S of regions differ by at most 1. Of each firm only what both plants sell in a region counts,
 so that F is merely monotone: sales in all are unique, their shares of plants are not.

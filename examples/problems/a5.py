@@ -1,8 +1,8 @@
 """A.5 As A.3 with other numbers, and actions from 0 to 10.
 
 Source: Facchinei and Kanzow (2010), preprint's appendix A.5.
-Published: right to three digits; entries that are 0 are published as small negative numbers, outside
-their bound.
+Published: right to three digits; entries that are 0 are published as small negative numbers,
+outside their bound.
 """
 
 import numpy as np

@@ -3,8 +3,8 @@
 (5, 9) and (t, 15 - t) for t from 9 to 10 are the generalized Nash equilibria; the first one is the
 only variational one.
 
-Source: Harker, "Generalized Nash games and quasi-variational inequalities", European J. of Operational
-Research 54 (1991), 81-94.
+Source: Harker, "Generalized Nash games and quasi-variational inequalities", European J. of
+Operational Research 54 (1991), 81-94.
 Published: (5, 9), exactly.
 """
 

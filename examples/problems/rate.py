@@ -2,8 +2,8 @@
 
 Without the shared bound on the power in each channel it is the game of iterative water filling.
 
-Source: Yu, Ginis and Cioffi, "Distributed multiuser power control for digital subscriber lines", IEEE
-J. on Selected Areas in Communications 20 (2002); the gains are this file's own.
+Source: Yu, Ginis and Cioffi, "Distributed multiuser power control for digital subscriber lines",
+IEEE J. on Selected Areas in Communications 20 (2002); the gains are this file's own.
 Published: no digits; compared with water filling where the shared bound does not bind.
 """
 

@@ -1,7 +1,7 @@
 """Rosen's two players, who share x_1 + x_2 >= 1, with his weights r of players.
 
-With the costs weighted by r the variational equilibrium is his normalised one,
-x_2 = (r_1 - r_2) / (2 r_1 + r_2), x_1 = 1 - x_2, as long as that is not negative.
+With the costs weighted by r the variational equilibrium is his normalised one, x_2 = (r_1 - r_2) /
+(2 r_1 + r_2), x_1 = 1 - x_2, as long as that is not negative.
 
 Source: after Rosen, "Existence and uniqueness of equilibrium points for concave n-person games",
 Econometrica 33 (1965), 520-534; used by von Heusinger and Kanzow (2009) among others.
