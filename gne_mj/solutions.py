@@ -248,6 +248,7 @@ def summary(solution: Solution) -> list[str]:
     """The solution in words, line by line."""
     game, variational, found = solution.game, solution.variational, solution.optimality
     unit = f" {game.action_unit}" if game.action_unit else ""
+    kind = "GNE" if game.private else "variational GNE"
     lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
     for point in solution.penalised:
         numbers = _compared(game, point)
@@ -259,7 +260,7 @@ def summary(solution: Solution) -> list[str]:
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
             f" {bounds_text(epsilon)}",
-            f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
+            f"    {'distance':16} {point.distance:.4g}{unit} to the {kind}",
         ]
     active = [
         f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
