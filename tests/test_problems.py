@@ -57,11 +57,32 @@ def test_every_file_is_listed():
     assert set(load_scenario(FOLDER / "problems.toml").systems) == set(NAMES)
 
 
+def documented(name):
+    """A problem's cells in docs/problems.md."""
+    heads = {"harker": "Harker's", "rosen": "Rosen's", "rate": "rate max", "transport": "Cournot"}
+    head = heads.get(name, f"A.{name[1:]} ")
+    text = (FOLDER.parents[1] / "docs" / "problems.md").read_text(encoding="utf-8")
+    (row,) = [line for line in text.splitlines() if line.startswith(f"| {head}")]
+    return [cell.strip() for cell in row.strip("|").split("|")]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_functions_have_ten_lines_at_most(name):
     tree = ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
-    assert sum(node.end_lineno - node.lineno + 1 for node in functions) <= 10
+    lines = sum(node.end_lineno - node.lineno + 1 for node in functions)
+    assert lines <= 10
+    game = solved(name)[0].game
+    assert documented(name)[1:3] == [f"{game.agents} ({game.actions})", str(lines)]
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_table_tells_how_far_published_digits_are(name):
+    digits = module(name).PUBLISHED
+    digits = digits[75] if name == "a16" else digits
+    off = np.max(np.abs(solved(name)[2].action - digits))
+    told = documented(name)[4]
+    assert off < 1e-8 if told == "exact" else off == pytest.approx(float(told), rel=0.06)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -179,6 +200,7 @@ VERDICTS = {
 @pytest.mark.parametrize("name", NAMES)
 def test_certified_as_far_as_the_theory_goes(name):
     expected, found = VERDICTS[name], Theorem(solved(name)[0])
+    assert documented(name)[5].startswith("certified") == (expected is None)
     if expected is None:
         assert found.status == CERTIFIED
         return
