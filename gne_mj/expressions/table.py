@@ -39,7 +39,9 @@ class ExpressionsTable(GameTable):
     parameters: dict[str, Any] = Field({}, description="numbers of the formulas, by name")
     structure: dict[str, Any] = Field({}, description="what is no number to change: edges, lists")
     dimension: int | list[int] = Field(1, description="entries of an agent's action")
-    lower: Limit | None = Field(None, description="least action: one for all, or one an agent or entry, or 'none'")
+    lower: Limit | None = Field(
+        None, description="least action: one, or one an agent or entry; 'none'"
+    )
     upper: Limit | None = Field(None, description="greatest action, likewise")
     name: str = "own game"
     action_name: str = "action"
