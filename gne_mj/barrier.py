@@ -18,6 +18,7 @@ from pydantic import Field
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.native import kernel
+from gne_mj.ownership import own_curvature, own_slopes
 from gne_mj.registry import SCHEDULES
 from gne_mj.toml_table import Fills, Table
 
@@ -153,15 +154,18 @@ class LogBarrier:
         return self.rho / -g
 
     def gradient(self, y: ArrayLike) -> NDArray[np.float64]:
-        """dphi/dy, shape (m,)."""
-        return self.weights(y) @ self.game.constraint_jacobian(y)
+        """dphi/dy, shape (m,): of each agent's own constraints where some are private."""
+        return self.weights(y) @ own_slopes(self.game, y)
 
     def hessian(self, y: ArrayLike) -> NDArray[np.float64]:
-        """d2phi/dy2, shape (m, m): sum_l w_l d2g_l + (w_l^2 / rho) dg_l dg_l'."""
+        """d2phi/dy2, shape (m, m): sum_l w_l d2g_l + (w_l^2 / rho) dg_l dg_l'.
+
+        The gradient's derivative, which is not symmetric where constraints are private.
+        """
         weights = self.weights(y)
         jacobian = self.game.constraint_jacobian(y)
-        curvature = self.game.weighted_constraint_hessian(y, weights)
-        return curvature + (jacobian.T * (weights**2 / self.rho)) @ jacobian
+        curvature = own_curvature(self.game, y, weights)
+        return curvature + (own_slopes(self.game, y).T * (weights**2 / self.rho)) @ jacobian
 
 
 @kernel
@@ -194,7 +198,7 @@ for _fall in (exponential, reciprocal, halving):
 
 @kernel
 def weighted_gradient(game, data, i, a, y, weights):
-    """Sum over the constraints l that contain y_i of weights[l] * dg_l/dy_a(y)."""
+    """Sum over agent i's constraints l of weights[l] * dg_l/dy_a(y)."""
     total = 0.0
     for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
         k = data.own_index[entry]

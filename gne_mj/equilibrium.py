@@ -187,6 +187,7 @@ class EquilibriumSolver:
             share=np.zeros(p),
             row=np.zeros(p + 1, dtype=np.int64),
             column=np.zeros(entries, dtype=np.int64),
+            owned=np.zeros(entries, dtype=np.bool_),
             jacobian=np.zeros(entries),
             stationarity=np.zeros(m),
             terms=np.zeros(m),

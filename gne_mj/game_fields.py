@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.equality import Equality
 from gne_mj.errors import GneError, InvalidInput, UserCodeError
 from gne_mj.quantity import Quantity
 
@@ -35,7 +36,14 @@ def check_kinds(game: Any) -> None:
         lists = getattr(game, key)
         fits = _all(lists, Sequence | np.ndarray) and all(_all(each, Integral) for each in lists)
         _need(game, key, fits, "it must list lists of agents' numbers")
+    owners = game.owners
+    fits = owners is None or (
+        _all(owners, Sequence | np.ndarray) and all(_all(each, Integral) for each in owners)
+    )
+    _need(game, "owners", fits, "it must list lists of agents' numbers")
     _need(game, "quantities", _all(game.quantities, Quantity), "it must list gne_mj Quantities")
+    equalities = _all(game.equalities, Equality)
+    _need(game, "equalities", equalities, "it must list gne_mj Equalities")
     numbers = real(game.parameters)
     row = numbers is not None and numbers.ndim == 1
     _need(game, "parameters", row, "it must be one row of real numbers")
@@ -51,6 +59,25 @@ def check_kinds(game: Any) -> None:
     _need_pair(game, "feasible_jacobian_bounds", (count, count))
     known = game.jacobian_bounds is None or callable(game.jacobian_bounds)
     _need(game, "jacobian_bounds", known, "it must be a function of a box")
+
+
+def check_owners(game: Any) -> None:
+    """Refuse owners that do not appear in their constraint, or equalities of none.
+
+    Raises:
+        InvalidInput: names ``owners`` or ``equalities``.
+    """
+    if game.owners is not None and len(game.owners) != len(game.in_constraint):
+        expected = f"there must be {len(game.in_constraint)}, one a constraint"
+        raise InvalidInput("owners", f"{len(game.owners)} lists", expected)
+    for own, members in zip(game.owned_by, game.in_constraint, strict=True):
+        if not len(own) or len(set(own)) != len(own) or not set(own) <= set(members):
+            expected = f"it must list some of the agents in the constraint, {sorted(members)}"
+            raise InvalidInput("owners", list(own), expected)
+    for each in game.equalities:
+        if not 0 <= each.constraint < len(game.in_constraint):
+            expected = f"constraints are numbered from 0 to {len(game.in_constraint) - 1}"
+            raise InvalidInput("equalities", each.constraint, expected)
 
 
 def checked_bounds(function: Callable[[Box], Box], actions: int) -> Callable[[Box], Box]:

@@ -30,8 +30,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj import game_functions as functions
 from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
+from gne_mj.equality import Equality
 from gne_mj.errors import InvalidInput, UserCodeError
-from gne_mj.game_fields import check_kinds, checked_bounds
+from gne_mj.game_fields import check_kinds, check_owners, checked_bounds
 from gne_mj.native import compiled, kernel, source_key
 from gne_mj.plain import Written, as_written, check_numbers, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
@@ -58,7 +59,8 @@ class GameData(NamedTuple):
     # constraint l -> the agents that appear in g_l
     member_pointer: Annotated[np.ndarray, "p + 1", int]
     member_index: Annotated[np.ndarray, "n", int]
-    own_pointer: Annotated[np.ndarray, "N + 1", int]  # agent i -> the constraints that contain y_i
+    # agent i -> the constraints that are its own: those whose barrier its penalised cost has
+    own_pointer: Annotated[np.ndarray, "N + 1", int]
     own_index: Annotated[np.ndarray, "n", int]
     tightening: Annotated[np.ndarray, "p"]  # t >= 0: the barrier guards g + t < 0
     everyone: Annotated[np.ndarray, "N", int]  # 0, ..., N - 1
@@ -79,6 +81,8 @@ class Game:
         sizes: m_i of each agent.
         in_cost: for each agent the agents that appear in its cost.
         in_constraint: for each constraint the agents that appear in it.
+        owners: for each constraint the agents whose constraint it is; others that appear in it move
+            it and need not keep it. None for all: every constraint is shared.
         constraint_names: one name for each constraint, used in messages and files.
         action_name: what an action is, e.g. "velocity".
         action_unit: its unit.
@@ -102,6 +106,7 @@ class Game:
         constraint_class: what the author says of all constraints: "affine", "quadratic" (convex,
             their second derivatives the same everywhere) or "convex"; None says nothing.
         smooth: whether the author says that F is twice continuously differentiable.
+        equalities: which constraints are bands about an equality.
         tested: whether the author's own tests compare the functions with each other and with what
             is declared here. The package's games say so: comparing them again at every load would
             only cost time. Of others :mod:`gne_mj.game_check` compares at load, and what they
@@ -137,6 +142,8 @@ class Game:
     constraint_class: ConstraintClass | None = None
     smooth: bool = False
     tested: bool = False
+    owners: Sequence[Sequence[int]] | None = None
+    equalities: tuple[Equality, ...] = ()
     written: Written = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -186,6 +193,7 @@ class Game:
                     )
         if not all(len(members) for members in self.in_constraint):
             raise InvalidInput("in_constraint", [], "every constraint contains an agent")
+        check_owners(self)
 
     def _check_declarations(self) -> None:
         m, p = sum(self.sizes), len(self.in_constraint)
@@ -256,6 +264,17 @@ class Game:
         return self.tightening
 
     @property
+    def owned_by(self) -> Sequence[Sequence[int]]:
+        """For each constraint the agents whose constraint it is."""
+        return self.in_constraint if self.owners is None else self.owners
+
+    @cached_property
+    def private(self) -> tuple[int, ...]:
+        """The constraints that some agent in them does not own."""
+        pairs = zip(self.owned_by, self.in_constraint, strict=True)
+        return tuple(k for k, (own, members) in enumerate(pairs) if len(own) < len(members))
+
+    @property
     def agents(self) -> int:
         """N."""
         return len(self.sizes)
@@ -274,7 +293,7 @@ class Game:
     def data(self) -> GameData:
         """The same, for native code (read-only arrays)."""
         own: list[list[int]] = [[] for _ in self.sizes]
-        for constraint, members in enumerate(self.in_constraint):
+        for constraint, members in enumerate(self.owned_by):
             for agent in members:
                 own[agent].append(constraint)
         ordered = [[i, *(j for j in members if j != i)] for i, members in enumerate(self.in_cost)]
@@ -304,7 +323,7 @@ class Game:
 
     @cached_property
     def own_constraints(self) -> NDArray[np.int64]:
-        """p_i, the number of constraints that contain y_i, shape (N,)."""
+        """p_i, the number of constraints of each agent that contain y_i, shape (N,)."""
         return np.diff(self.data.own_pointer)
 
     @cached_property

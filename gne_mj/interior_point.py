@@ -14,6 +14,8 @@ singular, as in merely monotone games, its diagonal is raised a little.
 Nothing depends on the units of costs, constraints or actions: all is measured by the problem's own
 sizes (:mod:`gne_mj.scales`).
 
+A private constraint is in the rows of its owners only, and keeps its slack all the same.
+
 Newton's matrix dF/dy + sum_l lambda_l d2g_l + dg' diag(lambda / s) dg couples actions of agents
 that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.banded`).
 """
@@ -88,6 +90,7 @@ class NewtonScratch(NamedTuple):
     size: np.ndarray  # (q,) size of the terms in g whose rounding shows in it
     row: np.ndarray  # (q + 1,) where each constraint's entries begin in the next two
     column: np.ndarray  # the free actions in one constraint after the other
+    owned: np.ndarray  # whether the constraint is one of that action's agent
     jacobian: np.ndarray  # dg_l/dy_a for them
     stationarity: np.ndarray  # (n,) F + sum_l lambda_l dg_l
     terms: np.ndarray  # (n,) sum of the magnitudes of its terms
@@ -102,8 +105,19 @@ class NewtonScratch(NamedTuple):
 
 
 @kernel
+def owns(data, j, l):
+    """Whether constraint l, which contains agent j, is one of its own."""
+    if len(data.own_index) == len(data.member_index):  # all are shared
+        return True
+    for entry in range(data.own_pointer[j], data.own_pointer[j + 1]):
+        if data.own_index[entry] == l:
+            return True
+    return False
+
+
+@kernel
 def find_entries(data, free, work):
-    """Fill row and column: where the constraints' derivatives are that a step needs."""
+    """Fill row, column and owned: where the constraints' derivatives are that a step needs."""
     at, entry = data.offsets, 0
     for k in range(len(free.constraints)):
         l = free.constraints[k]
@@ -111,8 +125,10 @@ def find_entries(data, free, work):
         for member in range(data.member_pointer[l], data.member_pointer[l + 1]):
             j = data.member_index[member]
             if free.position[at[j]] >= 0:
+                owned = owns(data, j, l)
                 for a in range(at[j], at[j + 1]):
                     work.column[entry] = a
+                    work.owned[entry] = owned
                     entry += 1
     work.row[len(free.constraints)] = entry
 
@@ -146,9 +162,10 @@ def evaluate(data, free, point, work):
             a = work.column[entry]
             slope = work.jacobian[entry]
             size += abs(slope * point.y[a])
-            r = free.position[a]
-            work.stationarity[r] += point.multipliers[k] * slope
-            work.terms[r] += point.multipliers[k] * abs(slope)
+            if work.owned[entry]:
+                r = free.position[a]
+                work.stationarity[r] += point.multipliers[k] * slope
+                work.terms[r] += point.multipliers[k] * abs(slope)
         work.size[k] = size
 
 
@@ -228,6 +245,8 @@ def assemble(data, free, count, length, shift, point, b, work):
         weight = point.multipliers[k]
         ratio = weight / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
+            if not work.owned[entry]:
+                continue
             a = work.column[entry]
             r = position[a]
             slope = ratio * work.jacobian[entry]
@@ -281,7 +300,8 @@ def solve(free, count, rho, length, point, b, work):
         change = (work.share[k] * rho + point.multipliers[k] * work.g[k]) / point.slack[k]
         work.step_multipliers[k] = change
         for entry in range(work.row[k], work.row[k + 1]):
-            work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
+            if work.owned[entry]:
+                work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
     return longest_entry(count, work.step) <= FAR * length
 
@@ -360,9 +380,10 @@ def begin(data, free, count, b, path, known, point, work):
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
-            r = free.position[work.column[entry]]
-            work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
-            work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
+            if work.owned[entry]:
+                r = free.position[work.column[entry]]
+                work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
+                work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
     return rho, highest, length, size
 
 
@@ -385,13 +406,14 @@ def follow(data, free, half_band, path, known, point, work, report):
     if rho == 0.0:
         return OUTSIDE
     least = max(scales.NARROWEST * length, scales.largest_held(free, point.y))
-    last = path.last_rho * size if path.to_zero else path.last_rho
+    first = last = path.last_rho * size if path.to_zero else path.last_rho
     distance, before, stalled, slow, still, careful = np.inf, np.inf, 0, 0, False, False
     for iteration in range(LARGEST_COUNT):
         near_enough, residual = False, stationarity_error(count, work)
         off = spread(constraints, rho, point, work)
-        if path.to_zero and path.last_rho * size < 0.5 * last:
-            last = path.last_rho * size
+        if path.to_zero:  # never above what it was at first; near y = 0 costs look small
+            there = min(path.last_rho * size, first)
+            last = last if 0.5 * last <= there <= 10.0 * last else there
         if not careful:
             lower = lower_rho(constraints, rho, last, size, residual, path, point, work)
             if lower < rho:

@@ -100,9 +100,12 @@ def lowest(data, i, own, holes, y, direction, trial, found):
 def to_middle(data, y, direction, trial):
     """Move y (m,) to the middle along each action in turn; where that is far away, a little."""
     copy(y, trial)
+    shared = len(data.own_index) == len(data.member_index)
     for _ in range(SWEEPS):
         for i in range(len(data.offsets) - 1):
-            own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
+            own = data.all_constraints[:]
+            if shared:
+                own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
             for a in range(data.offsets[i], data.offsets[i + 1]):
                 length = scales.largest(y)
                 length = length if length > 0.0 else 1.0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium
 from gne_mj.game_model import Game
+from gne_mj.ownership import own_curvature, own_slopes
 
 # Relative to what it acts on: a push below is none, and likewise room for an action.
 NEGLIGIBLE = 1e-8
@@ -48,10 +49,10 @@ class Optimality:
 def examine(game: Game, point: Equilibrium) -> Optimality:
     """What a variational GNE, or what was found in its place, is."""
     y, multipliers = point.action, point.multipliers
-    jacobian = game.constraint_jacobian(y)
+    jacobian, owned = game.constraint_jacobian(y), own_slopes(game, y)
     slopes = game.pseudo_gradient_jacobian(y)
     length = float(np.max(np.abs(y))) or 1.0
-    pushes = multipliers[:, None] * np.abs(jacobian)
+    pushes = multipliers[:, None] * np.abs(owned)
     rows = np.abs(game.pseudo_gradient(y)) + pushes.sum(axis=0)
     rows += length * np.abs(slopes).sum(axis=1)
     push = np.max(np.divide(pushes, rows, out=np.zeros_like(pushes), where=rows > 0), axis=1)
@@ -63,7 +64,7 @@ def examine(game: Game, point: Equilibrium) -> Optimality:
     return Optimality(
         active=tuple(np.flatnonzero(active).tolist()),
         weakly_active=tuple(np.flatnonzero(near & ~active).tolist()),
-        curvature=_curvature(game, slopes, multipliers, jacobian[active], y),
+        curvature=_curvature(game, slopes, multipliers, owned[active], y),
         monotonicity=_monotonicity(slopes),
     )
 
@@ -75,7 +76,7 @@ def _curvature(
     binding: NDArray[np.float64],
     y: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    bends = game.weighted_constraint_hessian(y, multipliers)
+    bends = own_curvature(game, y, multipliers)
     at, found = game.data.offsets, np.empty(game.agents)
     for i in range(game.agents):
         own = slice(at[i], at[i + 1])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_POINTS
 from gne_mj.epsilon import epsilon_bounds
+from gne_mj.equality import error_of, multipliers
 from gne_mj.equilibrium import (
     Equilibrium,
     measured_epsilon,
@@ -201,11 +202,26 @@ def _numbers(game: Game, point: Equilibrium) -> dict[str, Any]:
         "rho": point.rho,
         "action": point.action.tolist(),
         "multipliers": point.multipliers.tolist(),
+        "equalities": _equalities(game, point),
         "residual": point.residual,
         "largest_constraint": float(np.max(game.constraints(point.action), initial=-np.inf)),
         "complementarity": point.complementarity,
         "iterations": point.iterations,
     }
+
+
+def _equalities(game: Game, point: Equilibrium) -> list[dict[str, Any]]:
+    """Of each equality what is missing to it, and its multiplier."""
+    found = multipliers(game.equalities, point.action, point.multipliers)
+    return [
+        {
+            "name": each.name,
+            "error": error_of(each, point.action),
+            "width": each.width,
+            "multiplier": float(multiplier),
+        }
+        for each, multiplier in zip(game.equalities, found, strict=True)
+    ]
 
 
 def _compared(game: Game, point: Measured) -> dict[str, Any]:
@@ -232,6 +248,7 @@ def summary(solution: Solution) -> list[str]:
     """The solution in words, line by line."""
     game, variational, found = solution.game, solution.variational, solution.optimality
     unit = f" {game.action_unit}" if game.action_unit else ""
+    kind = "GNE" if game.private else "variational GNE"
     lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
     for point in solution.penalised:
         numbers = _compared(game, point)
@@ -243,7 +260,7 @@ def summary(solution: Solution) -> list[str]:
             f"    {'residual':16} {numbers['residual']:.1e}; {numbers['iterations']} iterations",
             f"    {'epsilon':16} {epsilon['measured']:.4g} measured (agent {epsilon['agent']});"
             f" {bounds_text(epsilon)}",
-            f"    {'distance':16} {point.distance:.4g}{unit} to the variational GNE",
+            f"    {'distance':16} {point.distance:.4g}{unit} to the {kind}",
         ]
     active = [
         f"{game.constraint_names[k]} (lambda = {variational.multipliers[k]:.4g})"
@@ -251,7 +268,7 @@ def summary(solution: Solution) -> list[str]:
     ]
     weakly = [game.constraint_names[k] for k in found.weakly_active]
     lines += [
-        "  variational GNE" if solution.holds else "  stationary profile, and no equilibrium",
+        _title(solution),
         f"    {game.action_name:16} {_listed(variational.action)}{unit}",
         f"    {'active':16} {len(active)} of {game.constraints_count} constraints"
         + (f": {_shortened(active)}" if active else "")
@@ -259,6 +276,11 @@ def summary(solution: Solution) -> list[str]:
         f"    {'residual':16} stationarity {variational.residual:.1e}, complementarity"
         f" {variational.complementarity:.1e}, every constraint negative;"
         f" {variational.iterations} iterations",
+        *(
+            f"    {'equality':16} {each['name']}: multiplier {each['multiplier']:.6g}, off by"
+            f" {each['error']:.2g} within the width {each['width']:g}"
+            for each in _equalities(game, variational)
+        ),
         *_doubts(solution),
     ]
     if solution.path:
@@ -270,6 +292,15 @@ def summary(solution: Solution) -> list[str]:
                 f"  {_number(bounds_of(game, point)['bound'])}"
             )
     return lines
+
+
+def _title(solution: Solution) -> str:
+    if not solution.holds:
+        return "  stationary profile, and no equilibrium"
+    private = len(solution.game.private)
+    if private:
+        return f"  GNE, {private} of {solution.game.constraints_count} constraints private"
+    return "  variational GNE"
 
 
 def _doubts(solution: Solution) -> list[str]:

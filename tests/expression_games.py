@@ -54,12 +54,8 @@ def cournot(count: int = 10) -> tuple[Game, Game]:
     def cost(i, y, p):
         return y[i] * (p.c[i] - (p.D - y.sum()))
 
-    def constraints(y, p):
-        yield "least quantity", y >= 7.0
-        yield "greatest quantity", y <= p.most
-
     c = count * (1.0 + 0.5 * np.arange(count))
-    return game(count, cost, constraints, c=c, D=60.0 * count, most=100.0), cournot_game(count)
+    return game(count, cost, lower=7.0, upper=100.0, c=c, D=60.0 * count), cournot_game(count)
 
 
 def osnr() -> tuple[Game, Game]:

@@ -47,7 +47,8 @@ def parts_of(system, timing):
     scratch = work(m, p, game.agents, system._sizes)
     solver = solver_in(scratch.solver, setup.problem.order, p, states)
     kind = system.agents.kind
-    channels = Channels(system.agents.parameters, setup.equilibrium_state, compiled_functions(kind), kind.OUTPUT)
+    rest = setup.equilibrium_state
+    channels = Channels(system.agents.parameters, rest, compiled_functions(kind), kind.OUTPUT)
     problem, parameter_block = layout.problem_and_parameter_block(
         setup, system.agents, len(system.loop_memory)
     )
@@ -76,5 +77,6 @@ def run_plain(system, timing, periods, plant=zero_order_hold):
         faults.deliver(problem, clock, step, scratch)
         row = (scratch.y, scratch.u, before, scratch.measurement)
         rows.append([array.copy() for array in row])
-        plant.roll(channels, clock, state, scratch.u, np.zeros(5 * channels.equilibrium_state.shape[1]))
+        spare = np.zeros(5 * channels.equilibrium_state.shape[1])
+        plant.roll(channels, clock, state, scratch.u, spare)
     return Instants(*map(np.array, zip(*rows, strict=True)), monitor)

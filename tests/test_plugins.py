@@ -80,7 +80,7 @@ def test_parameters_of_an_agent_type_may_differ_from_agent_to_agent(point):
 @pytest.mark.parametrize(
     ("changed", "agents", "said"),
     [
-        (("@kernel\ndef storage", "def storage"), {}, "define a kernel storage(q, x, equilibrium_state)"),
+        (("@kernel\ndef storage", "def storage"), {}, "kernel storage(q, x, equilibrium_state)"),
         (("def rate(q, x, u, out)", "def rate(q, x, u)"), {}, "it must define rate(q, x, u, out)"),
         (('"point", ("factor",)', '"point", "f"'), {"parameters": {}}, "points have f"),
         ((', 0, ""\n', ', 1, ""\n'), {}, "OUTPUT must be the number of one of 1 states"),

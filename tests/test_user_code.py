@@ -218,8 +218,8 @@ def test_a_start_outside_a_game_of_plain_functions():
 # Processes
 
 MAIN = (
-    "import sys, gne_mj.cli.ending\n"
-    "ending.LOOK, ending.OF_USER, ending.NATIVE, ending.GRACE = 0.05, 0.3, 1.0, 0.5\n"
+    "import sys, gne_mj.cli.ending as ending\n"
+    "ending.POLL, ending.OF_USER, ending.NATIVE, ending.GRACE = 0.05, 0.3, 1.0, 0.5\n"
     "from gne_mj.cli import main\n"
     "sys.argv[0] = 'gne-mj'\n"
     "main()"
@@ -347,7 +347,7 @@ def storage(problem, memory):
 
 
 ANNOUNCED = """
-import gne_mj.simulation
+import gne_mj.simulation as simulation
 advance = simulation.Simulation.advance
 def announced(self, steps):
     print("begins", flush=True)

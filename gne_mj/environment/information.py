@@ -58,7 +58,7 @@ def information_of(game: Game, structure: str, graph: Graph | None) -> Informati
     heard, constraints = [], []
     for i in agents:
         heard.append(np.flatnonzero(np.isin(game.agent_of_action, hears[i])))
-        own = [k for k, members in enumerate(game.in_constraint) if i in members]
+        own = [k for k, owners in enumerate(game.owned_by) if i in owners]
         if structure == "distributed":
             own = [k for k in own if set(game.in_constraint[k]) <= {i, *hears[i]}]
         constraints.append(np.array(own, dtype=np.int64))

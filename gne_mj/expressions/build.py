@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_ACTIONS, check_count
+from gne_mj.equality import Equality
 from gne_mj.errors import InvalidInput
+from gne_mj.expressions import boxes
 from gne_mj.expressions.claims import Claims, box, values
 from gne_mj.expressions.intervals import jacobian_bounds
 from gne_mj.expressions.nodes import Node
@@ -26,8 +28,10 @@ def fixed(value: Any) -> Fixed:
 def game(
     count: int,
     cost: Callable[..., Any],
-    constraints: Callable[..., Any],
+    constraints: Callable[..., Any] | None = None,
     *,
+    lower: Any = None,
+    upper: Any = None,
     dimension: int | Sequence[int] = 1,
     name: str = "",
     action_name: str = "action",
@@ -45,7 +49,10 @@ def game(
         count: N.
         cost: ``cost(i, y, p)``, J_i of agent i = 0..N-1; y[i] is its action, (m_i,) or a number.
         constraints: ``constraints(y, p)`` yields comparisons, each alone or behind its name:
-            ``yield "energy", (y**2).sum() <= p.budget``.
+            ``yield "energy", (y**2).sum() <= p.budget``; :func:`private` and :func:`band` declare
+            what they are. May be left out where actions have bounds.
+        lower, upper: bounds of the actions, one number for all, one an agent, or one an entry;
+            -inf and inf for none. They become constraints, drawn as bounds of the actions.
         dimension: m_i, one number for all or one each.
         name: what the game is called; "own game" if left out.
         action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game_model.Game`.
@@ -60,53 +67,93 @@ def game(
         raise InvalidInput("count", count, "it must be a positive whole number")
     sizes = sizes_of(int(count), dimension)
     check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
-    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
-
-    traced = trace(sizes, cost, constraints, parameters)
-    try:
-        made, claims = make(traced), Claims(_roots(traced))
-    except RecursionError:
-        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
-    found = _found(traced, claims)
+    limits = boxes.limits_of(lower, upper, sizes)
+    names = boxes.names_of(sizes, agent_name, axes)
+    traced = trace(sizes, cost, constraints, parameters, limits, names)
     return Game(
         name=name or "own game",
-        kernels=made.kernels,
-        parameters=made.q,
         sizes=sizes,
-        constraint_names=tuple(bound.name for bound in traced.bounds),
         action_name=action_name,
         action_unit=action_unit,
         agent_name=agent_name,
         axes=axes,
-        quantities=_quantities(traced, len(sizes)),
+        quantities=(
+            *_quantities(traced, len(sizes)),
+            *boxes.quantities(limits, sizes, action_name, action_unit, axes),
+        ),
         tested=True,
-        jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, made.q, sizes),
-        **found,
+        **_found(traced, cost),
     )
 
 
-def _found(traced: Trace, claims: Claims) -> dict[str, Any]:
+def _found(traced: Trace, cost: Callable[..., Any]) -> dict[str, Any]:
     """What follows from the expressions, by the names of a game's fields."""
-    owner = np.repeat(np.arange(len(traced.sizes)), traced.sizes)
-    limits = [claims.gap_bound(bound) for bound in traced.bounds]
+    from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
+
+    try:
+        made, claims = make(traced), Claims(_roots(traced))
+    except RecursionError:
+        raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
+    owner, bounds = np.repeat(np.arange(len(traced.sizes)), traced.sizes), _all(traced)
+    limits = [claims.gap_bound(bound) for bound in bounds]
     gaps = all(limit is not None for limit in limits)
-    single = gaps and all(bound.gap is not None for bound in traced.bounds)
+    single = gaps and all(bound.gap is not None for bound in bounds)
+    members = [_members(claims, bound, owner) for bound in bounds]
     costs = [_agents(claims, node, owner) for node in traced.costs]
+    affine = claims.affine(traced.costs)
     return {
+        "kernels": made.kernels,
+        "parameters": made.q,
+        "constraint_names": tuple(bound.name for bound in bounds),
         "in_cost": [[i, *(j for j in agents if j != i)] for i, agents in enumerate(costs)],
-        "in_constraint": [_members(claims, bound, owner) for bound in traced.bounds],
-        "affine": claims.affine(traced.costs),
-        "box": box(traced.bounds, claims, len(owner)),
+        "in_constraint": members,
+        "owners": _owners(bounds, members),
+        "equalities": _equalities(bounds),
+        "affine": affine,
+        "jacobian_bounds": None if affine else jacobian_bounds(made.kernels, made.q, traced.sizes),
+        "box": box(bounds, claims, len(owner)),
         "gap_bounds": np.array(limits, dtype=np.float64) if gaps else None,
         "affine_constraints": 2 * len(limits) if single else None,
-        "constraint_class": claims.constraint_class(traced.bounds),
+        "constraint_class": claims.constraint_class(bounds),
         "smooth": claims.smooth,
     }
 
 
+def _all(traced: Trace) -> list[Bound]:
+    return [*traced.bounds, *traced.boxed]
+
+
 def _roots(traced: Trace) -> list[Node]:
     gaps = [bound.gap for bound in traced.bounds if bound.gap is not None]
-    return [*traced.costs, *(bound.g for bound in traced.bounds), *gaps]
+    return [*traced.costs, *(bound.g for bound in _all(traced)), *gaps]
+
+
+def _owners(bounds: list[Bound], members: list[list[int]]) -> list[list[int]] | None:
+    """Whose constraints they are; None where all are shared."""
+    if all(bound.owners is None for bound in bounds):
+        return None
+    found = []
+    for bound, inside in zip(bounds, members, strict=True):
+        found.append(inside if bound.owners is None else list(bound.owners))
+        for i in found[-1]:
+            if i not in inside:
+                expected = (
+                    f"it is private to agent {i + 1}, counted from 1, which must appear in it"
+                )
+                raise InvalidInput("constraints", bound.name, expected)
+    return found
+
+
+def _equalities(bounds: list[Bound]) -> tuple[Equality, ...]:
+    return tuple(
+        Equality(bound.name, k, partial(_gap, node=bound.gap), bound.limit.tape.value(bound.limit))
+        for k, bound in enumerate(bounds)
+        if bound.equality and bound.gap is not None and bound.limit is not None
+    )
+
+
+def _gap(y: NDArray[np.float64], node: Node) -> NDArray[np.float64]:
+    return values([node], y)[:, 0]
 
 
 def _agents(claims: Claims, node: Node, owner: NDArray[np.int64]) -> list[int]:
@@ -128,7 +175,7 @@ def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     found: list[Quantity] = []
     taken: set[str] = set()
     for stem, bounds in families.items():
-        kinds = {"": 1, "agent": agents, "constraint": len(traced.bounds)}
+        kinds = {"": 1, "agent": agents, "constraint": len(_all(traced))}
         each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
         name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
         if each is None or name in taken or not name.isidentifier():

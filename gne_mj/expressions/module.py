@@ -76,7 +76,7 @@ def make(trace: Trace) -> Made:
     own = [range(at[i], at[i + 1]) for i in range(len(trace.sizes))]
     tables = Tables(trace.tape.q)
     costs = Part(tables, _kinds(analysis, trace.costs, own), "i")
-    nodes = [bound.g for bound in trace.bounds]
+    nodes = [bound.g for bound in [*trace.bounds, *trace.boxed]]
     most = max(trace.sizes)
     bounds = Part(tables, _kinds(analysis, nodes, [()] * len(nodes), most), "l")
     text = [

@@ -379,7 +379,7 @@ def _equal(self: Any, other: Any) -> Any:
         except (Untraceable, TypeError, ValueError):
             pass
     raise Untraceable(
-        "== of what depends on the actions: an equality has no inside; write abs(a - b) <= width"
+        "== of what depends on the actions: an equality has no inside; write band(a, b, width)"
     )
 
 

@@ -1,5 +1,6 @@
 """The table ``[systems.NAME.game]`` of a game of expressions: texts, or a file of functions."""
 
+import inspect
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -14,6 +15,12 @@ from gne_mj.games.table import GameTable
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import Fills
 from gne_mj.user_files import load_module
+
+# Bounds of actions; tables have finite numbers only
+Bounded = float | Literal["none"]
+Limit = float | list[Bounded] | list[list[Bounded]]
+# What parameters cannot be called: the function's other arguments
+_TAKEN = {*inspect.signature(game).parameters} - {"parameters"}
 
 
 @GAMES.register
@@ -32,6 +39,10 @@ class ExpressionsTable(GameTable):
     parameters: dict[str, Any] = Field({}, description="numbers of the formulas, by name")
     structure: dict[str, Any] = Field({}, description="what is no number to change: edges, lists")
     dimension: int | list[int] = Field(1, description="entries of an agent's action")
+    lower: Limit | None = Field(
+        None, description="least action: one, or one an agent or entry; 'none'"
+    )
+    upper: Limit | None = Field(None, description="greatest action, likewise")
     name: str = "own game"
     action_name: str = "action"
     action_unit: str = ""
@@ -46,6 +57,8 @@ class ExpressionsTable(GameTable):
             cost,
             constraints,
             dimension=self.dimension,
+            lower=_numbers(self.lower, -np.inf),
+            upper=_numbers(self.upper, np.inf),
             name=self.name,
             action_name=self.action_name,
             action_unit=self.action_unit,
@@ -59,21 +72,30 @@ class ExpressionsTable(GameTable):
         both = set(self.parameters) & set(self.structure)
         if both:
             raise InvalidInput("structure", min(both), "it is among the parameters too")
-        if (self.file is None) == (self.cost is None or self.constraints is None):
-            raise InvalidInput(
-                "cost", self.cost, "there must be either a file, or cost and constraints"
-            )
+        for name in sorted({*self.parameters, *self.structure} & _TAKEN):
+            raise InvalidInput("parameters", name, "that name means something else of a game")
+        boxed = self.lower is not None or self.upper is not None
+        if (self.file is None) == (self.cost is None or not (self.constraints or boxed)):
+            expected = "there must be either a file, or cost and constraints (or lower and upper)"
+            raise InvalidInput("cost", self.cost, expected)
         if self.file is None:
             known = {**self.parameters, **self.structure}
             assert self.cost is not None
-            assert self.constraints is not None
-            return cost_of(self.cost, known), constraints_of(self.constraints, known)
+            return cost_of(self.cost, known), constraints_of(self.constraints or {}, known)
         module = load_module(self.file)
         for name, arguments in (("cost", "i, y, p"), ("constraints", "y, p")):
-            if not callable(getattr(module, name, None)):
+            needed = name == "cost" or not boxed or hasattr(module, name)
+            if needed and not callable(getattr(module, name, None)):
                 raise InvalidInput("path", self.file, f"it must define {name}({arguments})")
-        return module.cost, module.constraints
+        return module.cost, getattr(module, "constraints", None)
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """There is none."""
         raise InvalidInput("action", None, "a game of expressions has no default start: give one")
+
+
+def _numbers(limit: Any, nothing: float) -> Any:
+    """A bound of a table, ``nothing`` where it is "none"."""
+    if isinstance(limit, list):
+        return [_numbers(each, nothing) for each in limit]
+    return nothing if limit == "none" else limit

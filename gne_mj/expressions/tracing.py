@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gne_mj.errors import GneError, InvalidInput, UserCodeError, nearest
+from gne_mj.expressions.boxes import Limits
+from gne_mj.expressions.declared import Band, Private
 from gne_mj.expressions.nodes import Array, Node, Relation, Tape, Untraceable, objects, words
 
 
@@ -26,6 +28,8 @@ class Bound(NamedTuple):
         g: negative inside.
         gap, limit: of one that reads |gap| <= limit: then g = (gap - limit) (gap + limit).
         sides: of another its two sides, less <= more.
+        owners: the agents whose it is, from 0; None for all in it.
+        equality: whether it is the band of one.
     """
 
     name: str
@@ -33,15 +37,18 @@ class Bound(NamedTuple):
     gap: Node | None = None
     limit: Node | None = None
     sides: tuple[Node, Node] | None = None
+    owners: tuple[int, ...] | None = None
+    equality: bool = False
 
 
 class Trace(NamedTuple):
-    """What the functions computed."""
+    """What the functions computed; ``boxed`` follows from bounds of actions."""
 
     tape: Tape
     sizes: tuple[int, ...]
     costs: list[Node]
     bounds: list[Bound]
+    boxed: list[Bound]
 
 
 class Parameters:
@@ -71,8 +78,10 @@ class Parameters:
 def trace(
     sizes: tuple[int, ...],
     cost: Callable[..., Any],
-    constraints: Callable[..., Any],
+    constraints: Callable[..., Any] | None,
     parameters: Mapping[str, Any],
+    limits: Limits,
+    names: Sequence[str],
 ) -> Trace:
     """Call both functions.
 
@@ -81,6 +90,8 @@ def trace(
         cost: ``cost(i, y, p)`` of agent i, from 0.
         constraints: ``constraints(y, p)`` gives comparisons, or pairs of a name and one.
         parameters: by name.
+        limits: bounds of actions.
+        names: of the actions.
 
     Raises:
         UserCodeError: a function raises, or does what cannot be traced; names its file and line.
@@ -90,10 +101,31 @@ def trace(
     y, p = _profile(tape, sizes), Parameters(tape, parameters)
     costs = [_called(cost, f"for agent {i + 1}", _one, tape, cost, i, y, p)
              for i in range(len(sizes))]  # fmt: skip
-    bounds = _called(constraints, "", _bounds, tape, constraints, y, p)
-    if not bounds:
+    bounds = []
+    if constraints is not None:
+        bounds = _called(constraints, "", _bounds, tape, constraints, y, p)
+    boxed = _boxed(tape, limits, names)
+    for name, times in Counter(bound.name for bound in [*bounds, *boxed]).items():
+        if times > 1:
+            raise InvalidInput("constraints", name, "each needs a name of its own")
+    if not bounds and not boxed:
         raise InvalidInput("constraints", "none", "a game has at least one constraint")
-    return Trace(tape, sizes, costs, bounds)
+    return Trace(tape, sizes, costs, bounds, boxed)
+
+
+def _boxed(tape: Tape, limits: Limits, names: Sequence[str]) -> list[Bound]:
+    """lower <= y and y <= upper, of the actions that have such a bound."""
+    found = []
+    for key, values in zip(("lower", "upper"), limits, strict=True):
+        bounded = np.flatnonzero(np.isfinite(values))
+        if not len(bounded):
+            continue
+        numbers = tape.parameter(values[bounded])
+        for a, limit in zip(bounded.tolist(), numbers, strict=True):
+            sides = (limit, tape.actions[a]) if key == "lower" else (tape.actions[a], limit)
+            g = tape.binary("-", *sides)
+            found.append(Bound(f"{key} bound of {names[a]}", g, sides=sides))
+    return found
 
 
 def _profile(tape: Tape, sizes: tuple[int, ...]) -> Any:
@@ -145,11 +177,11 @@ def _bounds(tape: Tape, function: Callable[..., Any], y: Any, p: Parameters) -> 
     given = function(y, p)
     if isinstance(given, Mapping):
         given = given.items()
-    elif isinstance(given, Relation | Array) or given is None:
+    elif isinstance(given, Relation | Array | Private | Band) or given is None:
         given = [] if given is None else [given]
     found: list[Bound] = []
     for entry in given:
-        pair = isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[0], str)
+        pair = type(entry) is tuple and len(entry) == 2 and isinstance(entry[0], str)
         name, relation = entry if pair else (f"constraint {len(found) + 1}", entry)
         found += _named(tape, name, relation)
     for name, times in Counter(bound.name for bound in found).items():
@@ -163,6 +195,16 @@ def _named(tape: Tape, name: str, relation: Any) -> Iterable[Bound]:
         many = relation.nodes.ravel()
         for k, each in enumerate(many):
             yield from _named(tape, f"{name} {k + 1}" if len(many) > 1 else name, each)
+    elif isinstance(relation, Private):
+        if isinstance(relation.relation, Private):
+            raise Untraceable(f"constraint '{name}' is private twice")
+        for bound in _named(tape, name, relation.relation):
+            yield bound._replace(owners=relation.agents)
+    elif isinstance(relation, Band):
+        for bound in _named(tape, name, relation.relation):
+            if bound.gap is None:
+                raise Untraceable(f"constraint '{name}': the width of a band is a number")
+            yield bound._replace(equality=True)
     elif isinstance(relation, Relation):
         yield from _lowered(tape, name, relation)
     elif isinstance(relation, bool | np.bool_):

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from gne_mj.errors import InvalidInput
+from gne_mj.expressions.declared import band, private
 from gne_mj.expressions.nodes import FUNCTIONS
 
 _WORDS: dict[str, Any] = {
     "abs": abs, "sum": sum, "len": len, "range": range, "pi": np.pi,
+    "band": band, "private": private,
     **{name: function for name, function in FUNCTIONS.items() if name != "abs"},
 }  # fmt: skip
 _KNOWN = (

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.controllers.settings import LINKS
+from gne_mj.controllers.settings import GUARDED, LINKS
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.loops import functions
@@ -96,6 +96,15 @@ class Assembly(SystemData):
             memory=bool(len(self.loop_memory)), others=self._others,
         )  # fmt: skip
 
+    def law_settings(self, rho: float) -> NDArray[np.float64]:
+        """The law's numbers, with what they take from the rest of the system."""
+        settings = self.law.settings(rho)
+        if strikes_messages(self.faults):
+            settings[LINKS] = len(self.memory)
+        if self.game.private:  # which others can push an agent out of
+            settings[GUARDED] = 0.0
+        return settings
+
     def setup(self, clock: Clock) -> Setup:
         """What a loop of this system is made of, besides its plant, its start and its kernels.
 
@@ -106,9 +115,7 @@ class Assembly(SystemData):
         steps.check_step(self, clock)
         mode = mode_of(self)
         mode.check_period(self, clock)
-        settings = self.law.settings(self.rho)
-        if strikes_messages(self.faults):
-            settings[LINKS] = len(self.memory)
+        settings = self.law_settings(self.rho)
         with named(period="clock.control_period"):
             propagator = self.law.propagator(clock.control_period) if mode.held else no_propagator()
         problem = Problem(

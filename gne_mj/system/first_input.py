@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.propagation import no_propagator
-from gne_mj.controllers.settings import LINKS, RHO
+from gne_mj.controllers.settings import RHO
 from gne_mj.errors import InvalidInput
-from gne_mj.faults import Saturation, strikes_messages
+from gne_mj.faults import Saturation
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import Problem, work
@@ -40,13 +40,11 @@ def law_at_start(system: System) -> Array:
 
 def problem_at_start(system: System) -> Problem:
     """What the law reads at the start, and what the division of steps does."""
-    settings = system.law.settings(system.rho if system.schedule is None else system.schedule.start)
-    if strikes_messages(system.faults):
-        settings[LINKS] = len(system.memory)
+    rho = system.rho if system.schedule is None else system.schedule.start
     return Problem(
         data=system.game.data,
         graph=system.law.graph_data,
-        settings=settings,
+        settings=system.law_settings(rho),
         limit=system.agents.input_limit,
         equilibrium=np.ascontiguousarray(system.start),  # nothing is measured from it here
         propagator=no_propagator(),

@@ -11,6 +11,20 @@ from gne_mj.theory.convexity import convex_constraints, own_convexity, strictly_
 from gne_mj.theory.gain import Gain
 
 
+def shared(system: System) -> list[Assumption]:
+    """[eq:GNE]: all constraints are shared; nothing is said of games where they are."""
+    game = system.game
+    if not game.private:
+        return []
+    names = ", ".join(f"'{game.constraint_names[k]}'" for k in game.private[:3])
+    names += ", ..." if len(game.private) > 3 else ""
+    why = (
+        f"{len(game.private)} of {game.constraints_count} constraints are private ({names}): agents"
+        " that appear in them can push others out, and no barrier that is common to all is left"
+    )
+    return [Assumption("eq:GNE", FAILS, why)]
+
+
 def costs(system: System, slopes: Slopes) -> Assumption:
     """[asmp:cost]: convex costs; convex constraints, affine or one strictly; compact, Slater.
 

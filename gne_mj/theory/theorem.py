@@ -124,6 +124,7 @@ class Theorem:
             return ()
         system, slopes = self.system, self.slopes
         found = [
+            *assumptions.shared(system),
             assumptions.costs(system, slopes),
             assumptions.pseudo_gradient(system, slopes, strong=proven.strong),
             assumptions.plants(system),

@@ -144,7 +144,7 @@ class ShownSystem:
 def shares(game: Game, values: Values) -> NDArray[np.float64]:
     """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
 
-    A quantity's bounds count for the agent or for the agents of the constraint that it is of, and
+    A quantity's bounds count for the agent or for the owners of the constraint that it is of, and
     for all agents if it is one number.
     """
     found = np.full((len(values["action"]), game.agents), np.nan)
@@ -155,8 +155,8 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
         if quantity.each != "constraint":
             found = np.fmax(found, used)  # one column each, or one for all
             continue
-        for column, members in enumerate(game.in_constraint):
-            agents = list(members)
+        for column, owners in enumerate(game.owned_by):
+            agents = list(owners)
             found[:, agents] = np.fmax(found[:, agents], used[:, column, None])
     return found
 

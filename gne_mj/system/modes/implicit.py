@@ -105,6 +105,14 @@ class Implicit(Mode):
                 "this law does not define 'barrier_free' and its derivative, which mode 'implicit'"
                 " solves with; use mode 'sampled'",
             )
+        if system.game.private:
+            name = system.game.constraint_names[system.game.private[0]]
+            raise InvalidInput(
+                "mode",
+                self.name,
+                f"constraint '{name}' is private, so that the equation which this mode solves is"
+                " not known to have a solution; use mode 'continuous' or 'sampled'",
+            )
 
     def check_faults(self, system: SystemData) -> None:
         """It predicts from the state, which sensors must tell."""
