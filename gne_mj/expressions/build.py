@@ -1,21 +1,66 @@
 """A game from two Python functions (see docs/expressions.md)."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_ACTIONS, check_count
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, nearest
 from gne_mj.expressions.claims import Claims, box, values
 from gne_mj.expressions.intervals import jacobian_bounds
 from gne_mj.expressions.nodes import Node
-from gne_mj.expressions.tracing import Bound, Fixed, Trace, sizes_of, trace
+from gne_mj.expressions.tracing import Bound, Fixed, Trace, numbers, sizes_of, trace
 from gne_mj.game_model import Game
 from gne_mj.quantity import Quantity
+
+
+class Functions(NamedTuple):
+    """What a game of expressions is made of besides its numbers.
+
+    Attributes:
+        cost, constraints: as :func:`game` has them.
+        others: parameters that are no numbers, by name.
+    """
+
+    cost: Callable[..., Any]
+    constraints: Callable[..., Any]
+    others: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExpressionGame(Game):
+    """A game of expressions, which knows what it was made of.
+
+    Attributes:
+        functions: its two functions, and what they are given besides numbers.
+        numbers: its parameters that are numbers, by name, as lists.
+        words: the other keywords of :func:`game`.
+    """
+
+    functions: Functions | None = None
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    words: Mapping[str, Any] = field(default_factory=dict)
+
+    def changed(self, **parameters: Any) -> "ExpressionGame":
+        """The same game with some of its parameters changed.
+
+        Raises:
+            InvalidInput: there is no such parameter, or it cannot have that value.
+        """
+        assert self.functions is not None
+        cost, constraints, others = self.functions
+        known = {**self.numbers, **others}
+        for name, value in parameters.items():
+            if name not in known:
+                raise InvalidInput(
+                    name, value, f"there is no such parameter; {nearest(name, known)}"
+                )
+        return game(self.agents, cost, constraints, **self.words, **{**known, **parameters})
 
 
 def fixed(value: Any) -> Fixed:
@@ -35,7 +80,7 @@ def game(
     agent_name: str = "agent",
     axes: tuple[str, ...] = (),
     **parameters: Any,
-) -> Game:
+) -> ExpressionGame:
     """The game of ``count`` agents with these costs and shared constraints.
 
     The functions are called with numbers that are not known yet: y, the actions, and p, whose
@@ -68,16 +113,24 @@ def game(
     except RecursionError:
         raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
     found = _found(traced, claims)
-    return Game(
-        name=name or "own game",
+    words = {
+        "name": name or "own game",
+        "action_name": action_name,
+        "action_unit": action_unit,
+        "agent_name": agent_name,
+        "axes": axes,
+    }
+    given = {key: numbers(value) for key, value in parameters.items()}
+    others = {key: value for key, value in parameters.items() if given[key] is None}
+    return ExpressionGame(
+        functions=Functions(cost, constraints, others),
+        numbers={key: value.tolist() for key, value in given.items() if value is not None},
+        words={"dimension": dimension, **words},
+        **words,
         kernels=made.kernels,
         parameters=made.q,
         sizes=sizes,
         constraint_names=tuple(bound.name for bound in traced.bounds),
-        action_name=action_name,
-        action_unit=action_unit,
-        agent_name=agent_name,
-        axes=axes,
         quantities=_quantities(traced, len(sizes)),
         tested=True,
         jacobian_bounds=None if found["affine"] else jacobian_bounds(made.kernels, made.q, sizes),
