@@ -132,6 +132,8 @@ _PLACES = {
     "star": "gne_mj.graph",
 }
 
+_NAMES = {"batch": "run_batch"}  # what is called otherwise in its module
+
 
 def _show_in_notebooks() -> None:
     """Where IPython runs, a trajectory is shown with its figures (see gne_mj.notebook)."""
@@ -156,9 +158,8 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        found = getattr(
-            import_module(_PLACES.get(name, "gne_mj.interface")), _NAMES.get(name, name)
-        )
+        module = import_module(_PLACES.get(name, "gne_mj.interface"))
+        found = getattr(module, _NAMES.get(name, name))
         globals()[name] = found  # looked for once
         return found
     near = "" if name.startswith("_") else _nearest(name)
@@ -170,6 +171,3 @@ def _nearest(name: str) -> str:
 
     close = get_close_matches(name, __all__, n=1)
     return f": did you mean {close[0]!r}?" if close else ""
-
-
-_NAMES = {"batch": "run_batch"}  # what is called otherwise in its module

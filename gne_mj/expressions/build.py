@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,7 +102,24 @@ def game(
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InvalidInput("count", count, "it must be a positive whole number")
-    sizes = sizes_of(int(count), dimension)
+    words = {
+        "name": name or "own game",
+        "action_name": action_name,
+        "action_unit": action_unit,
+        "agent_name": agent_name,
+        "axes": axes,
+    }
+    return _made(sizes_of(int(count), dimension), cost, constraints, parameters, words, dimension)
+
+
+def _made(
+    sizes: tuple[int, ...],
+    cost: Callable[..., Any],
+    constraints: Callable[..., Any],
+    parameters: Mapping[str, Any],
+    words: Mapping[str, Any],
+    dimension: int | Sequence[int],
+) -> ExpressionGame:
     check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
     from gne_mj.expressions.module import make  # with SymPy, 0.3 s that others need not wait for
 
@@ -113,13 +129,6 @@ def game(
     except RecursionError:
         raise InvalidInput("cost", cost, "expressions must not nest so deeply") from None
     found = _found(traced, claims)
-    words = {
-        "name": name or "own game",
-        "action_name": action_name,
-        "action_unit": action_unit,
-        "agent_name": agent_name,
-        "axes": axes,
-    }
     given = {key: numbers(value) for key, value in parameters.items()}
     others = {key: value for key, value in parameters.items() if given[key] is None}
     return ExpressionGame(
@@ -182,30 +191,43 @@ def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     taken: set[str] = set()
     for stem, bounds in families.items():
         kinds = {"": 1, "agent": agents, "constraint": len(traced.bounds)}
-        each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
+        each = next((kind for kind, size in kinds.items() if size == len(bounds)), "constraint")
         name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
-        if each is None or name in taken or not name.isidentifier():
+        if name in taken or not name.isidentifier():
             continue
         taken.add(name)
-        found.append(_quantity(name, stem or "constraint", each, bounds))
+        places = np.arange(len(bounds))
+        if each == "constraint":  # perhaps of a part of them: the others have no numbers
+            number = {id(bound): k for k, bound in enumerate(traced.bounds)}
+            places = np.array([number[id(bound)] for bound in bounds])
+        size = kinds.get(each, 1)
+        found.append(_quantity(name, stem or "constraint", each, bounds, (places, size)))
     return tuple(found)
 
 
-def _quantity(name: str, long_name: str, each: str, bounds: list[Bound]) -> Quantity:
+def _quantity(
+    name: str,
+    long_name: str,
+    each: str,
+    bounds: list[Bound],
+    at: tuple[NDArray[np.int64], int],
+) -> Quantity:
+    """What constraints bound; ``at`` has their places among so many entries."""
     nodes, lower, upper = zip(*map(_shown, bounds), strict=True)
-    entries = list(nodes)
+    entries, (places, size) = list(nodes), at
 
-    def found(y: NDArray[np.float64], one: bool) -> NDArray[np.float64]:
-        columns = values(entries, y)
-        return columns[:, 0] if one else columns
+    def placed(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        every = np.full((*columns.shape[:-1], size), np.nan)
+        every[..., places] = columns
+        return every if each else every[..., 0]
 
     limits: dict[str, Any] = {
-        key: np.array(side) if each else side[0]
+        key: placed(np.array(side, dtype=np.float64))
         for key, side in (("bound", upper), ("lower_bound", lower))
         if None not in side
     }
     return Quantity(name=f"{name}_value", long_name=long_name, unit="",
-                    values=partial(found, one=not each), each=each, **limits)  # fmt: skip
+                    values=lambda y: placed(values(entries, y)), each=each, **limits)  # fmt: skip
 
 
 def _shown(bound: Bound) -> tuple[Node, float | None, float | None]:

@@ -1,8 +1,8 @@
 """Agents as objects: one function a type that scenario files know.
 
-Numbers are one for all agents or a list with one each. ``input_limit`` is the greatest \\|u\\| that the
-actuators deliver, in the input's unit (for actions of several entries lists of lists); None for no
-limit. All raise InvalidInput, which names the key, the value and what would be right.
+Numbers are one for all agents or a list with one each. ``input_limit`` is the greatest absolute
+value that the actuators deliver (for actions of several entries lists of lists); None for no limit.
+All raise InvalidInput, which names the key, the value and what would be right.
 """
 
 from collections.abc import Mapping, Sequence

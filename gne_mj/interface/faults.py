@@ -1,7 +1,7 @@
 """What goes wrong, as objects: one function a kind of fault.
 
-``agents`` are numbered from 1, all if left out; a fault lasts from ``start`` to ``end`` in s, to the
-run's end if that is None. ``edges`` are pairs of agents.
+``agents`` are numbered from 1, all if left out; a fault lasts from ``start`` to ``end`` in s, to
+the run's end if that is None. ``edges`` are pairs of agents.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def push(
 def saturation(
     limit: float, *, agents: Agents = None, start: float = 0.0, end: float | None = None
 ) -> FaultTable:
-    """Actuators that deliver no more than \\|u\\| = limit meanwhile."""
+    """Actuators that deliver no more than the limit, in absolute value, meanwhile."""
     return made(tables.SaturationTable, type="saturation", **locals())
 
 

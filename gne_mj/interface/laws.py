@@ -1,8 +1,8 @@
 """Laws as objects: one function an information structure.
 
-``mode`` is "continuous", "sampled" or "implicit", and ``decentralised`` for the last one: each agent
-keeps to its share of every bound's slack. A ``graph`` is a :class:`gne_mj.Graph`, the name of one
-(then of as many agents as the game has), or edges as pairs of agents numbered from 1.
+``mode`` is "continuous", "sampled" or "implicit", and ``decentralised`` for the last one: each
+agent keeps to its share of every bound's slack. A ``graph`` is a :class:`gne_mj.Graph`, the name of
+one (then of as many agents as the game has), or edges as pairs of agents numbered from 1.
 """
 
 from collections.abc import Callable, Sequence

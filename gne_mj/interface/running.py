@@ -80,7 +80,7 @@ def setup(
         engine: "ode" or "mujoco".
         integrator: "rk4" or "euler"; "rosenbrock" is a change of ``plant.integrator``.
         faults: what goes wrong.
-        tolerance: on max \\|y - y*\\|, for the status ``converged``.
+        tolerance: on the greatest distance to y*, for the status ``converged``.
         seed: of what is random in faults.
 
     Raises:

@@ -1,7 +1,7 @@
 """Figures and replays of runs."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -25,6 +25,9 @@ class Figures(dict[str, "Figure"]):
 
     >>> gne_mj.run("velocity-sync").plot()["robots-gaps"].savefig("gaps.pdf")
     """
+
+    def __init__(self, figures: "Mapping[str, Figure]") -> None:
+        super().__init__(figures)
 
     def __repr__(self) -> str:
         return f"<Figures: {', '.join(self) or 'none'}>"

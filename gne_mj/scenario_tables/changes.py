@@ -19,6 +19,8 @@ from gne_mj.scenario_tables.scenario import Scenario, SystemTable
 from gne_mj.system import System
 from gne_mj.toml_table import Table, union_tags
 
+_STAYS = "it stays as it is while a simulation goes on; games, barriers and controllers may change"
+
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """The same scenario with some values changed, see :func:`gne_mj.load_scenario`."""
@@ -41,7 +43,7 @@ def changed_systems(
     """
     for name in Scenario.model_fields:
         if name != "systems" and getattr(before, name) != getattr(after, name):
-            raise InvalidInput(name, "another value", "of a simulation that goes on it stays")
+            raise InvalidInput(name, "another value", _STAYS)
     found = []
     for name, table in after.systems.items():
         old = before.systems[name]
@@ -52,7 +54,7 @@ def changed_systems(
                 raise InvalidInput(
                     f"systems.{name}.{part}",
                     "another value",
-                    "of a simulation that goes on it stays",
+                    _STAYS,
                 )
         if table != old:
             found.append(table.build(name, after.simulation, present[name]))
