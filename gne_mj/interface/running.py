@@ -21,7 +21,7 @@ from gne_mj.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray
 
-    from gne_mj.interface.show import Figures
+    from gne_mj.interface.show import Figures, Replay
     from gne_mj.viewer import Server
 
 # Which key of a scenario each part fills
@@ -147,6 +147,12 @@ class Run(Trajectory):
         from gne_mj.interface.show import view
 
         return view(self, title, port=port)
+
+    def replay(self) -> "Replay":
+        """The replay, for a notebook to show inline: some two megabytes each time."""
+        from gne_mj.interface.show import Replay
+
+        return Replay(self)
 
 
 def run(

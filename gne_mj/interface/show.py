@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from gne_mj.files import storing
 from gne_mj.interface.running import run_scenario
+from gne_mj.notebook import replay_html
 from gne_mj.scenario import Source, load_scenario
 from gne_mj.trajectory import Trajectory
 
@@ -43,6 +44,23 @@ def _png(figure: "Figure") -> str:
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=DPI)
     return b64encode(stream.getvalue()).decode("ascii")
+
+
+class Replay:
+    """A trajectory's replay, which a notebook shows inline and keeps.
+
+    Args:
+        trajectory: of a scenario, which it holds.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+
+    def __repr__(self) -> str:
+        return f"<Replay of {self.trajectory!r}>"
+
+    def _repr_html_(self) -> str:
+        return replay_html(self.trajectory)
 
 
 def plot(
