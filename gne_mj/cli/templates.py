@@ -95,7 +95,7 @@ gain = 1.0
 time_constant = 0.5             # s
 """
 
-_ROBOT = """<!-- NAME: one robot of a fleet. y_i is a joint's velocity, u_i the force of a motor. -->
+_ROBOT = """<!-- NAME: one of a fleet. y_i is a joint's velocity, u_i the force of a motor. -->
 <mujoco model="NAME">
   <option gravity="0 0 -9.81"/>
   <default>
