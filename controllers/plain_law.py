@@ -53,6 +53,10 @@ class PlainLaw(Law):
         self.propagates = memory is None
         self._kept: list[Any] = []
 
+    def __repr__(self) -> str:
+        memory = "without a memory" if self._memory is None else "with a memory"
+        return f"<PlainLaw of {_name(self._action)}, {memory}>"
+
     @property
     def kernels(self) -> ModuleType:
         """This module."""
@@ -98,6 +102,10 @@ class PlainLaw(Law):
                 self._memory, f"it must return one row of numbers, not shape {memory.shape}"
             )
         return memory.copy()
+
+
+def _name(function: Callable[..., Any]) -> str:
+    return str(getattr(getattr(function, "func", function), "__name__", function))
 
 
 def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:

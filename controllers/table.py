@@ -29,7 +29,7 @@ class NetworkTable(LawTable):
     """A law over a communication graph."""
 
     graph: Annotated[
-        Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]],
+        Literal["line", "ring", "star", "complete", "printed", "caption"] | list[tuple[int, int]],
         Fills("edges"),
     ] = Field("ring", description="a name, or edges as pairs of agents numbered from 1")
 

@@ -1,4 +1,10 @@
-"""Robots that seek a generalized Nash equilibrium and never leave their shared constraint set."""
+"""Robots that seek a generalized Nash equilibrium and never leave their shared constraint set.
+
+>>> import gne_mj as gm
+>>> game = gm.game(6, cost, constraints, budget=30.0)  # two functions, as on paper
+>>> run = gm.run(game, agents=gm.flexible_robots(6), law=gm.partial_information("ring"), rho=0.02)
+>>> run.plot(); print(gm.certify(run)); print(gm.solve(game))
+"""
 
 import sys
 from importlib import import_module
@@ -6,41 +12,135 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gne_mj.batches import open_batch, run_batch
+    from gne_mj.batches import open_batch
+    from gne_mj.batches import run_batch as batch
     from gne_mj.environment import load_environment
+    from gne_mj.expressions import band, fixed, game, private
+    from gne_mj.game_model import Game
+    from gne_mj.graph import Graph, complete, line, ring, star
+    from gne_mj.interface import (
+        Comparison,
+        Figures,
+        Run,
+        bias,
+        certify,
+        check,
+        compare,
+        custom_agents,
+        estimate_corruption,
+        flexible_robots,
+        full_information,
+        fully_distributed,
+        integrators,
+        message_delay,
+        message_loss,
+        mixed_agents,
+        mjcf_robots,
+        noise,
+        own_law,
+        partial_information,
+        pi_cascades,
+        planar_robots,
+        plot,
+        push,
+        run,
+        saturation,
+        sensor_delay,
+        setup,
+        silence,
+        solve,
+        view,
+    )
     from gne_mj.scenario import Scenario, load_scenario
     from gne_mj.simulation import Simulation
+    from gne_mj.system import Clock, System
     from gne_mj.trajectory import Trajectory
 
 __version__ = version("gne-mj")
 
-# Imported at first use, so that the command line answers at once.
-_LAZY = {
+__all__ = [
+    "Clock",
+    "Comparison",
+    "Figures",
+    "Game",
+    "Graph",
+    "Run",
+    "Scenario",
+    "Simulation",
+    "System",
+    "Trajectory",
+    "__version__",
+    "band",
+    "batch",
+    "bias",
+    "certify",
+    "check",
+    "compare",
+    "complete",
+    "custom_agents",
+    "estimate_corruption",
+    "fixed",
+    "flexible_robots",
+    "full_information",
+    "fully_distributed",
+    "game",
+    "integrators",
+    "line",
+    "load_environment",
+    "load_scenario",
+    "message_delay",
+    "message_loss",
+    "mixed_agents",
+    "mjcf_robots",
+    "noise",
+    "open_batch",
+    "own_law",
+    "partial_information",
+    "pi_cascades",
+    "planar_robots",
+    "plot",
+    "private",
+    "push",
+    "ring",
+    "run",
+    "saturation",
+    "sensor_delay",
+    "setup",
+    "silence",
+    "solve",
+    "star",
+    "view",
+]
+
+# Imported at first use, so that the command line answers at once; what is not here is in
+# gne_mj.interface.
+_PLACES = {
+    "Clock": "gne_mj.system",
+    "Game": "gne_mj.game_model",
+    "Graph": "gne_mj.graph",
     "Scenario": "gne_mj.scenario",
     "Simulation": "gne_mj.simulation",
+    "System": "gne_mj.system",
     "Trajectory": "gne_mj.trajectory",
+    "band": "gne_mj.expressions",
+    "batch": "gne_mj.batches",
+    "complete": "gne_mj.graph",
+    "fixed": "gne_mj.expressions",
+    "game": "gne_mj.expressions",
+    "line": "gne_mj.graph",
     "load_environment": "gne_mj.environment",
     "load_scenario": "gne_mj.scenario",
     "open_batch": "gne_mj.batches",
-    "run": "gne_mj.scenario",
-    "run_batch": "gne_mj.batches",
+    "private": "gne_mj.expressions",
+    "ring": "gne_mj.graph",
+    "star": "gne_mj.graph",
 }
 
-__all__ = [
-    "Scenario",
-    "Simulation",
-    "Trajectory",
-    "__version__",
-    "load_environment",
-    "load_scenario",
-    "open_batch",
-    "run",
-    "run_batch",
-]
+_NAMES = {"batch": "run_batch"}  # what is called otherwise in its module
 
 
 def _show_in_notebooks() -> None:
-    """Where IPython runs, a trajectory is shown with its replay (see gne_mj.notebook)."""
+    """Where IPython runs, a trajectory is shown with its figures (see gne_mj.notebook)."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if shell is not None:
         html = shell.display_formatter.formatters["text/html"]
@@ -56,7 +156,22 @@ def _notebook_html(trajectory: "Trajectory") -> str:
 _show_in_notebooks()
 
 
+def __dir__() -> list[str]:
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]
+
+
 def __getattr__(name: str) -> Any:
-    if name in _LAZY:
-        return getattr(import_module(_LAZY[name]), name)
-    raise AttributeError(f"module 'gne_mj' has no attribute {name!r}")
+    if name in __all__:
+        module = import_module(_PLACES.get(name, "gne_mj.interface"))
+        found = getattr(module, _NAMES.get(name, name))
+        globals()[name] = found  # looked for once
+        return found
+    near = "" if name.startswith("_") else _nearest(name)
+    raise AttributeError(f"module 'gne_mj' has no attribute {name!r}{near}")
+
+
+def _nearest(name: str) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, __all__, n=1)
+    return f": did you mean {close[0]!r}?" if close else ""

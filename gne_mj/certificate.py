@@ -30,7 +30,8 @@ class Certificate:
 
     Attributes:
         status: one of the statuses of the README, with its sentence in ``message``.
-        worst_constraint: the least margin -g over all constraints and integration steps.
+        worst_constraint: the least margin -g over all constraints and integration steps, and
+            ``each`` constraint's own.
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
         equilibrium: penalised and variational, and how far from them the run ended.
         epsilon: what agents could gain at the penalised equilibrium, against
@@ -298,6 +299,7 @@ def _worst_constraint(system: System, monitor: Any) -> dict[str, Any] | None:
         "name": system.game.constraint_names[index],
         "index": index + 1,
         "margin": float(-worst[index]),
+        "each": [float(-value) if np.isfinite(value) else None for value in worst],
         "time": float(when[index]),
     }
 

@@ -55,6 +55,13 @@ class Equilibrium:
     complementarity: float
     iterations: int
 
+    def __repr__(self) -> str:
+        with np.printoptions(precision=5, threshold=12):
+            return (
+                f"<Equilibrium at rho = {self.rho:g}: y = {self.action},"
+                f" residual {self.residual:.1e}>"
+            )
+
 
 # A profile strictly inside, shape (m,), or an equilibrium whose multipliers help as well
 Start = ArrayLike | Equilibrium

@@ -164,6 +164,16 @@ class Game:
             object.__setattr__(self, "parameters", addresses)
             object.__setattr__(self, "_kept", kept)
 
+    def __repr__(self) -> str:
+        """One line: name, sizes, what is known of it."""
+        each = f" of {self.sizes[0]} entries" if max(self.sizes) > 1 else ""
+        known = [f"{self.constraint_class} constraints"] * (self.constraint_class is not None)
+        known += ["affine F"] * self.affine
+        return (
+            f"<Game {self.name!r}: {self.agents} agents, {self.actions} actions{each},"
+            f" {', '.join([f'{self.constraints_count} constraints', *known])}>"
+        )
+
     def _check(self) -> None:
         count = len(self.sizes)
         if not count or any(size < 1 for size in self.sizes):

@@ -1,6 +1,7 @@
 """Who hears whom: undirected communication graphs (paper, section II-C)."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
@@ -61,6 +62,19 @@ class Graph:
                 f"the graph must be connected; agent 1 cannot reach"
                 f" agent{'s' if len(apart) > 1 else ''} {shown}",
             )
+
+    def __repr__(self) -> str:
+        connectivity = f", lambda_2 = {self.algebraic_connectivity:.4g}" * (self.agents <= _DENSE)
+        return f"<Graph of {self.agents} agents, {len(self.edges)} edges{connectivity}>"
+
+    @property
+    def name(self) -> str | None:
+        """What scenario files call it; None if it is none of those that have names."""
+        for name, made in NAMED.items():
+            with suppress(InvalidInput):  # not of so many agents
+                if made(self.agents).edges == self.edges:
+                    return name
+        return None
 
     @cached_property
     def adjacency(self) -> csr_array:
@@ -129,6 +143,11 @@ def ring(agents: int) -> Graph:
     return Graph(agents, line(agents).edges + closing)
 
 
+def star(agents: int) -> Graph:
+    """Agent 1 hears all others, who hear it alone."""
+    return Graph(agents, tuple((0, i) for i in range(1, agents)))
+
+
 def complete(agents: int) -> Graph:
     """Everyone hears everyone: up to 1,000 agents."""
     check_count("agents", agents * (agents - 1) // 2, MOST_EDGES, "the edges of a complete graph")
@@ -165,6 +184,7 @@ def _ten_channels(name: str, edges: Sequence[tuple[int, int]], agents: int) -> G
 NAMED = {
     "line": line,
     "ring": ring,
+    "star": star,
     "complete": complete,
     "printed": printed,
     "caption": caption,

@@ -1,36 +1,61 @@
-"""A trajectory in a notebook: its replay inline, and a table of what it shows."""
+"""A trajectory in a notebook: a table of what it shows, and its figures."""
 
+from base64 import b64encode
 from html import escape
+from io import BytesIO
 
 from gne_mj.errors import GneError
+from gne_mj.extras import need
 from gne_mj.summary import summary
 from gne_mj.trajectory import Trajectory
 
-HEIGHT = 560  # pixels of the replay
+HEIGHT = 560  # pixels of a replay
+DPI = 64  # of the figures
 
 
 def notebook_html(trajectory: Trajectory) -> str:
-    """What IPython shows of a trajectory: a table for each system and, below, the replay.
+    """What IPython shows of a trajectory: a table for each system, and its figures.
 
-    All of it is in the notebook: it needs no server, and still works in one that was sent on. Where
-    there is no scenario to draw robots from, their files are gone, or the extra "view" is not
-    installed, a sentence says so.
+    Some tens of kilobytes: a replay, which has the page's whole code, is shown where it is asked
+    for (:func:`replay_html`). Where figures cannot be drawn a sentence says so.
     """
     tables = "".join(_table(name, report) for name, report in trajectory.reports.items())
     found = f'<div style="display:flex;flex-wrap:wrap;gap:2em">{tables}</div>'
     try:
-        from gne_mj.viewer import html_page
-
-        page = escape(html_page(trajectory), quote=True)
+        need("plots", "drawing figures")
     except GneError as error:
-        found += f"<p>There is no replay: {escape(str(error))}</p>"
-    else:
-        found += (
-            f'<iframe title="replay" sandbox="allow-scripts" srcdoc="{page}"'
-            f' style="width:100%;height:{HEIGHT}px;border:1px solid #8888;margin-top:1em">'
-            "</iframe>"
-        )
+        return found + f"<p>There are no figures: {escape(str(error))}</p>"
+    return found + _figures(trajectory)
+
+
+def _figures(trajectory: Trajectory) -> str:
+    from gne_mj import plots
+    from gne_mj.plots.style import pyplot
+
+    found = ""
+    for name, figure in plots.draw(trajectory).items():
+        stream = BytesIO()
+        figure.savefig(stream, format="png", dpi=DPI)
+        pyplot().close(figure)
+        data = b64encode(stream.getvalue()).decode("ascii")
+        found += f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
     return found
+
+
+def replay_html(trajectory: Trajectory) -> str:
+    """The replay inline. It needs no server, and still works in a notebook that was sent on.
+
+    Raises:
+        GneError: there is no scenario to draw robots from, their files are gone, or the extra
+            "view" is not installed.
+    """
+    from gne_mj.viewer import html_page
+
+    page = escape(html_page(trajectory), quote=True)
+    return (
+        f'<iframe title="replay" sandbox="allow-scripts" srcdoc="{page}"'
+        f' style="width:100%;height:{HEIGHT}px;border:1px solid #8888"></iframe>'
+    )
 
 
 def _table(name: str, report: dict[str, object]) -> str:

@@ -6,7 +6,7 @@ import time as real_time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from gne_mj.bounds import MOST_RECORDED, check_room
 from gne_mj.certificate import Certificate, certify_run
 from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import Samples
+from gne_mj.loops.base import Present, Samples
 from gne_mj.plain import raise_pending
 from gne_mj.run_metrics import check_numbers
 from gne_mj.system import Clock, System
@@ -24,6 +24,18 @@ from gne_mj.variables import Rows, Variable, changed, check_names, declared
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
 _CHUNK, _FIRST = 0.1, 10_000
+
+
+class Remade(Protocol):
+    """How a scenario's systems come of its keys: given changes, and where each system is.
+
+    Returns the systems that are otherwise then, and what remakes them further.
+    """
+
+    def __call__(
+        self, changes: Mapping[str, Any], present: Mapping[str, Present]
+    ) -> "tuple[Sequence[System], Remade]":
+        """See the class."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +68,7 @@ class Simulation:
         tolerance: on max |y - y*| for the status ``converged``.
         seed: kept with the results; systems have their own, of what is random in their faults.
         source: the scenario as JSON, kept with the results.
+        remade: systems with changes of a scenario's keys, see :class:`Remade`.
 
     Attributes:
         interventions: what :meth:`change` and :meth:`push` did, each with its "time" in s, its
@@ -74,6 +87,7 @@ class Simulation:
         tolerance: float = 1e-3,
         seed: int = 0,
         source: str = "",
+        remade: "Remade | None" = None,
     ) -> None:
         names = [system.name for system in systems]
         if len(set(names)) != len(names) or not names:
@@ -84,11 +98,18 @@ class Simulation:
                 check_names(system, declared(system))
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
+        self._remade = remade
         self.interventions: list[dict[str, Any]] = []
         self._runs: dict[str, SystemRun] = {}
         for system in systems:
             with part_of(f"systems.{system.name}", "clock"):
                 self._runs[system.name] = SystemRun(system, clock)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Simulation of {', '.join(self._runs)}: {self.time:.6g} of"
+            f" {self.clock.duration:g} s{', ended' * self.ended}>"
+        )
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -124,18 +145,36 @@ class Simulation:
         for run in self._runs.values():
             run.advance(steps)
 
-    def change(self, system: System, what: str, **about: Any) -> None:
-        """Go on with other numbers in one of the systems, as of the next step.
+    def change(self, changes: System | Mapping[str, Any], what: str = "", **about: Any) -> None:
+        """Go on with other numbers, as of the next step.
+
+        >>> simulation.change({"barrier.rho": 0.02})
 
         Args:
-            system: of the same name, game, law, agents and engine; its start is not used.
-            what: the change in words, kept with the results.
+            changes: dotted keys of the scenario's games, barriers and controllers to new values;
+                or a system of the same name, game, law, agents and engine, whose start is not used.
+            what: the change in words, kept with the results; the keys and values if left out.
             about: what else to keep of it, as JSON has it. A later one of the same time, system and
                 "key" takes its place.
 
         Raises:
-            InvalidInput: a step that the new numbers do not allow; nothing has changed then.
+            InvalidInput: a key that there is not, or a step that the new numbers do not allow.
+            InfeasibleStart: the present outputs are not inside with the new numbers. Of several
+                systems those before the refused one have changed, else nothing has.
         """
+        if isinstance(changes, System):
+            self._change(changes, what, about)
+            return
+        if self._remade is None:
+            raise InvalidInput("changes", changes, "only a scenario's simulation knows its keys")
+        words = what or ", ".join(f"{key} = {value!r}" for key, value in changes.items())
+        present = {name: run.loop.present() for name, run in self._runs.items()}
+        systems, remade = self._remade(changes, present)
+        for system in systems:
+            self._change(system, words, about)
+        self._remade = remade
+
+    def _change(self, system: System, what: str, about: Mapping[str, Any]) -> None:
         with part_of("system", "clock"):
             self._runs[system.name].change(system)
         self._note(system.name, what, about)

@@ -68,6 +68,20 @@ class Solution:
     optimality: Optimality
     path: tuple[Measured, ...]
 
+    def __repr__(self) -> str:
+        """Two lines; ``print`` shows all (:func:`summary`)."""
+        what = "variational GNE" if self.holds else "stationary profile, and no equilibrium"
+        active = len(self.optimality.active)
+        return (
+            f"<Solution of {self.game.name}, {self.game.agents} agents: {what}"
+            f" {_listed(self.variational.action)},\n {active} of {self.game.constraints_count}"
+            f" constraints active; penalised at rho ="
+            f" {', '.join(f'{point.equilibrium.rho:g}' for point in self.penalised)}>"
+        )
+
+    def __str__(self) -> str:
+        return "\n".join(summary(self))
+
     @property
     def deviating(self) -> tuple[int, ...]:
         """The agents, from 0, for whom the profile in the variational GNE's place is no minimum.

@@ -58,6 +58,11 @@ class Table(BaseModel):
                     )
         return values
 
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What was given, for one short line."""
+        given = self.model_fields_set
+        return ((key, value) for key, value in super().__repr_args__() if key in given)
+
     def key_of(self, parameter: str) -> str:
         """The dotted key in this table that filled a parameter; of a part of one what is known."""
         parts = parameter.split(".")

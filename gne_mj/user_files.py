@@ -14,14 +14,13 @@ import importlib.util
 import re
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.bounds import read_file
@@ -90,14 +89,34 @@ def load_law(
         return law
     if not callable(getattr(module, "action", None)):
         raise InvalidInput("path", str(path), "it must define law(game, graph, ...) or action(...)")
-    functions = {}
-    for name, arguments in _LAW_FUNCTIONS.items():
-        if hasattr(module, name):
-            function = getattr(module, name)
-            check_arguments("path", Path(path).name, function, name, arguments, parameters)
-            functions[name] = partial(function, **parameters)
+    functions = {name: getattr(module, name) for name in _LAW_FUNCTIONS if hasattr(module, name)}
     with named(rate="path"):
-        return PlainLaw(game, memory=functions.pop("initial_memory", None), **functions)
+        return plain_law(game, functions, parameters, "path", Path(path).name)
+
+
+def plain_law(
+    game: Game,
+    functions: Mapping[str, Callable[..., Any]],
+    parameters: Mapping[str, Any],
+    key: str,
+    name: str,
+) -> PlainLaw:
+    """The law of plain functions: ``action`` and, with a memory, ``rate`` and ``initial_memory``.
+
+    Args:
+        game: what is played.
+        functions: by these names.
+        parameters: which all of them take by name, besides their own arguments.
+        key, name: what messages call where they are from, and its name there.
+
+    Raises:
+        InvalidInput: one takes other arguments, or ``rate`` is without ``initial_memory``.
+    """
+    made = {}
+    for each, function in functions.items():
+        check_arguments(key, name, function, each, _LAW_FUNCTIONS[each], parameters)
+        made[each] = partial(function, **parameters)
+    return PlainLaw(game, memory=made.pop("initial_memory", None), **made)
 
 
 def load_agent_type(path: str | Path) -> ModuleType:
@@ -192,7 +211,6 @@ def load_module(path: str | Path) -> ModuleType:
 class CustomGame(GameTable):
     """A game of the user's own."""
 
-    has_default_start: ClassVar[bool] = False
     type: Literal["custom"]
     file: Annotated[str, Fills("path")] = Field(
         description="Python file that defines game(count, ...)"
@@ -202,10 +220,6 @@ class CustomGame(GameTable):
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
         return load_game(self.file, count, self.parameters)
-
-    def default_start(self, count: int) -> NDArray[np.float64]:
-        """There is none."""
-        raise InvalidInput("action", None, "a custom game has no default start: give one")
 
 
 @LAWS.register

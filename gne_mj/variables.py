@@ -333,10 +333,6 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
         unit=_state_units, page="behind", batch=False,  # whose rows have its components
     ),
     Variable(
-        "constraint", ("time", "constraint"), lambda rows: rows.system.game.constraints(rows.y),
-        long_name="g(y), negative inside the set", page="behind",
-    ),
-    Variable(
         "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
         unit=_action_unit, long_name="y*", batch=False,
         runs=(
@@ -349,6 +345,12 @@ SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
     ),
     _states,
     _quantities,
+    Variable(
+        "constraint", ("time", "constraint"), lambda rows: rows.system.game.constraints(rows.y),
+        long_name="constraint, negative inside the set", symbol="g_l",
+        bounds=lambda system: {"constraint_bound": np.zeros(system.game.constraints_count)},
+        figure=True, page="line",
+    ),
     _memory,
     Variable(
         "measurement", ("time", AXIS), lambda rows: rows.samples.measurement, there=_is_faulty,

@@ -147,7 +147,7 @@ def test_plot_draws_into_the_runs_folder(finished):
     done = gne_here("plot", folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert {path.name for path in folder.glob("*.png")} == {
-        "robots-velocities.png", "robots-gaps.png",
+        "robots-velocities.png", "robots-gaps.png", "robots-constraints.png",
     }  # fmt: skip
 
 

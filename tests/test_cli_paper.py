@@ -15,7 +15,10 @@ from commands import gne, gne_here, running
 import gne_mj
 from gne_mj.simulation import Simulation
 
-FIGURES = {"robots-velocities", "robots-gaps", "channels-powers", "channels-total-power"}
+FIGURES = {
+    *("robots-velocities", "robots-gaps", "robots-constraints"),
+    *("channels-powers", "channels-total-power", "channels-constraints"),
+}
 SHORT = ("--set", "simulation.duration=0.2")
 
 
@@ -26,7 +29,7 @@ def drawn(tmp_path_factory):
     return folder, gne("paper", *SHORT, "--out", folder)
 
 
-def test_paper_draws_its_four_figures(drawn):
+def test_paper_draws_its_four_figures_and_all_constraints(drawn):
     folder, done = drawn
     assert (done.returncode, done.stderr) == (0, "")
     assert {path.stem for path in folder.glob("*.png")} == FIGURES

@@ -292,7 +292,7 @@ def test_a_batch_keeps_its_runs_where_forces_were_left_out(tmp_path, monkeypatch
         self.data.warning[min(LOST)].number = int(len(count) == 3)
 
     monkeypatch.setattr(MujocoPlant, "reset", warned)
-    found = gne_mj.run_batch(
+    found = gne_mj.batch(
         "velocity-sync", out=tmp_path / "b", changes={"simulation.duration": 0.1}, runs=4, threads=1
     )
     status = found["status"].to_numpy().tolist()

@@ -192,8 +192,8 @@ def test_of_a_batch(options, key, tmp_path):
     key = {"starts": "runs", "sweeps": "sweep"}.get(key, key)
     options = {{"starts": "runs"}.get(name, name): given for name, given in options.items()}
     options = {"sweep": {"simulation.seed": [1, 2]}} if "sweeps" in options else options
-    assert refused(gne_mj.run_batch, "velocity-sync", out=tmp_path / "a", **options).key == key
-    assert key in parameters(gne_mj.run_batch)
+    assert refused(gne_mj.batch, "velocity-sync", out=tmp_path / "a", **options).key == key
+    assert key in parameters(gne_mj.batch)
 
 
 def test_of_a_file_that_is_gone(tmp_path):
@@ -221,7 +221,7 @@ def test_of_a_batchs_folder(tmp_path):
     assert refused(Store.open, tmp_path).key == "folder"
     store = Store.create(tmp_path / "a", plan)
     assert refused(execute, store, threads=-1).key == "threads"
-    error = refused(gne_mj.run_batch, "velocity-sync", {"barrier.rho": [1.0, 1.0]}, out=tmp_path)
+    error = refused(gne_mj.batch, "velocity-sync", {"barrier.rho": [1.0, 1.0]}, out=tmp_path)
     assert error.key == "sweep.barrier.rho"
 
 

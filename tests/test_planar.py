@@ -288,7 +288,7 @@ def test_its_dataset_says_whose_and_along_which_axis(shipped):
 
 def test_its_figures(shipped, tmp_path):
     figures = plots.draw(shipped)
-    assert set(figures) == {"robots-velocities", "robots-gaps"}
+    assert set(figures) == {"robots-velocities", "robots-gaps", "robots-constraints"}
     panels = figures["robots-velocities"].axes
     assert [panel.get_ylabel() for panel in panels] == [
         f"velocity $y_{{i,{axis}}}$ (m/s)" for axis in "xy"
@@ -403,7 +403,7 @@ def test_other_agents_have_as_many_channels_as_the_action_has_entries(kind):
     assert data["axis"].to_numpy().tolist() == ["x", "y", "z"] * 3
     assert data["input"].attrs["units"] == "m/s/s"
     assert ("integral" in data) == (kind == "pi-cascade")
-    assert json.loads(data.attrs["quantities"]) == ["gap"]
+    assert json.loads(data.attrs["quantities"]) == ["gap", "constraint"]
     assert len(plots.draw(done)["points-velocities"].axes) == 3
 
 

@@ -82,7 +82,8 @@ def test_all_are_recorded(trajectory, tmp_path):
 def test_all_are_drawn(trajectory):
     figures = plots.draw(trajectory)
     assert set(figures) == {
-        "points-places", "points-squared-length", "points-shares", "points-slacks"
+        "points-places", "points-squared-length", "points-shares", "points-slacks",
+        "points-constraints",
     }  # fmt: skip
     first, second = figures["points-places"].axes
     assert (len(first.get_lines()), len(second.get_lines())) == (3, 1)
@@ -144,7 +145,9 @@ def test_a_file_of_ones_own_with_actions_of_unequal_sizes(tmp_path):
     assert built.systems[0].agents.input_limit.tolist() == [9, 8, 7, 6]
     done = built.run()
     assert np.array_equal(done["points"]["action"], simulate(game(LENGTH))["points"]["action"])
-    assert set(plots.draw(done)) == {"points-places", "points-squared-length"}
+    assert set(plots.draw(done)) == {
+        "points-places", "points-squared-length", "points-constraints",
+    }  # fmt: skip
     for wrong in ([0.5, -0.4, 0.3, 0.2], [[0.5], [-0.4, 0.3], [0.2]], [[0.5, -0.4], [0.3]]):
         tables["systems"]["points"]["initial"]["action"] = wrong
         with pytest.raises(InvalidInput, match=r"initial\.action: .* a list of 3 lists"):

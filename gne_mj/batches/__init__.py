@@ -51,7 +51,7 @@ def run_batch(
 
     >>> import gne_mj
     >>> sweep = {"barrier.rho": [0.01, 0.1, 1]}
-    >>> runs = gne_mj.run_batch("velocity-sync", sweep, runs=100, out="results/rho")
+    >>> runs = gne_mj.batch("velocity-sync", sweep, runs=100, out="results/rho")
 
     Args:
         source, changes: see :func:`gne_mj.load_scenario`.

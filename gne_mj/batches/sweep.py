@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.errors import InvalidInput
-from gne_mj.scenario import parse_value
+from gne_mj.scenario import parse_value, plain
 
 _NUMBER = r"[-+0-9.eE_]+"
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):([0-9]+)(log)?")
@@ -39,7 +39,7 @@ class Sweep:
         given: Any = self.values
         if isinstance(given, str | bytes) or not isinstance(given, Iterable):
             raise InvalidInput("values", given, "its values must be a list")
-        values = tuple(_plain(value) for value in given)
+        values = tuple(_plain(plain(value)) for value in given)
         if not values:
             raise InvalidInput("values", "nothing", "it needs at least one value")
         if len(values) > MOST:
@@ -80,8 +80,6 @@ def parse_sweep(text: str) -> Sweep:
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
     if isinstance(value, Mapping):

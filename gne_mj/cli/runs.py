@@ -71,7 +71,7 @@ def paper(
     ] = Path("results/paper"),
     as_json: JSON = False,
 ) -> None:
-    """Run the paper's two experiments beside each other; draw its four figures and a replay.
+    """Run the paper's two experiments beside each other; draw their figures and a replay.
 
     Results of an earlier `paper` in the same folder are replaced; other files there stay.
     """

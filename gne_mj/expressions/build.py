@@ -1,23 +1,68 @@
 """A game from two Python functions (see docs/expressions.md)."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.equality import Equality
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, nearest
 from gne_mj.expressions import boxes
 from gne_mj.expressions.claims import Claims, box, values
 from gne_mj.expressions.intervals import jacobian_bounds
 from gne_mj.expressions.nodes import Node
-from gne_mj.expressions.tracing import Bound, Fixed, Trace, sizes_of, trace
+from gne_mj.expressions.tracing import Bound, Fixed, Trace, numbers, sizes_of, trace
 from gne_mj.game_model import Game
 from gne_mj.quantity import Quantity
+
+
+class Functions(NamedTuple):
+    """What a game of expressions is made of besides its numbers.
+
+    Attributes:
+        cost, constraints: as :func:`game` has them.
+        others: parameters that are no numbers, by name.
+    """
+
+    cost: Callable[..., Any]
+    constraints: Callable[..., Any] | None
+    others: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExpressionGame(Game):
+    """A game of expressions, which knows what it was made of.
+
+    Attributes:
+        functions: its two functions, and what they are given besides numbers.
+        numbers: its parameters that are numbers, by name, as lists.
+        words: the other keywords of :func:`game`.
+    """
+
+    functions: Functions | None = None
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    words: Mapping[str, Any] = field(default_factory=dict)
+
+    def changed(self, **parameters: Any) -> "ExpressionGame":
+        """The same game with some of its parameters changed.
+
+        Raises:
+            InvalidInput: there is no such parameter, or it cannot have that value.
+        """
+        assert self.functions is not None
+        cost, constraints, others = self.functions
+        known = {**self.numbers, **others}
+        for name, value in parameters.items():
+            if name not in known:
+                raise InvalidInput(
+                    name, value, f"there is no such parameter; {nearest(name, known)}"
+                )
+        return game(self.agents, cost, constraints, **self.words, **{**known, **parameters})
 
 
 def fixed(value: Any) -> Fixed:
@@ -39,7 +84,7 @@ def game(
     agent_name: str = "agent",
     axes: tuple[str, ...] = (),
     **parameters: Any,
-) -> Game:
+) -> ExpressionGame:
     """The game of ``count`` agents with these costs and shared constraints.
 
     The functions are called with numbers that are not known yet: y, the actions, and p, whose
@@ -65,21 +110,42 @@ def game(
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InvalidInput("count", count, "it must be a positive whole number")
-    sizes = sizes_of(int(count), dimension)
+    words = {
+        "name": name or "own game",
+        "action_name": action_name,
+        "action_unit": action_unit,
+        "agent_name": agent_name,
+        "axes": axes,
+    }
+    shape = {"dimension": dimension, "lower": lower, "upper": upper}
+    return _made(sizes_of(int(count), dimension), cost, constraints, parameters, words, shape)
+
+
+def _made(
+    sizes: tuple[int, ...],
+    cost: Callable[..., Any],
+    constraints: Callable[..., Any] | None,
+    parameters: Mapping[str, Any],
+    words: Mapping[str, Any],
+    shape: Mapping[str, Any],
+) -> ExpressionGame:
     check_count("count", sum(sizes), MOST_ACTIONS, "the actions of all")
-    limits = boxes.limits_of(lower, upper, sizes)
-    names = boxes.names_of(sizes, agent_name, axes)
-    traced = trace(sizes, cost, constraints, parameters, limits, names)
-    return Game(
-        name=name or "own game",
+    limits = boxes.limits_of(shape["lower"], shape["upper"], sizes)
+    labels = boxes.names_of(sizes, words["agent_name"], words["axes"])
+    traced = trace(sizes, cost, constraints, parameters, limits, labels)
+    given = {key: numbers(value) for key, value in parameters.items()}
+    others = {key: value for key, value in parameters.items() if given[key] is None}
+    return ExpressionGame(
+        functions=Functions(cost, constraints, others),
+        numbers={key: value.tolist() for key, value in given.items() if value is not None},
+        words={**shape, **words},
+        **words,
         sizes=sizes,
-        action_name=action_name,
-        action_unit=action_unit,
-        agent_name=agent_name,
-        axes=axes,
         quantities=(
             *_quantities(traced, len(sizes)),
-            *boxes.quantities(limits, sizes, action_name, action_unit, axes),
+            *boxes.quantities(
+                limits, sizes, words["action_name"], words["action_unit"], words["axes"]
+            ),
         ),
         tested=True,
         **_found(traced, cost),
@@ -176,30 +242,43 @@ def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     taken: set[str] = set()
     for stem, bounds in families.items():
         kinds = {"": 1, "agent": agents, "constraint": len(_all(traced))}
-        each = next((kind for kind, size in kinds.items() if size == len(bounds)), None)
+        each = next((kind for kind, size in kinds.items() if size == len(bounds)), "constraint")
         name = re.sub(r"\W+", "_", stem.lower()).strip("_") or "constraint"
-        if each is None or name in taken or not name.isidentifier():
+        if name in taken or not name.isidentifier():
             continue
         taken.add(name)
-        found.append(_quantity(name, stem or "constraint", each, bounds))
+        places = np.arange(len(bounds))
+        if each == "constraint":  # perhaps of a part of them: the others have no numbers
+            number = {id(bound): k for k, bound in enumerate(traced.bounds)}
+            places = np.array([number[id(bound)] for bound in bounds])
+        size = kinds.get(each, 1)
+        found.append(_quantity(name, stem or "constraint", each, bounds, (places, size)))
     return tuple(found)
 
 
-def _quantity(name: str, long_name: str, each: str, bounds: list[Bound]) -> Quantity:
+def _quantity(
+    name: str,
+    long_name: str,
+    each: str,
+    bounds: list[Bound],
+    at: tuple[NDArray[np.int64], int],
+) -> Quantity:
+    """What constraints bound; ``at`` has their places among so many entries."""
     nodes, lower, upper = zip(*map(_shown, bounds), strict=True)
-    entries = list(nodes)
+    entries, (places, size) = list(nodes), at
 
-    def found(y: NDArray[np.float64], one: bool) -> NDArray[np.float64]:
-        columns = values(entries, y)
-        return columns[:, 0] if one else columns
+    def placed(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        every = np.full((*columns.shape[:-1], size), np.nan)
+        every[..., places] = columns
+        return every if each else every[..., 0]
 
     limits: dict[str, Any] = {
-        key: np.array(side) if each else side[0]
+        key: placed(np.array(side, dtype=np.float64))
         for key, side in (("bound", upper), ("lower_bound", lower))
         if None not in side
     }
     return Quantity(name=f"{name}_value", long_name=long_name, unit="",
-                    values=partial(found, one=not each), each=each, **limits)  # fmt: skip
+                    values=lambda y: placed(values(entries, y)), each=each, **limits)  # fmt: skip
 
 
 def _shown(bound: Bound) -> tuple[Node, float | None, float | None]:

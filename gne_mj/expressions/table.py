@@ -1,17 +1,17 @@
 """The table ``[systems.NAME.game]`` of a game of expressions: texts, or a file of functions."""
 
 import inspect
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
-from gne_mj.expressions.build import fixed, game
+from gne_mj.expressions.build import ExpressionGame, Functions, fixed, game
 from gne_mj.expressions.written import constraints_of, cost_of
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
+from gne_mj.python_objects import OBJECT, keep, kept
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import Fills
 from gne_mj.user_files import load_module
@@ -27,7 +27,6 @@ _TAKEN = {*inspect.signature(game).parameters} - {"parameters"}
 class ExpressionsTable(GameTable):
     """A game of the user's own, of plain expressions."""
 
-    has_default_start: ClassVar[bool] = False
     type: Literal["expressions"]
     file: Annotated[str | None, Fills("path")] = Field(
         None, description="Python file with cost(i, y, p) and constraints(y, p)"
@@ -36,6 +35,7 @@ class ExpressionsTable(GameTable):
     constraints: dict[str, str] | None = Field(
         None, description="comparisons by name; one that has i is one for each agent"
     )
+    object: str | None = Field(None, description=f"functions {OBJECT}")
     parameters: dict[str, Any] = Field({}, description="numbers of the formulas, by name")
     structure: dict[str, Any] = Field({}, description="what is no number to change: edges, lists")
     dimension: int | list[int] = Field(1, description="entries of an agent's action")
@@ -51,7 +51,7 @@ class ExpressionsTable(GameTable):
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
-        cost, constraints = self._functions()
+        cost, constraints, others = self._functions()
         return game(
             count,
             cost,
@@ -66,14 +66,17 @@ class ExpressionsTable(GameTable):
             axes=tuple(self.axes),
             **self.parameters,
             **{key: fixed(value) for key, value in self.structure.items()},
+            **others,
         )
 
-    def _functions(self) -> tuple[Any, Any]:
+    def _functions(self) -> Functions:
         both = set(self.parameters) & set(self.structure)
         if both:
             raise InvalidInput("structure", min(both), "it is among the parameters too")
         for name in sorted({*self.parameters, *self.structure} & _TAKEN):
             raise InvalidInput("parameters", name, "that name means something else of a game")
+        if self.object is not None:
+            return kept(self.object, Functions)
         boxed = self.lower is not None or self.upper is not None
         if (self.file is None) == (self.cost is None or not (self.constraints or boxed)):
             expected = "there must be either a file, or cost and constraints (or lower and upper)"
@@ -81,17 +84,14 @@ class ExpressionsTable(GameTable):
         if self.file is None:
             known = {**self.parameters, **self.structure}
             assert self.cost is not None
-            return cost_of(self.cost, known), constraints_of(self.constraints or {}, known)
+            made = cost_of(self.cost, known), constraints_of(self.constraints or {}, known)
+            return Functions(*made, {})
         module = load_module(self.file)
         for name, arguments in (("cost", "i, y, p"), ("constraints", "y, p")):
             needed = name == "cost" or not boxed or hasattr(module, name)
             if needed and not callable(getattr(module, name, None)):
                 raise InvalidInput("path", self.file, f"it must define {name}({arguments})")
-        return module.cost, getattr(module, "constraints", None)
-
-    def default_start(self, count: int) -> NDArray[np.float64]:
-        """There is none."""
-        raise InvalidInput("action", None, "a game of expressions has no default start: give one")
+        return Functions(module.cost, getattr(module, "constraints", None), {})
 
 
 def _numbers(limit: Any, nothing: float) -> Any:
@@ -99,3 +99,27 @@ def _numbers(limit: Any, nothing: float) -> Any:
     if isinstance(limit, list):
         return [_numbers(each, nothing) for each in limit]
     return nothing if limit == "none" else limit
+
+
+def _bounded(limit: Any) -> Any:
+    """A bound as tables have it, whose numbers are finite: "none" where there is none."""
+    if isinstance(limit, list):
+        return [_bounded(each) for each in limit]
+    return "none" if np.isinf(limit) else float(limit)
+
+
+def table_of(game: ExpressionGame) -> ExpressionsTable:
+    """The table that makes the game of this process again, with other numbers if it is changed."""
+    words = {**game.words, "axes": list(game.words["axes"])}
+    dimension = words.pop("dimension")
+    for key in ("lower", "upper"):
+        if words[key] is not None:
+            limits = np.asarray(words[key], dtype=np.float64)
+            words[key] = None if np.all(np.isinf(limits)) else _bounded(limits.tolist())
+    return ExpressionsTable(
+        type="expressions",
+        object=keep(game.functions, "game"),
+        parameters=dict(game.numbers),
+        dimension=dimension if isinstance(dimension, int) else list(map(int, dimension)),
+        **words,
+    )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gne_mj.errors import GneError, InvalidInput, UserCodeError, nearest
 from gne_mj.expressions.boxes import Limits
@@ -139,15 +140,19 @@ def _profile(tape: Tape, sizes: tuple[int, ...]) -> Any:
                  for part in parts)  # fmt: skip
 
 
-def _parameter(tape: Tape, key: str, value: Any) -> Any:
-    if isinstance(value, Fixed):
-        return value.value
+def numbers(value: Any) -> NDArray[Any] | None:
+    """A parameter's numbers, which may change; None of one that functions get as it is."""
     try:
         array = np.asarray(value)
     except ValueError:
-        return value
-    if array.dtype.kind not in "fiu":
-        return value
+        return None
+    return array if array.dtype.kind in "fiu" and not isinstance(value, Fixed) else None
+
+
+def _parameter(tape: Tape, key: str, value: Any) -> Any:
+    array = numbers(value)
+    if array is None:
+        return value.value if isinstance(value, Fixed) else value
     if not np.all(np.isfinite(array)):
         raise InvalidInput(key, value, "every number must be finite")
     return tape.parameter(array.astype(np.float64))

@@ -1,7 +1,6 @@
 """What the tables ``[systems.NAME.game]`` have in common; each game's is beside it."""
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +10,15 @@ from gne_mj.toml_table import Table
 
 
 class GameTable(Table):
-    """A game's numbers in a scenario file.
-
-    Attributes:
-        has_default_start: whether a run may begin where no start is given.
-    """
-
-    has_default_start: ClassVar[bool] = True
+    """A game's numbers in a scenario file."""
 
     @abstractmethod
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
 
-    @abstractmethod
-    def default_start(self, count: int) -> NDArray[np.float64]:
-        """(m,) actions strictly inside, from which it is started if none are given."""
+    def default_start(self, count: int) -> NDArray[np.float64] | None:
+        """(m,) actions strictly inside, from which it is started if none are given.
+
+        None lets a profile inside be looked for.
+        """
+        return None

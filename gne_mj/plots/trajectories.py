@@ -112,10 +112,11 @@ def _drawn(data: "xarray.Dataset", name: str) -> "Figure":
     values = variable.to_numpy().reshape(len(variable), -1)
     axis = data["axis"].to_numpy() if of_actions else np.full(values.shape[1], "")
     names = data["owner" if of_actions else "agent" if of_agents else "constraint_name"].to_numpy()
+    there = ~np.all(np.isnan(values), axis=0)  # of a quantity of some constraints only these
     panels = list(dict.fromkeys(axis.tolist())) or [""]
     figure, axes = _figure(data, len(panels), 4.6 if single or of_agents else 5.6)
     for panel, along in zip(axes, panels, strict=True):
-        mine = axis == along
+        mine = (axis == along) & there
         numbers = names[mine] - 1 if of_agents else np.arange(np.count_nonzero(mine))
         labels = [] if single else [str(each) for each in names[mine]]
         _lines(panel, data["time"].to_numpy(), values[:, mine], numbers, labels)

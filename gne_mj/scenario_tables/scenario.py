@@ -12,6 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 import gne_mj.expressions.table  # registers games of expressions
+import gne_mj.python_objects  # and games and laws of this process
 import gne_mj.user_files  # noqa: F401  registers games and laws of the user's own
 from gne_mj.barrier import BarrierTable
 from gne_mj.controllers import Law
@@ -27,7 +28,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, MODES, load_plugins
 from gne_mj.scenario_tables.faults import FaultTable, MarginTable
-from gne_mj.simulation import Simulation
+from gne_mj.simulation import Remade, Simulation
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.checks import check_estimates
@@ -119,18 +120,17 @@ class SystemTable(Table):
         given = self.initial.action
         with self.naming(name):
             game = self._game()
-            if given is not None:
-                y = per_action("initial.action", given, game.sizes)
-            elif not self.game.has_default_start:
-                y = (
-                    np.zeros(game.actions)
-                    if game.box is None
-                    else 0.5 * (game.box[0] + game.box[1])
-                )
+            if given is None:
+                y = self._default_start(game)
             else:
-                y = self.game.default_start(self.agents.count)
+                y = per_action("initial.action", given, game.sizes)
             inside = bool(np.all(game.constraints(y) < 0.0))
             return game, y if inside else interior_profile(game, y)
+
+    def _default_start(self, game: Game) -> NDArray[np.float64]:
+        """y(0) where none is given: the game's own, or one that is looked for inside."""
+        y = self.game.default_start(self.agents.count)
+        return interior_profile(game, np.zeros(game.actions)) if y is None else y
 
     def build(self, name: str, simulation: "SimulationTable", at: Present | None = None) -> System:
         """The system, with the simulation's integrator unless it names its own.
@@ -211,14 +211,14 @@ class SystemTable(Table):
         with self.naming(name):
             game, _ = self._parts(simulation)
         try:
-            if given is None and not self.game.has_default_start:
-                why, wanted = "no start is given", np.zeros(game.actions)
-            else:
-                return self.build(name, simulation), None
+            built = self.build(name, simulation)
+            if given is None and self.game.default_start(self.agents.count) is None:
+                return built, {"why": "no start is given", "action": built.start.tolist()}
+            return built, None
         except InfeasibleStart as error:
             why = str(error)
             wanted = (
-                self.game.default_start(self.agents.count)
+                self._default_start(game)
                 if given is None
                 else per_action("initial.action", given, game.sizes)
             )
@@ -275,9 +275,9 @@ class SystemTable(Table):
         self, game: Game, agents: Agents, law: Law
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """States (m, states) and the law's memory, as the initial table has them."""
-        count, sizes, initial = self.agents.count, game.sizes, self.initial
+        sizes, initial = game.sizes, self.initial
         with part_of("initial"):
-            state = initial.build(agents, sizes, lambda: self.game.default_start(count))
+            state = initial.build(agents, sizes, lambda: self._default_start(game))
             filtered = initial.filtered
             memory = law.initial_memory(
                 state[:, agents.kind.OUTPUT],
@@ -326,6 +326,15 @@ class Scenario(Table):
                     " the first two",
                 )
         return self
+
+    def __repr__(self) -> str:
+        """One line: each system's game, agents and law; the duration."""
+        systems = [
+            f"{name}: {_kind(table.game)} with {table.agents.count} {_kind(table.agents)},"
+            f" {_kind(table.controller)} law"
+            for name, table in self.systems.items()
+        ]
+        return f"<Scenario of {'; '.join(systems)}; {self.simulation.duration:g} s>"
 
     def name_of(self, system: str | None) -> str:
         """The system of this name, or the only one if none is given.
@@ -392,7 +401,21 @@ class Scenario(Table):
                 tolerance=self.simulation.tolerance,
                 seed=self.simulation.seed,
                 source=self.model_dump_json(exclude_none=True),
+                remade=self._remade,
             )
+
+    def _remade(
+        self, changes: Mapping[str, Any], present: Mapping[str, Present]
+    ) -> tuple[list[System], Remade]:
+        from gne_mj.scenario_tables.changes import changed, changed_systems
+
+        scenario = changed(self, changes)
+        return changed_systems(self, scenario, present), scenario._remade
+
+
+def _kind(table: Table) -> str:
+    """Which of the tables that may stand there it is."""
+    return str(getattr(table, "type", None) or getattr(table, "information", ""))
 
 
 def _places(sizes: Sizes) -> NDArray[np.float64]:

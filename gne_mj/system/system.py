@@ -9,7 +9,7 @@ from gne_mj.system import checks
 from gne_mj.system.assembly import Assembly
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class System(Assembly):
     """A game that agents play under a law.
 
@@ -37,6 +37,14 @@ class System(Assembly):
         InvalidInput: parts that do not fit together.
         InfeasibleStart: an initial action on or outside the boundary.
     """
+
+    def __repr__(self) -> str:
+        """One line: game, agents, law, engine, penalty."""
+        return (
+            f"<System {self.name!r}: {self.game.name}, {self.game.agents} agents"
+            f" ({self.agents.kind.NAME}s), {self.law.information} law, mode {self.mode},"
+            f" {self.engine} by {self.integrator}, rho = {self.rho:g}>"
+        )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "barrier", LogBarrier(self.game, self.rho))

@@ -50,6 +50,18 @@ class Guarantees:
     measured: list[str]
     not_certified: list[str]
 
+    def __repr__(self) -> str:
+        """One line; ``print`` shows the whole report."""
+        return (
+            f"<Guarantees of {self.system['name']!r}: {self.status}, {len(self.guaranteed)}"
+            f" guaranteed, {len(self.measured)} measured, {len(self.not_certified)} not certified>"
+        )
+
+    def __str__(self) -> str:
+        from gne_mj.theory.report_text import report_text
+
+        return "\n".join(report_text(self)).strip("\n")
+
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         plain: dict[str, Any] = _plain(asdict(self))

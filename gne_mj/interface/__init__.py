@@ -1,0 +1,66 @@
+"""What a program or a notebook imports as ``gne_mj``: objects for all that a scenario names.
+
+Agents, laws and faults are made by functions of plain names. Each returns the table that a scenario
+file would have in that place, so that both mean the same and are checked by the same rules.
+:func:`setup` puts them together to a scenario; what acts on one takes any source of it.
+"""
+
+from gne_mj.interface.agents import (
+    custom_agents,
+    flexible_robots,
+    integrators,
+    mixed_agents,
+    mjcf_robots,
+    pi_cascades,
+    planar_robots,
+)
+from gne_mj.interface.analyses import certify, check, solve
+from gne_mj.interface.comparison import Comparison, compare
+from gne_mj.interface.faults import (
+    bias,
+    estimate_corruption,
+    message_delay,
+    message_loss,
+    noise,
+    push,
+    saturation,
+    sensor_delay,
+    silence,
+)
+from gne_mj.interface.laws import full_information, fully_distributed, own_law, partial_information
+from gne_mj.interface.running import Run, run, setup
+from gne_mj.interface.show import Figures, plot, view
+
+__all__ = [
+    "Comparison",
+    "Figures",
+    "Run",
+    "bias",
+    "certify",
+    "check",
+    "compare",
+    "custom_agents",
+    "estimate_corruption",
+    "flexible_robots",
+    "full_information",
+    "fully_distributed",
+    "integrators",
+    "message_delay",
+    "message_loss",
+    "mixed_agents",
+    "mjcf_robots",
+    "noise",
+    "own_law",
+    "partial_information",
+    "pi_cascades",
+    "planar_robots",
+    "plot",
+    "push",
+    "run",
+    "saturation",
+    "sensor_delay",
+    "setup",
+    "silence",
+    "solve",
+    "view",
+]

@@ -1,0 +1,174 @@
+"""Agents as objects: one function a type that scenario files know.
+
+Numbers are one for all agents or a list with one each. ``input_limit`` is the greatest absolute
+value that the actuators deliver (for actions of several entries lists of lists); None for no limit.
+All raise InvalidInput, which names the key, the value and what would be right.
+"""
+
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from tempfile import gettempdir
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from gne_mj.files import written
+from gne_mj.interface.tables import made
+from gne_mj.plants.flexible_robot import PlanarRobotAgents, RobotAgents
+from gne_mj.plants.integrator import IntegratorAgents
+from gne_mj.plants.mixed import MixedAgents
+from gne_mj.plants.mjcf_robot import MjcfAgents
+from gne_mj.plants.pi_cascade import PiCascadeAgents
+from gne_mj.plants.table import AgentsTable
+from gne_mj.toml_table import Table
+from gne_mj.user_files import CustomAgents
+
+
+def flexible_robots(
+    count: int,
+    *,
+    main_mass: ArrayLike = 1.0,
+    appendage_mass: ArrayLike = 1.0,
+    stiffness: ArrayLike = 1.0,
+    atan_coefficient: ArrayLike = 1.0,
+    damping: ArrayLike = 1.0,
+    input_limit: ArrayLike | None = None,
+) -> AgentsTable:
+    """Robots on a lane: two masses, a spring and a damper [eq:MobileRobot]; y is the velocity.
+
+    Args:
+        count: N.
+        main_mass: M in kg, positive.
+        appendage_mass: m in kg, positive.
+        stiffness: linear part of psi in N/m.
+        atan_coefficient: atan part of psi in N.
+        damping: gamma in N s/m.
+        input_limit: in N.
+    """
+    return made(RobotAgents, type="flexible-robot", **locals())
+
+
+def planar_robots(
+    count: int,
+    *,
+    main_mass: ArrayLike = 1.0,
+    appendage_mass: ArrayLike = 1.0,
+    stiffness: ArrayLike = 1.0,
+    atan_coefficient: ArrayLike = 1.0,
+    damping: ArrayLike = 1.0,
+    input_limit: ArrayLike | None = None,
+) -> AgentsTable:
+    """The same robots in the plane, for games with ``dimension=2``.
+
+    Args:
+        count: N.
+        main_mass: M in kg, positive.
+        appendage_mass: m in kg, positive.
+        stiffness: linear part of psi in N/m.
+        atan_coefficient: atan part of psi in N.
+        damping: gamma in N s/m.
+        input_limit: in N.
+    """
+    return made(PlanarRobotAgents, type="planar-flexible-robot", **locals())
+
+
+def integrators(count: int, *, input_limit: ArrayLike | None = None) -> AgentsTable:
+    """Agents with y' = u [eq:int].
+
+    Args:
+        count: N.
+        input_limit: in the action's unit per second.
+    """
+    return made(IntegratorAgents, type="integrator", **locals())
+
+
+def pi_cascades(
+    count: int,
+    *,
+    decay_rate: ArrayLike = 1.0,
+    integral_gain: ArrayLike = 0.5,
+    input_limit: ArrayLike | None = None,
+) -> AgentsTable:
+    """First-order systems behind a PI controller [eq:cascadePI].
+
+    Args:
+        count: N.
+        decay_rate: v in 1/s.
+        integral_gain: k in 1/s, 0 < k < v.
+        input_limit: in the action's unit per second.
+    """
+    return made(PiCascadeAgents, type="pi-cascade", **locals())
+
+
+def mjcf_robots(
+    count: int,
+    file: str | Path | Sequence[str | Path],
+    *,
+    output: str | Sequence[str],
+    input: str | Sequence[str],
+    input_limit: ArrayLike | None = None,
+) -> AgentsTable:
+    """Robots of your own, which MuJoCo moves.
+
+    Args:
+        count: N.
+        file: an MJCF file, or its text, which begins with ``<``; one for all or one each.
+        output: the joint or velocity sensor that is y_i, likewise.
+        input: the actuator that u_i drives, likewise.
+        input_limit: in N or N m.
+    """
+    each = [file] if isinstance(file, str | Path) else list(file)
+    paths = [_path(one) for one in each]
+    return made(
+        MjcfAgents,
+        type="mjcf-robot",
+        count=count,
+        file=paths[0] if isinstance(file, str | Path) else paths,
+        output=output,
+        input=input,
+        input_limit=input_limit,
+    )
+
+
+def _path(file: str | Path) -> str:
+    """A file's path; that of a text, which is kept among the user's temporary files."""
+    text = str(file).lstrip()
+    if not text.startswith("<"):
+        return str(Path(file).resolve())
+    path = Path(gettempdir()) / f"gne-mj-{sha256(text.encode()).hexdigest()[:16]}.xml"
+    with written("file", path, replace=True) as new:
+        new.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def custom_agents(
+    count: int,
+    file: str | Path,
+    *,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    input_limit: ArrayLike | None = None,
+) -> AgentsTable:
+    """Agents that a differential equation in a Python file describes (docs/your-own.md).
+
+    Args:
+        count: N.
+        file: with the kernels of an agent type.
+        parameters: each of its PARAMETERS.
+        input_limit: in the type's INPUT_UNIT.
+    """
+    path = str(Path(file).resolve())
+    return made(
+        CustomAgents, type="custom", count=count, file=path, parameters=parameters,
+        input_limit=input_limit,
+    )  # fmt: skip
+
+
+def mixed_agents(*groups: Table) -> Table:
+    """Agents of several types, one group behind the other.
+
+    Args:
+        groups: made by the functions above, but those of files.
+    """
+    tables: list[Any] = list(groups)
+    return made(MixedAgents, type="mixed", groups=tables)

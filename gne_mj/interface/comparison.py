@@ -1,0 +1,114 @@
+"""Runs side by side, and a small table of how they went."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from gne_mj.controllers.table import LawTable
+from gne_mj.errors import InvalidInput
+from gne_mj.interface.running import Run, part_changes, run_scenario
+from gne_mj.scenario import Source, load_scenario
+
+if TYPE_CHECKING:
+    import pandas
+
+MOST = 100  # runs; more are a batch
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """Runs of one set-up that differ in a few values.
+
+    Attributes:
+        varied: for each run its values, in words, by what was varied.
+        runs: in the same order.
+    """
+
+    varied: tuple[dict[str, str], ...]
+    runs: tuple[Run, ...]
+
+    @property
+    def table(self) -> "pandas.DataFrame":
+        """A row for each run, or each system of one: status, margin, settling time, distances.
+
+        Times in s, margins -g and distances in the action's unit; not a number where unknown.
+        """
+        import pandas
+
+        rows = []
+        for varied, run in zip(self.varied, self.runs, strict=True):
+            for name, report in run.reports.items():
+                system = {"system": name} if len(run.reports) > 1 else {}
+                rows.append({**varied, **system, **_row(report)})
+        return pandas.DataFrame(rows)
+
+    def __repr__(self) -> str:
+        shown = self.table.to_string(index=False, float_format=lambda value: f"{value:.4g}")
+        return str(shown)
+
+    def _repr_html_(self) -> str:
+        html = self.table.to_html(index=False, float_format=lambda value: f"{value:.4g}")
+        return str(html)
+
+
+def _row(report: Mapping[str, Any]) -> dict[str, Any]:
+    worst, distances = report["worst_constraint"] or {}, report["equilibrium"]
+    return {
+        "status": report["status"],
+        "least margin": worst.get("margin"),
+        "of": worst.get("name"),
+        "settled": report["settling_time"],
+        "from y*": distances["final_distance"],
+        "from vGNE": distances["final_distance_to_variational"],
+        "peak input": report["actuators"]["peak"],
+    }
+
+
+def compare(
+    source: Source,
+    vary: Mapping[str, Sequence[Any]],
+    changes: Mapping[str, Any] | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> Comparison:
+    """Run all combinations of a few values, and put the runs beside each other.
+
+    >>> laws = [gne_mj.full_information(), gne_mj.partial_information("ring")]
+    >>> gne_mj.compare("velocity-sync", {"law": laws, "rho": [0.1, 0.01]})
+
+    Args:
+        source: a scenario, or a game.
+        vary: dotted keys, or the names that :func:`gne_mj.setup` has for parts, with their values.
+        changes: of all runs.
+        progress: called before each run with its number, from 0, and how many there are.
+
+    Raises:
+        InvalidInput: names the key, the value and what would be right; before anything is run.
+    """
+    for key, values in vary.items():
+        if isinstance(values, str | bytes | Mapping) or not isinstance(values, Sequence):
+            raise InvalidInput(f"vary.{key}", values, "its values must be a list")
+    combinations = [dict(zip(vary, values, strict=True)) for values in product(*vary.values())]
+    if not 0 < len(combinations) <= MOST:
+        raise InvalidInput(
+            "vary", f"{len(combinations)} runs", f"there must be 1 to {MOST}; more are a batch"
+        )
+    base = load_scenario(source, changes)
+    scenarios = [load_scenario(base, part_changes(source, each)) for each in combinations]
+    runs = []
+    for number, scenario in enumerate(scenarios):
+        if progress is not None:
+            progress(number, len(scenarios))
+        runs.append(run_scenario(scenario))
+    words = tuple({key: _words(value) for key, value in each.items()} for each in combinations)
+    return Comparison(words, tuple(runs))
+
+
+def _words(value: Any) -> str:
+    """A value in a table."""
+    if isinstance(value, LawTable):
+        return f"{value.information}, {value.mode}"  # type: ignore[attr-defined]
+    if callable(value):
+        return getattr(value, "__name__", repr(value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

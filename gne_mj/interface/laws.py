@@ -1,0 +1,102 @@
+"""Laws as objects: one function an information structure.
+
+``mode`` is "continuous", "sampled" or "implicit", and ``decentralised`` for the last one: each
+agent keeps to its share of every bound's slack. A ``graph`` is a :class:`gne_mj.Graph`, the name of
+one (then of as many agents as the game has), or edges as pairs of agents numbered from 1.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from gne_mj.controllers.full_information import FullController
+from gne_mj.controllers.fully_distributed import DistributedController
+from gne_mj.controllers.partial_information import PartialController
+from gne_mj.controllers.table import LawTable
+from gne_mj.graph import Graph
+from gne_mj.interface.tables import made
+from gne_mj.python_objects import LawFunctions, PythonLaw, keep
+
+Network = Graph | str | Sequence[tuple[int, int]]
+
+
+def full_information(*, mode: str = "continuous", decentralised: bool = False) -> LawTable:
+    """Every agent measures all actions [eq:nonlinFIfeedback].
+
+    Args:
+        mode: when the law is evaluated.
+        decentralised: in mode implicit, whether each agent solves alone.
+    """
+    return made(FullController, information="full", **locals())
+
+
+def partial_information(
+    graph: Network = "ring",
+    *,
+    coupling: float = 1.0,
+    time_constant: float = 1.0,
+    mode: str = "continuous",
+    decentralised: bool = False,
+) -> LawTable:
+    """Costs at estimates that neighbours exchange, a measured barrier [eq:nonlinearPIFeedback].
+
+    Args:
+        graph: over which agents communicate.
+        coupling: c; the paper has 1.
+        time_constant: tau of the estimates in s; the paper has 1.
+        mode: when the law is evaluated.
+        decentralised: in mode implicit, whether each agent solves alone.
+    """
+    return made(PartialController, information="partial", **locals())
+
+
+def fully_distributed(
+    graph: Network = "ring",
+    *,
+    epsilon: float,
+    gain: float = 1.0,
+    mode: str = "continuous",
+    decentralised: bool = False,
+) -> LawTable:
+    """Neighbours' messages and nothing else [eq:CenterFeedback].
+
+    Args:
+        graph: over which agents communicate.
+        epsilon: time constant of estimates and z in s.
+        gain: k.
+        mode: when the law is evaluated.
+        decentralised: in mode implicit, whether each agent solves alone.
+    """
+    return made(DistributedController, information="distributed", **locals())
+
+
+def own_law(
+    action: Callable[..., ArrayLike],
+    rate: Callable[..., ArrayLike] | None = None,
+    initial_memory: Callable[..., ArrayLike] | None = None,
+    *,
+    mode: str = "continuous",
+    **parameters: Any,
+) -> LawTable:
+    """A law of plain Python functions, for a first try; nothing is claimed of it.
+
+    >>> def damped(game, rho, y, memory, gain):
+    ...     slope = game.constraint_jacobian(y).T @ (rho / -game.constraints(y))
+    ...     return -gain * (game.pseudo_gradient(y) + slope)
+    >>> law = gne_mj.own_law(damped, gain=2.0)
+
+    Args:
+        action: ``action(game, rho, y, memory, **parameters)`` returns u, shape (m,).
+        rate: ``rate(game, rho, y, memory, **parameters)`` returns the memory's rate; only with a
+            memory.
+        initial_memory: ``initial_memory(y, **parameters)`` returns the memory at the start.
+        mode: "continuous"; a law without a memory also "sampled".
+        **parameters: numbers and lists, which can be changed and swept as
+            ``controller.parameters.NAME``.
+    """
+    given = {"action": action, "rate": rate, "initial_memory": initial_memory}
+    functions = {name: function for name, function in given.items() if function is not None}
+    name = keep(LawFunctions(functions), getattr(action, "__name__", "law"))
+    return made(PythonLaw, information="python", object=name, mode=mode,
+                parameters=parameters)  # fmt: skip

@@ -1,0 +1,119 @@
+"""Figures and replays of runs."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gne_mj.files import storing
+from gne_mj.interface.running import run_scenario
+from gne_mj.notebook import replay_html
+from gne_mj.scenario import Source, load_scenario
+from gne_mj.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gne_mj.viewer import Server
+
+DPI = 80  # of figures in a notebook
+
+
+class Figures(dict[str, "Figure"]):
+    """Matplotlib figures by name; a notebook shows them all.
+
+    >>> gne_mj.run("velocity-sync").plot()["robots-gaps"].savefig("gaps.pdf")
+    """
+
+    def __init__(self, figures: "Mapping[str, Figure]") -> None:
+        super().__init__(figures)
+
+    def __repr__(self) -> str:
+        return f"<Figures: {', '.join(self) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        return "".join(
+            f'<img alt="{escape(name)}" src="data:image/png;base64,{_png(figure)}">'
+            for name, figure in self.items()
+        )
+
+
+def _png(figure: "Figure") -> str:
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=DPI)
+    return b64encode(stream.getvalue()).decode("ascii")
+
+
+class Replay:
+    """A trajectory's replay, which a notebook shows inline and keeps.
+
+    Args:
+        trajectory: of a scenario, which it holds.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+
+    def __repr__(self) -> str:
+        return f"<Replay of {self.trajectory!r}>"
+
+    def _repr_html_(self) -> str:
+        return replay_html(self.trajectory)
+
+
+def plot(
+    shown: Trajectory | Source,
+    folder: str | Path | None = None,
+    formats: Sequence[str] = ("png",),
+) -> Figures:
+    """Draw a run: actions, what the game derives from them, and margins, with all bounds.
+
+    Args:
+        shown: a trajectory; a scenario or game is run first.
+        folder: where to write the figures too, in place of older ones of the same names.
+        formats: of the files: png, pdf, svg.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+        InvalidInput: the folder cannot be written to.
+    """
+    from gne_mj import plots
+    from gne_mj.plots.style import pyplot
+
+    trajectory = _trajectory(shown)
+    figures = Figures(plots.draw(trajectory))
+    for figure in figures.values():  # pyplot need not remember them
+        pyplot().close(figure)
+    if folder is not None:
+        with storing("folder", Path(folder)):
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        plots.save(trajectory, folder, tuple(formats))
+    return figures
+
+
+def view(shown: Trajectory | Source, title: str = "gne-mj replay", *, port: int = 0) -> "Server":
+    """Serve a run's replay on 127.0.0.1 until the server is closed or the process ends.
+
+    Open its ``url`` in a browser. ``gne-mj run --view`` shows a run while it is going on.
+
+    Args:
+        shown: a trajectory of this process, or one with a scenario that has no Python object; a
+            scenario or game is run first.
+        title: of the page.
+        port: 0 for any that is free.
+
+    Raises:
+        MissingExtra: what the page needs is not installed.
+        InvalidInput: there is no scenario to draw robots from; the port is taken.
+    """
+    from gne_mj.viewer import serve
+
+    return serve(_trajectory(shown), title, port=port)
+
+
+def _trajectory(shown: Trajectory | Source) -> Trajectory:
+    if isinstance(shown, Trajectory):
+        return shown
+    return run_scenario(load_scenario(shown))
