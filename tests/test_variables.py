@@ -28,7 +28,7 @@ def declarations(system):
         dimensions, attributes = variable.dims(system), variable.attributes(system)
         found[variable.name] = dimensions, attributes
         for name in variable.bounds(system):
-            units = {"units": attributes["units"]}
+            units = {k: v for k, v in attributes.items() if k == "units"}
             found[name] = tuple(d for d in dimensions if d != "time"), units
     return found
 
