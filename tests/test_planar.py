@@ -300,7 +300,7 @@ def test_its_figures(shipped, tmp_path):
     (gaps,) = figures["robots-gaps"].axes
     assert len(gaps.get_lines()) == 10 + 2  # and each bound once
     assert [line.get_ydata()[0] for line in gaps.get_lines()[10:]] == [1.5, 2.0]
-    assert len(plots.save(shipped, tmp_path)) == 2
+    assert len(plots.save(shipped, tmp_path)) == 3
 
 
 def test_the_ode_engine_ends_likewise(shipped):
