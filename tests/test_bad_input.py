@@ -94,8 +94,8 @@ CASES = {
     ),
     "wrong graph": (
         "osnr",
-        ["controller.graph=star"],
-        ["systems.channels.controller.graph: got 'star'"],
+        ["controller.graph=sun"],
+        ["systems.channels.controller.graph: got 'sun'"],
     ),
     "graph of another size": ("osnr", ["agents.count=3", "controller.graph=printed"], ["3"]),
     "nan": ("velocity-sync", ["barrier.rho=nan"], ["barrier.rho", "nan", "finite"]),

@@ -12,7 +12,7 @@ import pytest
 from browser import Recorded
 
 import gne_mj
-from gne_mj.notebook import notebook_html
+from gne_mj.notebook import notebook_html, replay_html
 from gne_mj.scenario import load_scenario
 from gne_mj.viewer import Session, serve, write_html
 
@@ -133,8 +133,8 @@ def test_plots_have_the_bounds_and_all_lines(page, served):
     opened(page, served.url)
     plots = {(p["system"], p["name"]): p for p in page.evaluate("window.gne.plots")}
     assert set(plots) == {
-        ("robots", "action"), ("robots", "gap"), ("channels", "action"),
-        ("channels", "total_power"),
+        ("robots", "action"), ("robots", "gap"), ("robots", "constraint"), ("channels", "action"),
+        ("channels", "total_power"), ("channels", "constraint"),
     }  # fmt: skip
     assert sorted(plots["robots", "gap"]["bounds"]) == [-3, 3]
     assert plots["channels", "total_power"]["bounds"] == [2.5]
@@ -228,7 +228,7 @@ def test_one_browser_too_many_is_told_so(page, monkeypatch):
 
 
 def test_a_notebook_shows_the_replay(page, recorded, paper):
-    page.set_content(notebook_html(paper))
+    page.set_content(notebook_html(paper) + replay_html(paper))
     frame = page.frames[1]
     until(frame, READY)
     assert (

@@ -19,7 +19,7 @@ from gne_mj.errors import InvalidInput, StorageError
 from gne_mj.faults import MessageLoss, Silence, for_native
 from gne_mj.games import velocity_game
 from gne_mj.loops import faults as native
-from gne_mj.notebook import notebook_html
+from gne_mj.notebook import notebook_html, replay_html
 from gne_mj.quantity import Quantity
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
@@ -258,9 +258,9 @@ def test_robots_of_which_no_body_moves_first_are_drawn_by_one_that_does(tmp_path
     with pytest.raises(InvalidInput, match="the robots' files have changed"):
         replay_pack(trajectory)
     (tmp_path / "based.xml").unlink()
-    html = notebook_html(trajectory)
-    assert "<table>" in html
-    assert "There is no replay" in html
+    assert "<table>" in notebook_html(trajectory)
+    with pytest.raises(InvalidInput, match="based.xml"):
+        replay_html(trajectory)
 
 
 def test_systems_that_end_early_stay_and_their_lines_stop():
