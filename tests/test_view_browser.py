@@ -228,7 +228,7 @@ def test_one_browser_too_many_is_told_so(page, monkeypatch):
 
 
 def test_a_notebook_shows_the_replay(page, recorded, paper):
-    page.set_content(notebook_html(paper) + replay_html(paper))
+    page.set_content(replay_html(paper) + notebook_html(paper))
     frame = page.frames[1]
     until(frame, READY)
     assert (

@@ -259,7 +259,7 @@ def test_robots_of_which_no_body_moves_first_are_drawn_by_one_that_does(tmp_path
         replay_pack(trajectory)
     (tmp_path / "based.xml").unlink()
     assert "<table>" in notebook_html(trajectory)
-    with pytest.raises(InvalidInput, match="based.xml"):
+    with pytest.raises(InvalidInput, match=r"based\.xml"):
         replay_html(trajectory)
 
 
