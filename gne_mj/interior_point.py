@@ -161,9 +161,8 @@ def begin(data, free, count, b, path, known, point, work):
     if known:
         return path.rho, path.rho, length, size
     last = path.last_rho * size if path.to_zero else path.last_rho
-    highest = max(
-        last, path.rho if path.rho > 0.0 else scales.largest_gradient(count, work) * length
-    )
+    suited = path.rho if path.rho > 0.0 else scales.largest_gradient(count, work) * length
+    highest = max(last, suited)
     rho = max(last, scales.balance(count, constraints, free, highest, work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]

@@ -91,7 +91,7 @@ def largest_gradient(count, work):
 
 @kernel
 def balance(count, constraints, free, highest, work):
-    """Near the path its own rho, at which the barrier's gradient is as large as F; else ``highest``.
+    """Near the path its own rho, where the barrier's gradient is as large as F; else ``highest``.
 
     Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
     stationarity residual must be F alone.
