@@ -61,7 +61,7 @@ def _mean_heard(problem, m, i, r, memory):
 
 @kernel
 def prepare(problem, first, last, y, memory):
-    """Put the actions of agents ``first`` to ``last`` - 1 into their own rows, for a law's pull."""
+    """Put the actions of agents ``first`` to ``last`` - 1 into their own rows."""
     at, m = problem.data.offsets, len(y)
     for r in range(at[first], at[last]):
         memory[problem.data.owner[r] * m + r] = y[r]

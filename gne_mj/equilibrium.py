@@ -20,8 +20,9 @@ from gne_mj import interior_point as method
 from gne_mj import lines
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game_model import Game
-from gne_mj.interior_point import Free, Iterate, NewtonScratch, Path
+from gne_mj.interior_point import Path
 from gne_mj.plain import forgive_pending, raise_pending
+from gne_mj.primal_dual import Free, Iterate, NewtonScratch
 
 TOLERANCE = 1e-12
 # The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the

@@ -21,9 +21,9 @@ agent, a and b entries of a profile (a belonging to agent i) and l a constraint,
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
-from types import ModuleType, SimpleNamespace
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from functools import cached_property
+from types import ModuleType
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,8 +32,8 @@ from gne_mj import game_functions as functions
 from gne_mj.bounds import MOST_ACTIONS, MOST_MEMBERS, check_count, check_room
 from gne_mj.equality import Equality
 from gne_mj.errors import InvalidInput, UserCodeError
+from gne_mj.game_arrays import array_functions
 from gne_mj.game_fields import check_kinds, check_owners, checked_bounds
-from gne_mj.native import compiled, kernel, source_key
 from gne_mj.plain import Written, as_written, check_numbers, plain_kernels, raise_pending
 from gne_mj.quantity import Quantity
 
@@ -354,27 +354,27 @@ class Game:
 
     def costs(self, y: ArrayLike) -> NDArray[np.float64]:
         """J_i(y) of each agent; y of shape (..., m), result (..., N)."""
-        return self._rows(y, self.agents, _native().costs)
+        return self._rows(y, self.agents, array_functions().costs)
 
     def pseudo_gradient(self, y: ArrayLike) -> NDArray[np.float64]:
         """F(y) = col(dJ_i/dy_i); y and the result of shape (..., m)."""
-        return self._rows(y, self.actions, _native().pseudo_gradient)
+        return self._rows(y, self.actions, array_functions().pseudo_gradient)
 
     def constraints(self, y: ArrayLike) -> NDArray[np.float64]:
         """g(y), negative inside; y of shape (..., m), result (..., p)."""
-        return self._rows(y, self.constraints_count, _native().constraints)
+        return self._rows(y, self.constraints_count, array_functions().constraints)
 
     def pseudo_gradient_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dF/dy, shape (m, m), at one profile y of shape (m,)."""
         out = self._matrix(self.actions)
-        _native().pseudo_gradient_jacobian(self.data, self._profile(y), out)
+        array_functions().pseudo_gradient_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
     def constraint_jacobian(self, y: ArrayLike) -> NDArray[np.float64]:
         """dg/dy, shape (p, m), at one profile y of shape (m,)."""
         out = self._matrix(self.constraints_count)
-        _native().constraint_jacobian(self.data, self._profile(y), out)
+        array_functions().constraint_jacobian(self.data, self._profile(y), out)
         raise_pending()
         return out
 
@@ -384,7 +384,7 @@ class Game:
         weights = np.ascontiguousarray(weights, dtype=np.float64)
         if weights.shape != (self.constraints_count,):
             raise ValueError(f"weights must be ({self.constraints_count},), not {weights.shape}")
-        _native().weighted_hessian(self.data, self._profile(y), weights, out)
+        array_functions().weighted_hessian(self.data, self._profile(y), weights, out)
         raise_pending()
         return out
 
@@ -393,7 +393,7 @@ class Game:
         start, actions = self.actions_in_constraints
         own = actions[start[constraint] : start[constraint + 1]]
         out = np.zeros((len(own), len(own)))
-        _native().constraint_hessian(self.data, self._profile(y), constraint, own, out)
+        array_functions().constraint_hessian(self.data, self._profile(y), constraint, own, out)
         raise_pending()
         return out
 
@@ -440,86 +440,3 @@ class Game:
 def _compress(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     pointer = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
     return pointer, np.array([entry for row in rows for entry in row], dtype=np.int64)
-
-
-@cache
-def _native() -> SimpleNamespace:
-    """The array functions of all games, compiled at their first call."""
-    return SimpleNamespace(**_values(source_key()), **_derivatives(source_key()))
-
-
-def _values(source: str) -> dict[str, Any]:
-    @compiled
-    def costs(data, profiles, out):
-        _ = source
-        for row in range(len(profiles)):
-            for i in range(len(data.offsets) - 1):
-                out[row, i] = functions.cost(data, i, profiles[row])
-
-    @compiled
-    def pseudo_gradient(data, profiles, out):
-        _ = source
-        for row in range(len(profiles)):
-            functions.gradients(data, data.everyone, profiles[row], out[row])
-
-    @compiled
-    def constraints(data, profiles, out):
-        _ = source
-        for row in range(len(profiles)):
-            functions.values(data, data.all_constraints, profiles[row], out[row])
-
-    return {"costs": costs, "pseudo_gradient": pseudo_gradient, "constraints": constraints}
-
-
-def _derivatives(source: str) -> dict[str, Any]:
-    @compiled
-    def pseudo_gradient_jacobian(data, y, out):
-        _ = source
-        at = data.offsets
-        for i in range(len(at) - 1):
-            for a in range(at[i], at[i + 1]):
-                functions.add_cost_hessian(data, i, a, y, 1.0, out[a])
-
-    @compiled
-    def constraint_jacobian(data, y, out):
-        _ = source
-        at = data.offsets
-        for k in range(len(out)):
-            for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
-                i = data.member_index[entry]
-                for a in range(at[i], at[i + 1]):
-                    out[k, a] = functions.constraint_gradient(data, k, a, y)
-
-    @compiled
-    def weighted_hessian(data, y, weights, out):
-        _ = source
-        for k in range(len(weights)):
-            first, last = data.member_pointer[k], data.member_pointer[k + 1]
-            for row in range(first, last):
-                for column in range(first, last):
-                    i, j = data.member_index[row], data.member_index[column]
-                    _add_block(data, k, i, j, y, weights[k], out)
-
-    @compiled
-    def constraint_hessian(data, y, k, own, out):
-        _ = source
-        for row in range(len(own)):
-            for column in range(len(own)):
-                a, b = own[row], own[column]
-                out[row, column] = functions.constraint_hessian(data, k, a, b, y)
-
-    return {
-        "pseudo_gradient_jacobian": pseudo_gradient_jacobian,
-        "constraint_jacobian": constraint_jacobian,
-        "weighted_hessian": weighted_hessian,
-        "constraint_hessian": constraint_hessian,
-    }
-
-
-@kernel
-def _add_block(data, k, i, j, y, weight, out):
-    """out[a, b] += weight d2g_k/dy_a dy_b for the actions a of agent i, and b of agent j."""
-    at = data.offsets
-    for a in range(at[i], at[i + 1]):
-        for b in range(at[j], at[j + 1]):
-            out[a, b] += weight * functions.constraint_hessian(data, k, a, b, y)

@@ -8,16 +8,12 @@ its terms. Iterates stay strictly inside.
 
 Steps are Newton's, shortened until the residuals' norm falls. Where only tiny steps do (along
 curved bounds, far from the path), the method sets the multipliers to rho / s and is careful until
-the path is reached: at a high rho if none was reached yet, else at its own. Where the matrix is
-singular, as in merely monotone games, its diagonal is raised a little.
+the path is reached: at a high rho if none was reached yet, else at its own.
 
 Nothing depends on the units of costs, constraints or actions: all is measured by the problem's own
 sizes (:mod:`gne_mj.scales`).
 
-A private constraint is in the rows of its owners only, and keeps its slack all the same.
-
-Newton's matrix dF/dy + sum_l lambda_l d2g_l + dg' diag(lambda / s) dg couples actions of agents
-that meet in a cost or a constraint, and is stored as a band (:mod:`gne_mj.banded`).
+The equations of a step are in :mod:`gne_mj.primal_dual`.
 """
 
 from functools import cache
@@ -26,9 +22,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gne_mj import banded, lines, scales
 from gne_mj import game_functions as games
+from gne_mj import lines, scales
 from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj.primal_dual import (
+    accept,
+    evaluate,
+    find_entries,
+    free_actions,
+    inside,
+    longest,
+    longest_entry,
+    move,
+    newton,
+)
 
 # How an iteration ended
 CONVERGED, OUTSIDE, SINGULAR, NO_WAY_ON, TOO_MANY = range(5)
@@ -47,17 +54,6 @@ SHRINK = 0.1  # of rho, from one equilibrium to the next
 # multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; each
 # LONG steps that this takes, rho grows by GROW.
 PATIENCE, SHORT, CENTRED, LONG, GROW = 3, 0.1, 0.3, 30, 10.0
-# What is added to the diagonal of a matrix that is singular, or whose step is longer than FAR
-# profiles, relative to the rows' own slopes: SHIFT, and so many times HIGHER.
-SHIFT, HIGHER, SHIFTS, FAR = 1e-12, 1e3, 5, 1e6
-
-
-class Free(NamedTuple):
-    """Whose actions are unknown."""
-
-    agents: np.ndarray  # the free agents
-    constraints: np.ndarray  # the constraints that contain an action of theirs
-    position: np.ndarray  # (m,) a free action's row in Newton's matrix, -1 if it is held
 
 
 class Path(NamedTuple):
@@ -72,101 +68,6 @@ class Path(NamedTuple):
     tolerance: float
     spread: float
     to_zero: bool  # last_rho is a share of the costs' size, and no bound is to look blurred there
-
-
-class Iterate(NamedTuple):
-    """A start, and then the result. q is the number of constraints."""
-
-    y: np.ndarray  # (m,)
-    slack: np.ndarray  # (q,) s > 0
-    multipliers: np.ndarray  # (q,) lambda > 0
-
-
-class NewtonScratch(NamedTuple):
-    """Arrays that the method works on; n is the number of free actions."""
-
-    trial: Iterate
-    g: np.ndarray  # (q,)
-    size: np.ndarray  # (q,) size of the terms in g whose rounding shows in it
-    row: np.ndarray  # (q + 1,) where each constraint's entries begin in the next two
-    column: np.ndarray  # the free actions in one constraint after the other
-    owned: np.ndarray  # whether the constraint is one of that action's agent
-    jacobian: np.ndarray  # dg_l/dy_a for them
-    stationarity: np.ndarray  # (n,) F + sum_l lambda_l dg_l
-    terms: np.ndarray  # (n,) sum of the magnitudes of its terms
-    unit: np.ndarray  # (n,) size of each row's terms
-    share: np.ndarray  # (q,) lambda_l s_l is to be this share of rho
-    step: np.ndarray  # (n,)
-    step_slack: np.ndarray  # (q,)
-    step_multipliers: np.ndarray  # (q,)
-    hessian_row: np.ndarray  # (m,) zero between uses
-    band: np.ndarray  # (n, 3 b + 1)
-    pivots: np.ndarray  # (n,)
-
-
-@kernel
-def owns(data, j, l):
-    """Whether constraint l, which contains agent j, is one of its own."""
-    if len(data.own_index) == len(data.member_index):  # all are shared
-        return True
-    for entry in range(data.own_pointer[j], data.own_pointer[j + 1]):
-        if data.own_index[entry] == l:
-            return True
-    return False
-
-
-@kernel
-def find_entries(data, free, work):
-    """Fill row, column and owned: where the constraints' derivatives are that a step needs."""
-    at, entry = data.offsets, 0
-    for k in range(len(free.constraints)):
-        l = free.constraints[k]
-        work.row[k] = entry
-        for member in range(data.member_pointer[l], data.member_pointer[l + 1]):
-            j = data.member_index[member]
-            if free.position[at[j]] >= 0:
-                owned = owns(data, j, l)
-                for a in range(at[j], at[j + 1]):
-                    work.column[entry] = a
-                    work.owned[entry] = owned
-                    entry += 1
-    work.row[len(free.constraints)] = entry
-
-
-@kernel
-def inside(data, free, y, work):
-    """Fill g; False if y is not strictly inside."""
-    games.values(data, free.constraints, y, work.g)
-    good = True
-    for k in range(len(free.constraints)):
-        work.g[k] += data.tightening[free.constraints[k]]
-        good &= work.g[k] < 0.0
-    return good
-
-
-@kernel
-def evaluate(data, free, point, work):
-    """Fill the Jacobian and the stationarity residual."""
-    at, gradient = data.offsets, work.hessian_row
-    games.gradients(data, free.agents, point.y, gradient)
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        for a in range(at[i], at[i + 1]):
-            work.stationarity[free.position[a]] = gradient[a]
-            work.terms[free.position[a]] = abs(gradient[a])
-            gradient[a] = 0.0
-    games.slopes(data, free.constraints, work.row, work.column, point.y, work.jacobian)
-    for k in range(len(free.constraints)):
-        size = 0.0
-        for entry in range(work.row[k], work.row[k + 1]):
-            a = work.column[entry]
-            slope = work.jacobian[entry]
-            size += abs(slope * point.y[a])
-            if work.owned[entry]:
-                r = free.position[a]
-                work.stationarity[r] += point.multipliers[k] * slope
-                work.terms[r] += point.multipliers[k] * abs(slope)
-        work.size[k] = size
 
 
 @kernel
@@ -230,127 +131,12 @@ def complementarity(constraints, point):
 
 
 @kernel
-def assemble(data, free, count, length, shift, point, b, work):
-    """Fill the band with Newton's matrix, rows in the order of ``free.position``; the costs' size.
-
-    ``shift`` is added to the diagonal, relative to the rows' own slopes.
-    """
-    position, band = free.position, work.band
-    size = scales.add_costs(data, free, length, point.y, b, work)
-    if shift > 0.0:
-        for r in range(count):
-            band[r, b] += shift * work.unit[r] / length
-    for k in range(len(free.constraints)):
-        l = free.constraints[k]
-        weight = point.multipliers[k]
-        ratio = weight / point.slack[k]
-        for entry in range(work.row[k], work.row[k + 1]):
-            if not work.owned[entry]:
-                continue
-            a = work.column[entry]
-            r = position[a]
-            slope = ratio * work.jacobian[entry]
-            for other in range(work.row[k], work.row[k + 1]):
-                c = work.column[other]
-                second = weight * games.constraint_hessian(data, l, a, c, point.y)
-                band[r, position[c] - r + b] += second + slope * work.jacobian[other]
-    return size
-
-
-@kernel
-def newton(data, free, count, rho, length, point, b, work):
-    """Fill the steps of y, s and lambda towards their rho; the costs' size, -1 if singular."""
-    shift, solved, size = 0.0, False, 0.0
-    for _ in range(SHIFTS):
-        size = assemble(data, free, count, length, shift, point, b, work)
-        solved = banded.factorise(work.band, count, b, work.pivots)
-        if solved:
-            solved = solve(free, count, rho, length, point, b, work)
-        if solved:
-            break
-        shift = max(SHIFT, HIGHER * shift)
-    if not solved:
-        return -1.0
-    for k in range(len(free.constraints)):
-        along = 0.0
-        for entry in range(work.row[k], work.row[k + 1]):
-            along += work.jacobian[entry] * work.step[free.position[work.column[entry]]]
-        work.step_slack[k] = -(work.g[k] + point.slack[k]) - along
-        work.step_multipliers[k] += point.multipliers[k] / point.slack[k] * along
-    return size
-
-
-@kernel
-def longest_entry(count, step):
-    """Greatest magnitude of the first entries, not a number if one of them is none."""
-    longest = 0.0
-    for r in range(count):
-        size = abs(step[r])
-        if not size <= longest:
-            longest = size
-    return longest
-
-
-@kernel
-def solve(free, count, rho, length, point, b, work):
-    """Fill the step of y, and lambda's if y stayed; False if it leads nowhere near."""
-    for r in range(count):
-        work.step[r] = -work.stationarity[r]
-    for k in range(len(free.constraints)):
-        change = (work.share[k] * rho + point.multipliers[k] * work.g[k]) / point.slack[k]
-        work.step_multipliers[k] = change
-        for entry in range(work.row[k], work.row[k + 1]):
-            if work.owned[entry]:
-                work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
-    banded.solve(work.band, count, b, work.pivots, work.step)
-    return longest_entry(count, work.step) <= FAR * length
-
-
-@kernel
-def longest(constraints, keep, point, work):
-    """Longest step, at most 1, that leaves slacks and multipliers a share ``keep`` of theirs."""
-    length = 1.0
-    for k in range(constraints):
-        if work.step_slack[k] < 0.0:
-            length = min(length, (keep - 1.0) * point.slack[k] / work.step_slack[k])
-        if work.step_multipliers[k] < 0.0:
-            length = min(length, (keep - 1.0) * point.multipliers[k] / work.step_multipliers[k])
-    return length
-
-
-@kernel
 def local_length(constraints, point, work):
     """Length of the step relative to the distances to the bounds, all together."""
     total = 0.0
     for k in range(constraints):
         total += (work.step_slack[k] / point.slack[k]) ** 2
     return np.sqrt(total)
-
-
-@kernel
-def move(data, free, length, point, work):
-    """Set the trial to the point that many steps on."""
-    at = data.offsets
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        for a in range(at[i], at[i + 1]):
-            work.trial.y[a] = point.y[a] + length * work.step[free.position[a]]
-    for k in range(len(free.constraints)):
-        work.trial.slack[k] = point.slack[k] + length * work.step_slack[k]
-        work.trial.multipliers[k] = point.multipliers[k] + length * work.step_multipliers[k]
-
-
-@kernel
-def accept(data, free, point, trial):
-    """Make the trial the point; held actions are equal in both."""
-    at = data.offsets
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        for a in range(at[i], at[i + 1]):
-            point.y[a] = trial.y[a]
-    for k in range(len(free.constraints)):
-        point.slack[k] = trial.slack[k]
-        point.multipliers[k] = trial.multipliers[k]
 
 
 @kernel
@@ -375,7 +161,8 @@ def begin(data, free, count, b, path, known, point, work):
     if known:
         return path.rho, path.rho, length, size
     last = path.last_rho * size if path.to_zero else path.last_rho
-    highest = max(last, path.rho if path.rho > 0.0 else scales.pull(count, work) * length)
+    suited = path.rho if path.rho > 0.0 else scales.largest_gradient(count, work) * length
+    highest = max(last, suited)
     rho = max(last, scales.balance(count, constraints, free, highest, work))
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
@@ -457,16 +244,6 @@ def follow(data, free, half_band, path, known, point, work, report):
             rho, slow = higher, 0
             centre(data, free, rho, point, work)
     return TOO_MANY
-
-
-@kernel
-def free_actions(data, free):
-    """How many actions move."""
-    count = 0
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        count += data.offsets[i + 1] - data.offsets[i]
-    return count
 
 
 @kernel

@@ -81,7 +81,7 @@ def length_at(count, constraints, free, y, work):
 
 
 @kernel
-def pull(count, work):
+def largest_gradient(count, work):
     """Greatest entry of F; the stationarity residual must be F alone."""
     value = 0.0
     for r in range(count):
@@ -91,24 +91,24 @@ def pull(count, work):
 
 @kernel
 def balance(count, constraints, free, highest, work):
-    """Near the path its own rho, at which the barrier pushes as hard as F pulls; else ``highest``.
+    """Near the path its own rho, where the barrier's gradient is as large as F; else ``highest``.
 
     Elsewhere a high rho leads away from the bounds first: along curved ones steps are tiny. The
     stationarity residual must be F alone.
     """
-    pull, push, along = 0.0, 0.0, 0.0
+    costs, barrier, along = 0.0, 0.0, 0.0
     for r in range(count):
-        pull += work.stationarity[r] ** 2
+        costs += work.stationarity[r] ** 2
         work.step[r] = 0.0
     for k in range(constraints):
         for entry in range(work.row[k], work.row[k + 1]):
             if work.owned[entry]:
                 work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
     for r in range(count):
-        push += work.step[r] ** 2
+        barrier += work.step[r] ** 2
         along -= work.stationarity[r] * work.step[r]
-    aligned = along > ALIGNED * np.sqrt(pull * push)
-    return min(np.sqrt(pull / push), highest) if aligned else highest
+    aligned = along > ALIGNED * np.sqrt(costs * barrier)
+    return min(np.sqrt(costs / barrier), highest) if aligned else highest
 
 
 @kernel

@@ -94,10 +94,10 @@ def _towards(game: Game, y: NDArray[np.float64], depth: float) -> NDArray[np.flo
         steep[~(steep > 0.0)] = np.inf  # nothing to be learnt from this one here
         short = _short(game, y, steep, depth)
         rows = jacobian[short > 0.0] / steep[short > 0.0, None]
-        pull = rows.T @ short[short > 0.0]
+        right = rows.T @ short[short > 0.0]
         square = rows.T @ rows
         while damping < 1e12:
-            step = np.linalg.solve(square + damping * np.eye(len(y)), pull)
+            step = np.linalg.solve(square + damping * np.eye(len(y)), right)
             found = _short(game, y - step, steep, depth)
             if np.sum(found**2) < np.sum(short**2):
                 break

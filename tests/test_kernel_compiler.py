@@ -7,8 +7,9 @@ import numpy as np
 from numba import types
 
 from gne_mj import native
-from gne_mj.interior_point import Free, Iterate, Path
+from gne_mj.interior_point import Path
 from gne_mj.kernel_compiler import _INHERITED
+from gne_mj.primal_dual import Free, Iterate
 
 
 class Elsewhere(NamedTuple):

@@ -12,7 +12,7 @@ from gne_mj.errors import EngineError
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.layout import steps_of
-from gne_mj.loops.mujoco import workspace_of
+from gne_mj.loops.mujoco_workspace import workspace_of
 from gne_mj.plants.native_mujoco import callbacks
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION

@@ -57,7 +57,7 @@ class Structure:
         memory = len(system.loop_memory)
         if self._plant is None:
             return ode_parameter_block(setup, system.agents, memory)
-        from gne_mj.loops.mujoco import mujoco_parameter_block
+        from gne_mj.loops.mujoco_workspace import mujoco_parameter_block
 
         return mujoco_parameter_block(self._plant, setup, system.agents, memory)
 

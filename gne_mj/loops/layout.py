@@ -219,11 +219,6 @@ class Instant(NamedTuple):
 def parts_in(parameter_block, workspace):
     """The parts of a run, from its parameter block and workspace."""
     return Parts(
-        problem_in(parameter_block),
-        channels_in(parameter_block),
-        clock_in(parameter_block),
-        workspace.monitor.numbers,
-        workspace.monitor,
-        workspace.u,
-        workspace.work,
-    )
+        problem_in(parameter_block), channels_in(parameter_block), clock_in(parameter_block),
+        workspace.monitor.numbers, workspace.monitor, workspace.u, workspace.work,
+    )  # fmt: skip

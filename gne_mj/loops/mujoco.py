@@ -5,137 +5,52 @@ itself: the first one of each step measures, acts and observes exactly as the OD
 (:func:`gne_mj.loops.ode.control_step`), and writes a row if one is due; later ones, in mode
 `continuous`, only act. In that mode the law's memory is in ``act``, moved by MuJoCo's integrator at
 the rates that a second callback gives; in the held modes it is in ``userdata``, where nothing but
-the law moves it. What else is kept from call to call is in ``userdata`` as well; both are part of
-MuJoCo's state. userdata holds [mark, address of the parameter block, the fleet's own, the loop's
-workspace].
+the law moves it. What else is kept from call to call is there as well
+(:mod:`gne_mj.loops.mujoco_workspace`).
 """
 
 from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.errors import EngineError
-from gne_mj.game_model import Game
-from gne_mj.loops import division, faultless, functions
+from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import ClosedLoop, Present, Samples
-from gne_mj.loops.feedback import NO_SIZES
-from gne_mj.loops.feedback import Sizes as LoopSizes
+from gne_mj.loops.base import Present
 from gne_mj.loops.layout import (
-    SCRATCH,
     Instant,
-    Setup,
-    Steps,
-    Workspace,
-    parameter_arrays,
     parts_in,
     problem_in,
     steps_in,
-    steps_of,
 )
+from gne_mj.loops.mujoco_workspace import place_of, workspace_at
 from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, control_step
-from gne_mj.loops.recorder import Recorder, record
+from gne_mj.loops.recorder import record
 from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
-from gne_mj.parameter_block import ParameterBlock, integers
-from gne_mj.plants.agents import Agents
-from gne_mj.plants.mujoco import PLACES, STAGES, Sizes, sizes_in
+from gne_mj.parameter_block import integers
+from gne_mj.plants.mujoco import PLACES
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
-    LOOP_MARK,
     STATE,
-    USERDATA_HEADER,
     Offsets,
     address_of,
     call,
     call_state,
-    callbacks,
     field,
     forces_lost,
-    offsets,
     parameter_block_of,
     set_number,
     state_functions,
     step_address,
     timed_step,
 )
-from gne_mj.records import by_name, dtype_of, in_array
 
 if TYPE_CHECKING:
-    from gne_mj.plants.fleet_plant import FleetPlant
-
-
-class MujocoWorkspace(NamedTuple):
-    """What changes in a run, in userdata."""
-
-    loop: Workspace
-    state: Annotated[np.ndarray, "m * states"]  # flat, at the step's start
-    later: Annotated[np.ndarray, "m * states"]  # and at a later stage
-    memory: Annotated[np.ndarray, "held"]  # the law's, in the held modes
-
-
-_length, _workspace_in = in_array(
-    MujocoWorkspace, "m p agents states held history solver", **SCRATCH
-)
-
-
-@kernel
-def held_memory(s):
-    """Entries of a law's memory in userdata: the others are in act."""
-    return 0 if s.mode == CONTINUOUS else s.memory
-
-
-@kernel
-def mujoco_workspace_length(s):
-    """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
-    return _length(
-        s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history, s.solver
-    )
-
-
-@kernel
-def mujoco_workspace_in(userdata, start, s):
-    """The views of a workspace that begins there."""
-    return _workspace_in(
-        userdata, start, s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history,
-        s.solver,
-    )  # fmt: skip
-
-
-def workspace_of(userdata: NDArray[np.float64], start: int, s: Steps) -> Any:
-    """The same as Python knows it, by name."""
-    dtype = dtype_of(
-        MujocoWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-        held=held_memory(s), history=s.history, solver=s.solver, **SCRATCH,
-    )  # fmt: skip
-    return by_name(userdata[start:], dtype)
-
-
-class Place(NamedTuple):
-    """Where a simulation's numbers are: addresses, and what the fleet's parameter block says."""
-
-    at: Offsets
-    parameter_block: int
-    model: int
-    data: int
-    sizes: Sizes
-
-
-@kernel
-def place_of(at, parameter_block, model, data):
-    """The place of a simulation that is ours."""
-    return Place(at, parameter_block, model, data, sizes_in(parameter_block))
-
-
-@kernel
-def workspace_at(place, steps):
-    """A simulation's workspace."""
-    userdata = field(place.data, place.at.userdata, place.sizes.nuserdata)
-    return mujoco_workspace_in(userdata, place.sizes.workspace, steps)
+    pass
 
 
 def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
@@ -162,11 +77,8 @@ def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
             return
         parts, work = parts_in(parameter_block, workspace.loop), workspace.loop.work
         monitor, divided, h = parts.monitor, work.division, parts.clock.h
-        time, length, state = (
-            division.begins(divided, step, h),
-            division.piece(divided, h),
-            workspace.state,
-        )
+        time, length = division.begins(divided, step, h), division.piece(divided, h)
+        state = workspace.state
         if stage > 0:
             time += length if stage == 3 else 0.5 * length
             state = workspace.later
@@ -310,11 +222,8 @@ def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
         parameter_block = parameter_block_of(at, model, data)
         place, steps = place_of(at, parameter_block, model, data), steps_in(parameter_block)
         workspace = workspace_at(place, steps)
-        parts, progress, state = (
-            parts_in(parameter_block, workspace.loop),
-            workspace.loop.progress,
-            workspace.state,
-        )
+        parts, progress = parts_in(parameter_block, workspace.loop), workspace.loop.progress
+        state = workspace.state
         memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
         divided, h, moving = parts.work.division, parts.clock.h, steps.mode == CONTINUOUS
         step, done, result = np.int64(progress.step), 0, UNDER_WAY
@@ -361,173 +270,6 @@ def machine_of(model: mujoco.MjModel, data: mujoco.MjData, saved: NDArray[np.flo
     return Machine(step_address(), *state_functions(), model._address, data._address, saved)
 
 
-def workspace(
-    game: Game, agents: Agents, memory: int, mode: int, sizes: LoopSizes = NO_SIZES
-) -> tuple[int, int]:
-    """Entries of userdata, and of act, that a plant must leave for this game's loop.
-
-    Args:
-        game, agents: of the loop.
-        memory: length of the law's memory.
-        mode: CONTINUOUS, SAMPLED or IMPLICIT of :mod:`gne_mj.loops.ode`.
-        sizes: of the scratch arrays that depend on the kind of loop.
-    """
-    held, moved = (0, memory) if mode == CONTINUOUS else (memory, 0)
-    needed = _length(game.actions, game.constraints_count, game.agents, agents.states, held, *sizes)
-    return int(needed), moved
-
-
-def mujoco_parameter_block(
-    plant: "FleetPlant", setup: Setup, agents: Agents, memory: int
-) -> ParameterBlock:
-    """The parameter block of a run: the plant's places and sizes, the robots' numbers, and the
-    rest."""
-    arrays = parameter_arrays(
-        plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator]
-    )
-    return ParameterBlock(arrays)
-
-
-class MujocoLoop(ClosedLoop):
-    """The closed loop of a fleet in MuJoCo.
-
-    Args:
-        plant: the fleet, reset to its start, with :func:`workspace` in its userdata and for the
-        memory.
-        setup: what the run is made of.
-        memory: the law's, at the start.
-        faults: module of kernels, see :func:`gne_mj.loops.ode.control_step`.
-    """
-
-    def __init__(
-        self,
-        plant: "FleetPlant",
-        setup: Setup,
-        memory: NDArray[np.float64],
-        faults: ModuleType = faultless,
-    ) -> None:
-        self.plant = plant
-        self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
-        self._parameter_block = mujoco_parameter_block(plant, setup, plant.agents, len(memory))
-        self._faulty = faults is not faultless
-        data, sizes = plant.data, steps_of(self._parameter_block)
-        workspace = workspace_of(data.userdata, plant.sizes.workspace, sizes)
-        self._progress, self.monitor, self._u = (
-            workspace.loop,
-            workspace.loop.monitor,
-            workspace.loop.u,
-        )
-        self._memory = put_start(data, self._parameter_block, setup.clock.mode, memory)
-        moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
-        self._remembers = moved  # by MuJoCo's integrator
-        self._machine = machine_of(plant.model, data, workspace_for_states(plant.model))
-
-    @property
-    def _step(self) -> int:
-        """Steps taken; in userdata, so that a state that is set again brings its own time."""
-        return int(self._progress.step)
-
-    @property
-    def time(self) -> float:
-        """Time of the present state in s."""
-        return self._step * self.plant.timestep
-
-    def advance(self, samples: int, every: int) -> Samples:
-        """See the base class."""
-        if self.monitor.exit != watch.INSIDE:
-            samples = 0
-        data, first = self.plant.data, self._step
-        recorder = self._recorder(samples, every)
-        self._progress.stage = 0.0
-        remember = self._remember if self._remembers else None
-        with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
-            steps = self._advance(self._machine, samples * every)
-        # The callback counts steps, but one that ended in an exit was not taken.
-        self._progress.step = first + steps
-        self._progress.recorder = 0.0
-        data.time = self.time
-        return recorder.samples(0)
-
-    def finish(self) -> Samples:
-        """See the base class."""
-        data = self.plant.data
-        state = self.plant.state
-        recorder = self._recorder(1, 1)
-        with callbacks(passive=self.plant.passive):
-            observe(self.plant, self._control, self._progress)
-        self._progress.recorder = 0.0
-        if recorder.done[0]:
-            return recorder.samples(0)
-        none = np.full((1, len(self._u)), np.nan)
-        faulty_rows = none[:, : len(self._u) * self._faulty]
-        qpos = data.qpos[None, : self.plant.configuration].copy()
-        return Samples(state[None], none, self._memory[None].copy(), faulty_rows, faulty_rows, qpos)
-
-    def present(self) -> Present:
-        """See the base class."""
-        qpos = self.plant.data.qpos[: self.plant.configuration].copy()
-        return Present(self.plant.state, self._memory.copy(), qpos)
-
-    def _adopt(self, setup: Setup) -> None:
-        self._parameter_block = mujoco_parameter_block(
-            self.plant, setup, self.plant.agents, len(self._memory)
-        )
-
-    def push(self, force: NDArray[np.float64]) -> None:
-        """See the base class; forces are MuJoCo's qfrc_applied at the outputs' joints."""
-        at = self.plant.output_joints
-        if np.any(force[at < 0]):
-            raise EngineError(
-                "this robot's output is a sensor's, not a joint's: nothing to push at"
-            )
-        self.plant.data.qfrc_applied[at[at >= 0]] = force[at >= 0]
-
-    def _recorder(self, rows: int, every: int) -> Recorder:
-        """Room for rows from now on, made known to the callbacks."""
-        agents, userdata = self.plant.agents, self.plant.data.userdata
-        # Marked as this loop's again: the plant's own step may have come between.
-        if userdata[0] == 0.0:
-            raise EngineError(
-                "the loop's MuJoCo data was reset: make a new loop to start from there"
-            )
-        userdata[:USERDATA_HEADER] = LOOP_MARK, self._parameter_block.address
-        recorder = Recorder(
-            1, rows, (agents.channels, agents.states), len(self._memory), self._faulty,
-            self.plant.configuration, first=self._step, every=every,
-        )  # fmt: skip
-        self._progress.recorder = recorder.addresses[0]
-        return recorder
-
-
-def observe(plant: "FleetPlant", control: Any, progress: Any) -> None:
-    """Observe the present state without moving on, by the callback of a step's start.
-
-    Args:
-        plant: with mjData of a loop.
-        control: the loop's callback.
-        progress: of the loop, as its workspace in userdata has it.
-
-    The plant's callbacks must be installed.
-    """
-    model, data = plant.model, plant.data
-    plant.refresh()
-    step, progress.stage = progress.step, 0.0
-    control.ctypes(model._address, data._address)
-    progress.step, progress.stage = step, 0.0
-
-
 def workspace_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
     """Two rows for what a step of MuJoCo starts from."""
     return np.zeros((2, mujoco.mj_stateSize(model, STATE)))
-
-
-def put_start(
-    data: mujoco.MjData, parameter_block: ParameterBlock, mode: int, memory: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Make mjData the start of a run; returns the memory."""
-    data.userdata[:] = 0.0
-    place = data.act if mode == CONTINUOUS and len(memory) else data.userdata
-    held: NDArray[np.float64] = place[len(place) - len(memory) :]
-    held[:] = memory
-    data.userdata[:USERDATA_HEADER] = LOOP_MARK, parameter_block.address
-    return held

@@ -14,14 +14,9 @@ import numpy as np
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
 from gne_mj.loops.layout import steps_of
-from gne_mj.loops.mujoco import (
-    build,
-    machine_of,
-    observe,
-    put_start,
-    workspace_for_states,
-    workspace_of,
-)
+from gne_mj.loops.mujoco import build, machine_of, workspace_for_states
+from gne_mj.loops.mujoco_loop import observe
+from gne_mj.loops.mujoco_workspace import put_start, workspace_of
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants.native_mujoco import callbacks, offsets

@@ -350,11 +350,8 @@ class OdeLoop(ClosedLoop):
         if len(rows.input):
             return rows
         state, memory, _ = (row[None] for row in self.present())
-        none = (
-            np.full((1, row.shape[1]), np.nan)
-            for row in (rows.input, rows.measurement, rows.applied)
-        )
-        u, measurement, applied = none
+        columns = rows.input, rows.measurement, rows.applied
+        u, measurement, applied = (np.full((1, row.shape[1]), np.nan) for row in columns)
         return Samples(state, u, memory, measurement, applied, u[:, :0])
 
     def present(self) -> Present:

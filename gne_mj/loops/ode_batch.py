@@ -51,10 +51,8 @@ class OdeBatch(BatchLoop):
             part = slice(first, first + PIECE)
             flat = np.zeros((len(addresses[part]), length))
             workspaces = workspaces_of(flat, sizes)
-            workspaces.loop.recorder, workspaces.vectors.state = (
-                recorder.addresses[part],
-                starts[part],
-            )
+            workspaces.loop.recorder = recorder.addresses[part]
+            workspaces.vectors.state = starts[part]
             at = flat.ctypes.data + 8 * length * np.arange(len(flat))
             for done in range(0, span.steps, STRIDE):
                 if stopped():

@@ -44,7 +44,7 @@ class StageSystem(NamedTuple):
     own: Annotated[np.ndarray, "m, m"]  # du/dy and, off the agents' own blocks, du/d estimate
     filtered: Annotated[np.ndarray, "m, m"]  # du/dz
     decay: Annotated[np.ndarray, "N - 1, m"]  # 1 / (epsilon s + lambda)
-    pull: Annotated[np.ndarray, "N - 1, m"]  # what a k_y of 1 adds to k_w
+    mode_response: Annotated[np.ndarray, "N - 1, m"]  # what a k_y of 1 adds to k_w
     spread: Annotated[np.ndarray, "N, m"]  # T: what a k_y of 1 adds to k_e
     # what k_y adds to k_u, directly and through z and the estimates
     slope: Annotated[np.ndarray, "m, m"]
@@ -139,11 +139,11 @@ def prepare(fixed, h, system):
     for a in range(agents - 1):
         for r in range(m):
             system.decay[a, r] = 1.0 / (epsilon * s + modes.rates[a, r])
-            system.pull[a, r] = modes.rates[a, r] * modes.rest[a, r] * system.decay[a, r]
+            system.mode_response[a, r] = modes.rates[a, r] * modes.rest[a, r] * system.decay[a, r]
     for i in range(agents):
         for r in range(m):
             system.spread[i, r] = 0.0
-    add_from_modes(modes.vectors, system.pull, system.spread)
+    add_from_modes(modes.vectors, system.mode_response, system.spread)
     for r in range(m):
         if not respond(system, r, states, s):
             return False
@@ -298,4 +298,4 @@ def add_input(output, filter_gain, now, system):
             now.e[i, r] += system.spread[i, r] * k_y[r]
     for a in range(len(now.w)):
         for r in range(m):
-            now.w[a, r] += system.pull[a, r] * k_y[r]
+            now.w[a, r] += system.mode_response[a, r] * k_y[r]

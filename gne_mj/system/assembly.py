@@ -65,7 +65,7 @@ class Assembly(SystemData):
         memory = self.loop_memory
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
-            from gne_mj.loops.mujoco import MujocoLoop
+            from gne_mj.loops.mujoco_loop import MujocoLoop
             from gne_mj.plants.fleet import MANY
 
             if plant is None:
@@ -164,11 +164,11 @@ class Assembly(SystemData):
             clock: how to step.
             decorated: keep what is for the eye only; MJCF robots keep all in any case.
         """
-        from gne_mj.loops.mujoco import workspace
+        from gne_mj.loops.mujoco_workspace import entries_needed
         from gne_mj.plants.fleet_plant import build_fleet
 
         mode = mode_of(self)
-        userdata, memory = workspace(
+        userdata, memory = entries_needed(
             self.game, self.agents, len(self.loop_memory), mode.native, self._sizes
         )
         plant = build_fleet(

@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 MODULES = (
     "controllers", "gne_mj/games", "gne_mj/barrier.py", "gne_mj/loops", "gne_mj/margins.py",
     "gne_mj/theory", "gne_mj/run_metrics.py", "gne_mj/certificate.py", "gne_mj/interior_point.py",
+    "gne_mj/primal_dual.py",
     "gne_mj/equilibrium.py", "gne_mj/solutions.py", "gne_mj/batches",
 )  # fmt: skip
 OUTCOMES = ("killed", "timed out", "survived", "equivalent", "undecided")

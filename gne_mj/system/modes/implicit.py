@@ -51,7 +51,7 @@ class Implicit(Mode):
         return local if system.decentralised or system.law.alone else joint
 
     def prediction(self, system: SystemData) -> Mapping[int, Any]:
-        """The law's pull, the equation's solver, and what is done at a control instant."""
+        """The law's barrier-free part, the equation's solver, and what a control instant does."""
         plant: ModuleType = zero_order_hold
         at: Any = ()
         if not has_ode(system.agents.kind):
@@ -96,7 +96,7 @@ class Implicit(Mode):
         return system.law.theorem is not None and not system.law.alone
 
     def check_law(self, system: SystemData) -> None:
-        """It needs the law's pull, with its derivative."""
+        """It needs the law's barrier-free part, with its derivative."""
         super().check_law(system)
         if not system.law.implicit:
             raise InvalidInput(
