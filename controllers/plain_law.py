@@ -6,6 +6,7 @@ The functions get NumPy arrays and the game as a Python object, and run in every
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -105,7 +106,10 @@ class PlainLaw(Law):
 
 
 def _name(function: Callable[..., Any]) -> str:
-    return str(getattr(getattr(function, "func", function), "__name__", function))
+    while isinstance(function, partial):  # with its parameters, or for each agent
+        inner = next((each for each in function.args if callable(each)), function.func)
+        function = inner
+    return str(getattr(function, "__name__", function))
 
 
 def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:

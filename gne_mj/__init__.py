@@ -12,6 +12,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gne_mj.barrier import LogBarrier
     from gne_mj.batches import open_batch
     from gne_mj.batches import run_batch as batch
     from gne_mj.environment import load_environment
@@ -64,6 +65,7 @@ __all__ = [
     "Figures",
     "Game",
     "Graph",
+    "LogBarrier",
     "Run",
     "Scenario",
     "Simulation",
@@ -118,6 +120,7 @@ _PLACES = {
     "Clock": "gne_mj.system",
     "Game": "gne_mj.game_model",
     "Graph": "gne_mj.graph",
+    "LogBarrier": "gne_mj.barrier",
     "Scenario": "gne_mj.scenario",
     "Simulation": "gne_mj.simulation",
     "System": "gne_mj.system",

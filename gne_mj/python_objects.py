@@ -94,4 +94,6 @@ class PythonLaw(NetworkTable):
             return made
         functions = made.functions
         name = getattr(functions["action"], "__name__", "law")
-        return plain_law(game, functions, self.parameters, "object", name)
+        return plain_law(
+            game, self.network(game.agents), functions, self.parameters, "object", name
+        )

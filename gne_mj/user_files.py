@@ -4,8 +4,9 @@ A game's file has ``game(count, **parameters)``, which returns a :class:`gne_mj.
 its functions are plain ones or all kernels (named in :mod:`gne_mj.game_model`). A law's file has
 ``law(game, graph, **parameters)``, which returns a :class:`gne_mj.controllers.Law`, or the plain
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
-for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; all of them take
-the scenario's parameters too, by name. An agent type's file has constants and kernels as
+for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; or those of one
+agent, ``action(agent)`` and so on (:mod:`gne_mj.controllers.local_law`). All of them take the
+scenario's parameters too, by name. An agent type's file has constants and kernels as
 :mod:`gne_mj.plants.agent_type` lists them.
 """
 
@@ -25,6 +26,7 @@ from pydantic import Field
 
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
+from gne_mj.controllers.local_law import is_local, joined
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.errors import USER_MODULES, GneError, InvalidInput, named, raised
 from gne_mj.game_model import Game
@@ -38,12 +40,14 @@ from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, GAMES, LAWS
 from gne_mj.toml_table import Fills, PerAgent, Sizes, dimension_of, per_agent
 
-# What the functions of a plain law are called, and take besides the scenario's parameters
+# What the functions of a plain law are called, and take besides the scenario's parameters; and
+# those of one agent
 _LAW_FUNCTIONS = {
     "action": ("game", "rho", "y", "memory"),
     "rate": ("game", "rho", "y", "memory"),
     "initial_memory": ("y",),
 }
+_LOCAL_FUNCTIONS = dict.fromkeys(_LAW_FUNCTIONS, ("agent",))
 # The kernels of a law's module
 _LAW_KERNELS = {
     "action": ("game", "problem", "y", "weights", "memory", "work", "u"),
@@ -72,9 +76,7 @@ def load_game(path: str | Path, count: int, parameters: Mapping[str, Any]) -> Ga
     return game
 
 
-def load_law(
-    path: str | Path, game: Game, graph: Graph | None, parameters: Mapping[str, Any]
-) -> Law:
+def load_law(path: str | Path, game: Game, graph: Graph, parameters: Mapping[str, Any]) -> Law:
     """The law of a file for a game.
 
     Raises:
@@ -91,11 +93,12 @@ def load_law(
         raise InvalidInput("path", str(path), "it must define law(game, graph, ...) or action(...)")
     functions = {name: getattr(module, name) for name in _LAW_FUNCTIONS if hasattr(module, name)}
     with named(rate="path"):
-        return plain_law(game, functions, parameters, "path", Path(path).name)
+        return plain_law(game, graph, functions, parameters, "path", Path(path).name)
 
 
 def plain_law(
     game: Game,
+    graph: Graph,
     functions: Mapping[str, Callable[..., Any]],
     parameters: Mapping[str, Any],
     key: str,
@@ -105,6 +108,7 @@ def plain_law(
 
     Args:
         game: what is played.
+        graph: what functions of one agent hear by (:mod:`gne_mj.controllers.local_law`).
         functions: by these names.
         parameters: which all of them take by name, besides their own arguments.
         key, name: what messages call where they are from, and its name there.
@@ -112,10 +116,14 @@ def plain_law(
     Raises:
         InvalidInput: one takes other arguments, or ``rate`` is without ``initial_memory``.
     """
-    made = {}
+    local = is_local(functions)
+    made: dict[str, Callable[..., Any]] = {}
     for each, function in functions.items():
-        check_arguments(key, name, function, each, _LAW_FUNCTIONS[each], parameters)
+        arguments = (_LOCAL_FUNCTIONS if local else _LAW_FUNCTIONS)[each]
+        check_arguments(key, name, function, each, arguments, parameters)
         made[each] = partial(function, **parameters)
+    if local:
+        made = joined(made, game, graph)
     return PlainLaw(game, memory=made.pop("initial_memory", None), **made)
 
 

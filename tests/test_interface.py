@@ -347,13 +347,18 @@ def test_reprs_are_short_and_say_what_it_is():
     def still(game, rho, y, memory):
         return 0.0 * y
 
+    def alone(agent, gain):
+        return -gain * agent.y
+
     plain = gm.setup(GAME, law=still).system_objects()[0].law
+    local = gm.setup(GAME, law=gm.own_law(alone, gain=1.0)).system_objects()[0].law
     shown = {
         "Game 'own game': 6 agents, 6 actions, 7 constraints": GAME,
         "Game 'velocity synchronisation": velocity_game(5, 3.0, 3.0),
         "System 'players': own game": run.system,
         "FullInformation()": run.system.law,
         "PlainLaw of still, without a memory": plain,
+        "PlainLaw of alone, without a memory": local,
         "Graph of 6 agents, 6 edges, lambda_2 = 1": gm.ring(6),
         "Simulation of players: 0 of 1 s": simulation,
         "Trajectory of players: completed": run,

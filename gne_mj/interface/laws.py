@@ -76,10 +76,15 @@ def own_law(
     rate: Callable[..., ArrayLike] | None = None,
     initial_memory: Callable[..., ArrayLike] | None = None,
     *,
+    graph: Network = "ring",
     mode: str = "continuous",
     **parameters: Any,
 ) -> LawTable:
     """A law of plain Python functions, for a first try; nothing is claimed of it.
+
+    Functions whose first argument is called ``agent`` are one agent's: they are called for each
+    with a :class:`gne_mj.controllers.local_law.Agent`, which has that agent's action, memory, cost,
+    constraints and neighbours, and nothing else. Others see the whole game.
 
     >>> def damped(game, rho, y, memory, gain):
     ...     slope = game.constraint_jacobian(y).T @ (rho / -game.constraints(y))
@@ -87,10 +92,13 @@ def own_law(
     >>> law = gne_mj.own_law(damped, gain=2.0)
 
     Args:
-        action: ``action(game, rho, y, memory, **parameters)`` returns u, shape (m,).
-        rate: ``rate(game, rho, y, memory, **parameters)`` returns the memory's rate; only with a
-            memory.
-        initial_memory: ``initial_memory(y, **parameters)`` returns the memory at the start.
+        action: ``action(game, rho, y, memory, **parameters)`` returns u, shape (m,); or
+            ``action(agent, **parameters)`` returns u_i, shape (m_i,).
+        rate: ``rate(game, rho, y, memory, **parameters)``, or ``rate(agent, **parameters)``,
+            returns the memory's rate; only with a memory.
+        initial_memory: ``initial_memory(y, **parameters)``, or ``initial_memory(agent,
+            **parameters)``, returns the memory at the start.
+        graph: over which agents hear each other.
         mode: "continuous"; a law without a memory also "sampled".
         **parameters: numbers and lists, which can be changed and swept as
             ``controller.parameters.NAME``.
@@ -98,5 +106,5 @@ def own_law(
     given = {"action": action, "rate": rate, "initial_memory": initial_memory}
     functions = {name: function for name, function in given.items() if function is not None}
     name = keep(LawFunctions(functions), getattr(action, "__name__", "law"))
-    return made(PythonLaw, information="python", object=name, mode=mode,
+    return made(PythonLaw, information="python", object=name, graph=graph, mode=mode,
                 parameters=parameters)  # fmt: skip
