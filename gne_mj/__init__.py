@@ -163,14 +163,16 @@ def __dir__() -> list[str]:
     return [*__all__, *(name for name in globals() if name.startswith("__"))]
 
 
-def __getattr__(name: str) -> Any:
-    if name in __all__:
-        module = import_module(_PLACES.get(name, "gne_mj.interface"))
-        found = getattr(module, _NAMES.get(name, name))
-        globals()[name] = found  # looked for once
-        return found
-    near = "" if name.startswith("_") else _nearest(name)
-    raise AttributeError(f"module 'gne_mj' has no attribute {name!r}{near}")
+if not TYPE_CHECKING:  # to a type checker the names above are all there are
+
+    def __getattr__(name: str) -> Any:
+        if name in __all__:
+            module = import_module(_PLACES.get(name, "gne_mj.interface"))
+            found = getattr(module, _NAMES.get(name, name))
+            globals()[name] = found  # looked for once
+            return found
+        near = "" if name.startswith("_") else _nearest(name)
+        raise AttributeError(f"module 'gne_mj' has no attribute {name!r}{near}")
 
 
 def _nearest(name: str) -> str:
