@@ -95,7 +95,7 @@ class _Pace:
         self._now, self.done, self.total, self.words = now, done, total, words
 
     def left(self) -> float | None:
-        """Seconds; None while too little was done to say."""
+        """Seconds; None while too little was done to say, and where the pace does not hold."""
         if self._first is None:
             return None
         since, before = self._first
@@ -103,7 +103,8 @@ class _Pace:
         if passed < MEASURED or self.done <= before:
             return None
         rest = (self.total - self.done) * passed / (self.done - before)
-        return max(rest - (monotonic() - self._now), 0.0)
+        rest -= monotonic() - self._now
+        return rest if rest > 0.0 else None
 
     def line(self) -> str:
         """How far it is."""

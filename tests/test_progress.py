@@ -24,11 +24,11 @@ def clock(monkeypatch):
     return now
 
 
-def work(clock, pieces, each, first=0.0, words="75 runs of 20 s on 2 processors"):
-    """Pieces that take ``each`` s, the first one so much more; the lines told by then."""
+def work(clock, pieces, each, first=0.0, last=None):
+    """Pieces that take ``each`` s, the first one so much more, up to the last or another one."""
     with progress.telling("preparing") as tell:
-        tell(0, pieces, words)
-        for done in range(1, pieces + 1):
+        tell(0, pieces, f"{pieces} runs of 20 s on 2 processors")
+        for done in range(1, (last or pieces) + 1):
             clock.time += each + (first if done == 1 else 0.0)
             tell(done, pieces, f"{done} of {pieces} runs")
 
@@ -103,10 +103,10 @@ def test_a_terminal_has_one_line_that_is_rewritten(clock, monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal)
     for name, value in (("TERM", "xterm"), ("COLUMNS", "120")):
         monkeypatch.setenv(name, value)
-    work(clock, 75, 0.5)
+    work(clock, 75, 0.5, last=40)
     shown = terminal.getvalue()
     assert "gne-mj: about 35 s: 75 runs of 20 s on 2 processors" in shown
-    assert "75 of 75 runs, about 0 s left" in shown
+    assert "40 of 75 runs, about 20 s left" in shown
     assert shown.endswith("\x1b[2K") or "\x1b[2K" in shown[-40:], "the line is gone at the end"
 
 
@@ -156,11 +156,31 @@ def test_checking_tells_after_every_profile():
     assert told[-1][2] == "3 of 3 profiles"
 
 
-SHORT = {"plant.engine": "ode", "simulation.duration": 0.5}
+SHORT = {"plant.engine": "ode", "simulation.duration": 5.0}
 
 
-def test_programs_ask_for_it(clock, monkeypatch, capsys, tmp_path):
-    """Nothing is told unless ``progress`` is True; what is given in its place is called."""
+@pytest.mark.parametrize(
+    ("words", "run"),
+    [
+        ("a run of 5 s", lambda out, asked: gm.run("velocity-sync", SHORT, progress=asked)),
+        (
+            "2 runs, 10 s of them together",
+            lambda out, asked: gm.compare(
+                "velocity-sync", {"rho": [0.1, 0.2]}, SHORT, progress=asked
+            ),
+        ),
+        (
+            "4 runs of 5 s on 1 processor",
+            lambda out, asked: gm.batch(
+                "velocity-sync", {"barrier.rho": [0.1, 0.2, 0.3, 0.4]}, changes=SHORT, threads=1,
+                out=out, progress=asked,
+            ),
+        ),
+    ],
+    ids=["run", "compare", "batch"],
+)  # fmt: skip
+def test_programs_ask_for_it(words, run, clock, monkeypatch, capsys, tmp_path):
+    """Whatever takes however long: nothing is told unless ``progress`` is True."""
     monkeypatch.setattr(progress, "MEASURED", 0.0)
     monkeypatch.setattr(progress, "LONG", 0.0)
 
@@ -169,20 +189,9 @@ def test_programs_ask_for_it(clock, monkeypatch, capsys, tmp_path):
         return clock.time
 
     monkeypatch.setattr(progress, "monotonic", ticking)
-    done = {
-        "a run of 0.5 s": lambda asked: gm.run("velocity-sync", SHORT, progress=asked),
-        "2 runs, 1 s of them together": lambda asked: gm.compare(
-            "velocity-sync", {"rho": [0.1, 0.2]}, SHORT, progress=asked
-        ),
-        "3 runs of 0.5 s on 1 processor": lambda asked: gm.batch(
-            "velocity-sync", {"barrier.rho": [0.1, 0.2, 0.3]}, changes=SHORT, threads=1,
-            out=tmp_path / str(asked), progress=asked,
-        ),
-    }  # fmt: skip
-    for words, run in done.items():
-        run(False)
-        assert capsys.readouterr().err == ""
-        run(True)
-        told = capsys.readouterr().err
-        assert told.count("\n") == 1
-        assert told.endswith(f": {words}\n")
+    run(tmp_path / "one", True)
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert told.endswith(f": {words}\n")
+    run(tmp_path / "other", False)
+    assert capsys.readouterr().err == ""

@@ -67,7 +67,8 @@ def simulate(
             trajectory = simulation.run(of_time(tell, duration))
         with results.written() as folder:
             if folder is not None:
-                keep(trajectory, folder)
+                with telling("writing", quiet=quiet):
+                    keep(trajectory, folder)
                 if illustrate is not None:
                     illustrate(trajectory, folder)
     return trajectory
