@@ -140,7 +140,7 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """Of a run in s, unless that is swept."""
+        """Of every run, in s."""
         return self._clock.duration
 
     @property
