@@ -7,11 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from builders import FIVE, robot_state, robot_system
+from matplotlib.figure import Figure
 
 import gne_mj as gm
 from gne_mj import game_check, progress
 from gne_mj.batches import Progress, of_runs
 from gne_mj.games import cournot_game
+from gne_mj.plots import trajectories
 from gne_mj.solutions import solve_system
 
 
@@ -154,6 +156,15 @@ def test_checking_tells_after_every_profile():
     told = told_by(lambda tell: game_check.examine(game, start, 3, 2, tell))
     assert [now[:2] for now in told] == [(k, 3) for k in range(4)]
     assert told[-1][2] == "3 of 3 profiles"
+
+
+def test_drawing_tells_after_every_file(monkeypatch, tmp_path):
+    figures = {name: Figure(figsize=(0.1, 0.1)) for name in ("gaps", "margins", "velocities")}
+    monkeypatch.setattr(trajectories, "draw", lambda trajectory: figures)
+    told = told_by(lambda tell: trajectories.save(None, tmp_path, ("png", "svg"), progress=tell))
+    assert [now[:2] for now in told] == [(k, 6) for k in range(7)]
+    assert (told[0][2], told[-1][2]) == ("6 figures", "6 of 6 figures")
+    assert len(list(tmp_path.iterdir())) == 6
 
 
 SHORT = {"plant.engine": "ode", "simulation.duration": 5.0}
