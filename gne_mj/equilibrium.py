@@ -5,7 +5,7 @@ smooth path whose end is the variational GNE [eq:vGNE]. All are found by the int
 of :mod:`gne_mj.interior_point`.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from threading import Lock
 from typing import NoReturn
@@ -128,7 +128,9 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     return _solver(game).respond(y, agent)[0]
 
 
-def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
+def measured_epsilon(
+    game: Game, y: ArrayLike, responded: Callable[[], None] = lambda: None
+) -> NDArray[np.float64]:
     """What each agent could gain by deviating alone from y: J_i(y) - min J_i, shape (N,).
 
     As far as :func:`best_response` finds that; where J_i or the set is not convex in y_i it may be
@@ -136,9 +138,13 @@ def measured_epsilon(game: Game, y: ArrayLike) -> NDArray[np.float64]:
 
     At the penalised equilibrium it is at most p_i * rho if J_i and the constraints are convex in
     y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
+    ``responded`` is called after every agent's.
     """
     solver, costs = _solver(game), game.costs(y)
-    least = [solver.respond(y, i)[1] for i in range(game.agents)]
+    least = np.empty(game.agents)
+    for i in range(game.agents):
+        least[i] = solver.respond(y, i)[1]
+        responded()
     return np.maximum(costs - least, 0.0)
 
 

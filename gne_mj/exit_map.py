@@ -22,6 +22,7 @@ from gne_mj.faults import steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.plain import raise_pending
+from gne_mj.progress import Tell, nothing
 from gne_mj.registry import MODES
 from gne_mj.system import Clock, System
 from gne_mj.theory.trials import held_for
@@ -113,7 +114,7 @@ def exit_map(
     system: System,
     timestep: float,
     grid: Grid,
-    progress: Callable[[int], None] | None = None,
+    progress: Tell = nothing,
     stopped: Callable[[], bool] = lambda: False,
 ) -> list[Cell]:
     """All cells of the grid, or those done when ``stopped``, asked before each run, said so.
@@ -122,12 +123,16 @@ def exit_map(
         system: whose game, agents, law and engine are tried; its start and mode do not matter.
         timestep: the longest integration step in s; periods are made of whole steps.
         grid: what is tried.
-        progress: called with the number of runs done.
+        progress: called after every run, with integration steps and the number of runs.
     """
     starts = _rays(system, grid)
     plants: dict[tuple[str, bool], Any] = {}
     cells: list[Cell] = []
-    done = 0
+    clocks = {period: _clock(grid.duration, timestep, period) for period in grid.periods}
+    steps = {period: clock.steps(clock.duration) for period, clock in clocks.items()}
+    total = sum(steps.values()) * (grid.total // len(grid.periods))
+    done = runs = 0
+    progress(0, total, f"{grid.total} runs of {grid.duration:g} s")
     for mode, period, push, margin in product(
         held_modes(), grid.periods, grid.pushes, grid.margins
     ):
@@ -137,15 +142,14 @@ def exit_map(
             if stopped():
                 return cells
             outcome, worst = _run(
-                _at(system, mode, ray, margin, push * signs), timestep, period, grid, plants
+                _at(system, mode, ray, margin, push * signs), clocks[period], plants
             )
             if outcome == "inside":
                 least = min(least, worst)
             else:
                 counts[outcome] += 1
-            done += 1
-            if progress is not None:
-                progress(done)
+            done, runs = done + steps[period], runs + 1
+            progress(done, total, f"{runs} of {grid.total} runs")
         cells.append(
             Cell(
                 mode, period, margin, push, len(starts), counts["instant"], counts["between"],
@@ -218,27 +222,27 @@ def _at(
         return None
 
 
+def _clock(duration: float, timestep: float, period: float) -> Clock:
+    """Of whole periods, each of whole steps."""
+    steps = int(np.ceil(period / timestep - 1e-9))
+    duration = float(np.ceil(duration / period - 1e-9)) * period
+    return Clock(duration, period / steps, period, duration)
+
+
 def _run(
-    system: System | None,
-    timestep: float,
-    period: float,
-    grid: Grid,
-    plants: dict[tuple[str, bool], Any],
+    system: System | None, clock: Clock, plants: dict[tuple[str, bool], Any]
 ) -> tuple[str, float]:
     """How one run ended, and its least margin -g."""
     if system is None:
         return "refused", np.nan
-    steps = int(np.ceil(period / timestep - 1e-9))
-    duration = float(np.ceil(grid.duration / period - 1e-9)) * period
-    clock = Clock(duration, period / steps, period, duration)
     key = (system.mode, bool(system.faults))
     try:
-        held = held_for(system, clock.timestep, steps)
+        held = held_for(system, clock.timestep, clock.steps(clock.control_period))
         loop: ClosedLoop = held.closed_loop(clock, plants.get(key))
     except (InvalidInput, InfeasibleStart, SolverError):
         return "refused", np.nan
     plants[key] = getattr(loop, "plant", None)
-    loop.pass_over(clock.steps(duration))
+    loop.pass_over(clock.steps(clock.duration))
     loop.finish()
     raise_pending()
     monitor = loop.monitor

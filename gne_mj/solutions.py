@@ -1,7 +1,7 @@
 """The equilibria of a system's game, what agents could still gain there, and a path over rho."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from gne_mj.errors import InvalidInput, part_of
 from gne_mj.game_model import Game
 from gne_mj.margins import of_the_set
 from gne_mj.optimality import FLAT, Optimality, examine
+from gne_mj.progress import Tell, nothing
 from gne_mj.summary import bounds_text
 from gne_mj.system import System
 
@@ -127,7 +128,10 @@ class Solution:
 @part_of("system", "rhos", "path_rhos")
 @np.errstate(over="ignore")  # what is beyond all floats is infinite, and no matter for a warning
 def solve_system(
-    system: System, rhos: Sequence[float] = (), path_rhos: Sequence[float] = ()
+    system: System,
+    rhos: Sequence[float] = (),
+    path_rhos: Sequence[float] = (),
+    progress: Tell = nothing,
 ) -> Solution:
     """Solve the game of a system from its start.
 
@@ -135,6 +139,7 @@ def solve_system(
         system: whose game and start are used.
         rhos: penalty parameters; the system's own if there are none.
         path_rhos: penalty parameters of a path, each equilibrium started from the one before.
+        progress: called after every agent's best response, which take most of the time.
 
     Raises:
         InvalidInput: a rho that is not positive and finite.
@@ -145,17 +150,30 @@ def solve_system(
             if not 0.0 < rho < np.inf:
                 raise InvalidInput(key, rho, "it must be positive and finite")
     game, start = system.game, system.start
+    points, responses = (len(rhos) or 1) + 1 + len(path_rhos), 0
+    progress(
+        0, points * game.agents,
+        f"{points} equilibria, and at each the best response of each of {game.agents} agents",
+    )  # fmt: skip
+
+    def responded() -> None:
+        nonlocal responses
+        responses += 1
+        words = f"{system.name}: {responses // game.agents} of {points} equilibria"
+        progress(responses, points * game.agents, words)
+
     penalised = [penalised_equilibrium(game, rho, start) for rho in rhos or (system.rho,)]
     variational = variational_equilibrium(of_the_set(game), penalised[0])
     return Solution(
         name=system.name,
         game=game,
-        penalised=tuple(_measure(game, point, variational) for point in penalised),
+        penalised=tuple(_measure(game, point, variational, responded) for point in penalised),
         variational=variational,
-        gains=measured_epsilon(game, variational.action),
+        gains=measured_epsilon(game, variational.action, responded),
         optimality=examine(game, variational),
         path=tuple(
-            _measure(game, point, variational) for point in path(game, path_rhos, penalised[0])
+            _measure(game, point, variational, responded)
+            for point in path(game, path_rhos, penalised[0])
         ),
     )
 
@@ -206,9 +224,11 @@ def write_path(solution: Solution, file: Path) -> None:
             )
 
 
-def _measure(game: Game, point: Equilibrium, variational: Equilibrium) -> Measured:
+def _measure(
+    game: Game, point: Equilibrium, variational: Equilibrium, responded: Callable[[], None]
+) -> Measured:
     distance = float(np.max(np.abs(point.action - variational.action)))
-    return Measured(point, measured_epsilon(of_the_set(game), point.action), distance)
+    return Measured(point, measured_epsilon(of_the_set(game), point.action, responded), distance)
 
 
 def _numbers(game: Game, point: Equilibrium) -> dict[str, Any]:

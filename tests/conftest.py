@@ -7,7 +7,7 @@ import pytest
 from browser import Recorded, launched
 from hypothesis import settings
 
-from gne_mj.cli import output
+from gne_mj import progress
 
 # Compiling a native loop for the first time takes seconds: no deadline per example.
 settings.register_profile("default", deadline=None, max_examples=50, derandomize=True)
@@ -15,7 +15,7 @@ settings.register_profile("thorough", deadline=None, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 # On a slow machine too nothing is printed that a test does not expect.
-output.MINUTE = 1e6
+progress.MINUTE = progress.LONG = 1e6
 
 # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)

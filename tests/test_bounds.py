@@ -283,9 +283,11 @@ def test_ranges_maps_and_trials():
 def test_trials_tell_how_far_they_are():
     told = []
     build = plants_of(integrators(300), "ode", "euler")
-    examine(build, 0.1, duration=4.0, trials=3, progress=told.append)
-    assert told == sorted(told)
-    assert told[:3] == pytest.approx([100 / 18, 200 / 18, 300 / 18])
+    examine(build, 0.1, duration=4.0, trials=3, progress=lambda *now: told.append(now))
+    assert told[0] == (0.0, 1.0, "3 trials of 4 s for each of 300 agents, at up to 3 amplitudes")
+    # one trial of 300 channels at a time, of 20 held inputs of two steps, at each amplitude
+    assert [done for done, _, _ in told[1:]] == pytest.approx(np.arange(1, 181) / 180)
+    assert told[90][2] == "50% of all trials"
 
 
 def test_every_table_bounds_its_numbers():

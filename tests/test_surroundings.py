@@ -1,16 +1,13 @@
-"""ASCII terminals, names that are not UTF-8, settings for displays, and where nobody watches."""
+"""ASCII terminals, names that are not UTF-8, and settings for displays."""
 
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 from commands import gne_here
 
 import gne_mj
-from gne_mj.batches import Progress
-from gne_mj.cli import batches, output
 from gne_mj.errors import InvalidInput
 from gne_mj.viewer import write_html
 
@@ -78,49 +75,3 @@ def test_text_of_a_files_own_folder_too(tmp_path):
     (folder / "s.toml").write_text('[systems.s.game]\ntype = "custom"\nfile = "g.py"\n')
     with pytest.raises(InvalidInput, match=r"^systems\.s\.game\.file: got .*UTF-8 text"):
         gne_mj.load_scenario(folder / "s.toml")
-
-
-# Where nobody watches
-
-
-def test_progress_is_a_line_every_minute_where_nobody_watches(monkeypatch, capsys):
-    monkeypatch.setattr(output, "MINUTE", 0.05)
-    with output.progress(8.0, False, "runs") as show:
-        show(2.0)
-        time.sleep(0.12)
-        show(4.5)
-        time.sleep(0.1)
-    told = capsys.readouterr().err.splitlines()
-    assert told[0] == "gne-mj: 1 min: 2 of 8 runs"
-    assert told[-1].endswith("min: 4.5 of 8 runs")
-    with output.working(False, "preparing") as tell:
-        time.sleep(0.07)
-        tell("searching")
-        time.sleep(0.07)
-    told = capsys.readouterr().err.splitlines()
-    assert told[0] == "gne-mj: 1 min: preparing"
-    assert told[-1].endswith("searching")
-
-
-def test_progress_of_a_batch_tells_of_a_cluster_without_workers(monkeypatch, capsys):
-    monkeypatch.setattr(output, "MINUTE", 0.05)
-    with batches._showing(9, False) as show:
-        for workers in (0, 0, 1, 0):
-            show(Progress(3, 9, 1, workers))
-        time.sleep(0.07)
-    told = capsys.readouterr().err.splitlines()
-    assert told[:2] == ["gne-mj: waiting: the cluster has no workers (Ctrl-C ends)"] * 2
-    assert told[2] == "gne-mj: 1 min: 3 of 9 runs, 1 ended early"
-
-
-def test_with_json_nothing_is_told(monkeypatch, capsys):
-    monkeypatch.setattr(output, "MINUTE", 0.01)
-    for quiet in (
-        output.progress(8.0, True),
-        output.working(True, "so"),
-        batches._showing(9, True),
-    ):
-        with quiet as show:
-            assert show is None
-            time.sleep(0.03)
-    assert capsys.readouterr().err == ""

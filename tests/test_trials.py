@@ -56,14 +56,17 @@ def rule(monkeypatch):
 def test_periods_grow_by_a_fifth_and_are_bisected(rule):
     asked = rule(lambda system, clock: clock.control_period < 0.205)
     said = []
-    found = search_period(ROBOTS, Clock(4.0, 0.01, 0.01, 0.01), said.append)
+    timing = Clock(4.0, 0.01, 0.01, 0.01)
+    found = search_period(ROBOTS, timing, lambda *told: said.append(told))
     steps = [round(period / 0.01) for period, _ in found.trials]
     assert steps == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 19, 22, 20, 21]
     assert [stayed for _, stayed in found.trials] == [n <= 20 for n in steps]
     assert (found.inside, found.outside) == pytest.approx((0.2, 0.21))
     assert found.note == "each a fifth longer than the last, then bisected"
     assert len(said) == len(steps)
-    assert said[-1] == "robots: trying a period of 0.21 s"
+    assert said[0] == (0, 31, "at most 31 runs of 4 s with longer and longer periods")
+    assert said[-1] == (16, 17, "robots: trying a period of 0.21 s")
+    assert all(len(steps) <= total for _, total, _ in said), "the most there can be"
     for (_, timing), n in zip(asked, steps, strict=True):
         assert timing.timestep == 0.01
         assert timing.control_period == pytest.approx(n * 0.01)
@@ -148,15 +151,25 @@ def test_the_smallest_push_is_found_over_all_patterns(rule):
     own = Saturation(limit=50.0)
     asked = rule(stays)
     said = []
-    found = search_push(replace(ROBOTS, faults=(own,)), Clock(4.0, 0.01, 0.01, 0.01), said.append)
+    timing = Clock(4.0, 0.01, 0.01, 0.01)
+    pushed = replace(ROBOTS, faults=(own,))
+    found = search_push(pushed, timing, lambda *told: said.append(told))
     assert 2.9 <= found.smallest_breaking_push <= 1.02 * 2.9
     assert found.pattern.endswith("from half the time on")
     assert found.runs == len(asked) - 1, "but the one without any push"
     assert found.largest_tried == max(size_of(system) for system, _ in asked)
     assert all(system.faults[0] is own for system, _ in asked)
     # two directions of each of five gaps, in five courses
-    assert len(said) == len(set(said)) == 50
-    assert said[0].startswith("robots: pushing, ")
+    ahead, *patterns = said
+    assert len({words for _, _, words in patterns}) == 50
+    assert all(words.startswith("robots: pushing, ") for _, _, words in patterns)
+    harmonic = sum(1 / k for k in range(1, 51))
+    assert ahead[:2] == (0, pytest.approx(50 + 7 * harmonic))
+    assert ahead[2] == "50 patterns of pushes, some 81 runs of 4 s"
+    assert [total - done for done, total, _ in patterns] == pytest.approx(
+        [50 - k + 7 * (harmonic - sum(1 / j for j in range(1, k + 1))) for k in range(50)]
+    )
+    assert patterns[-1][0] < found.runs + 1 <= patterns[-1][0] + 1 + 7
 
 
 @pytest.mark.parametrize("threshold", [0.004, 0.9, 1.0, 1.1, 17.0, 2e5])
@@ -248,12 +261,14 @@ CHANNELS = osnr_system(integrators(10), distributed(epsilon=0.04), 0.2)
 def test_the_search_brackets_an_epsilon(rule, threshold):
     asked = rule(lambda system, clock: system.law.epsilon <= threshold)
     said = []
-    found = search_epsilon(CHANNELS, clock(0.001, 1.0), said.append)
+    found = search_epsilon(CHANNELS, clock(0.001, 1.0), lambda *told: said.append(told))
     assert found.inside <= threshold < found.outside <= 1.01 * found.inside
     assert found.note is None
     assert [system.law.epsilon for system, _ in asked] == [tried for tried, _ in found.trials]
     assert all(stayed == (tried <= threshold) for tried, stayed in found.trials)
-    assert len(said) == len(found.trials)
+    assert [done for done, _, _ in said] == list(range(len(found.trials)))
+    assert said[0][1:] == (28, "at most 28 runs of 1 s with other epsilon")
+    assert said[-1][1] == 28 >= len(found.trials)
     first, second = found.trials[0], found.trials[1]
     assert first == (0.04, threshold >= 0.04)
     assert second[0] == (0.08 if threshold >= 0.04 else 0.02), "doubled or halved"
@@ -304,15 +319,22 @@ def test_every_cell_of_the_grid_is_tried(monkeypatch):
     ways = ["inside", "instant", "between", "nothing", "refused", "inside"]
     asked = []
 
-    def run(system, timestep, period, grid, plants):
-        asked.append((system.mode, period, system))
+    def run(system, clock, plants):
+        assert clock.timestep == 0.01
+        assert clock.duration == pytest.approx(0.3 if clock.control_period == 0.1 else 0.25)
+        asked.append((system.mode, clock.control_period, system))
         outcome = ways[len(asked) % 6]
         return outcome, float(len(asked)) if outcome == "inside" else np.nan
 
     monkeypatch.setattr(maps, "_run", run)
     done = []
-    cells = maps.exit_map(ROBOTS, 0.01, GRID, done.append)
-    assert done == list(range(1, GRID.total + 1))
+    cells = maps.exit_map(ROBOTS, 0.01, GRID, lambda *told: done.append(told))
+    # 12 runs of 30 steps, 12 of 25 and the same in the other mode
+    costs = np.cumsum([0, *2 * [*12 * [30], *12 * [25]]]).tolist()
+    assert [steps for steps, _, _ in done] == costs
+    assert {total for _, total, _ in done} == {costs[-1]}
+    assert done[0][2] == "48 runs of 0.25 s"
+    assert done[5][2] == "5 of 48 runs"
     assert GRID.total == 2 * 3 * 2 * 2 * 2 == len(asked)
     order = [(c.mode, c.period, c.push, c.margin) for c in cells]
     assert order == [
@@ -353,7 +375,7 @@ def test_starts_lie_on_rays_that_end_at_the_boundary():
     tight = replace(ROBOTS, game=ROBOTS.game.tightened(np.full(5, 1.0)))
     for ray, _ in maps._rays(tight, GRID):
         assert np.max(tight.game.constraints(middle + ray)) == pytest.approx(-1.0)
-    assert maps._run(None, 0.01, 0.1, GRID, {})[0] == "refused"
+    assert maps._run(None, clock(0.01), {})[0] == "refused"
 
 
 class _Loop:
@@ -381,25 +403,26 @@ def test_what_a_run_of_the_map_showed(monkeypatch):
 
     monkeypatch.setattr(System, "closed_loop", closed_loop)
     plants = {}
-    assert maps._run(ROBOTS, 0.03, 0.1, GRID, plants) == ("inside", 0.5)
+    ran = maps._clock(0.25, 0.03, 0.1)
+    assert maps._run(ROBOTS, ran, plants) == ("inside", 0.5)
     timing = made[0][0].clock
     assert timing.timestep == pytest.approx(0.025), "whole steps, none longer than was asked for"
     assert (timing.control_period, timing.duration) == (0.1, pytest.approx(0.3))
     assert made[0][0].steps == 12
-    assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "inside"
+    assert maps._run(ROBOTS, ran, plants)[0] == "inside"
     assert made[1][1] is made[0][0].plant, "one fleet serves all runs of a mode"
     monitor.exit = watch.LEFT_SET
-    assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "instant"
+    assert maps._run(ROBOTS, ran, plants)[0] == "instant"
     monitor.exit_between = 1.0
-    assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "between"
+    assert maps._run(ROBOTS, ran, plants)[0] == "between"
     monitor.exit = watch.DIVERGED
-    assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "nothing"
+    assert maps._run(ROBOTS, ran, plants)[0] == "nothing"
 
     def refused(system, clock, plant=None):
         raise InvalidInput("clock.timestep", 1.0, "less")
 
     monkeypatch.setattr(System, "closed_loop", refused)
-    assert maps._run(ROBOTS, 0.05, 0.1, GRID, plants)[0] == "refused"
+    assert maps._run(ROBOTS, ran, plants)[0] == "refused"
 
 
 def cell(mode, period, left=0, refused=0, push=0.0):

@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gne_mj.batches.cluster import connected
-from gne_mj.batches.execute import execute
+from gne_mj.batches.execute import ahead, execute
 from gne_mj.batches.plan import Plan, make_plan, parse_record
-from gne_mj.batches.progress import Progress
+from gne_mj.batches.progress import Progress, of_runs
 from gne_mj.batches.store import Store
 from gne_mj.batches.sweep import Sweep, parse_sweep
 from gne_mj.errors import named
+from gne_mj.progress import if_asked
 
 if TYPE_CHECKING:
     import xarray
@@ -20,9 +21,11 @@ __all__ = [
     "Progress",
     "Store",
     "Sweep",
+    "ahead",
     "connected",
     "execute",
     "make_plan",
+    "of_runs",
     "open_batch",
     "parse_record",
     "parse_sweep",
@@ -45,7 +48,7 @@ def run_batch(
     threads: int = 0,
     resume: bool = False,
     cluster: str | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Progress], None] | bool = False,
 ) -> "xarray.Dataset":
     """Run all combinations of swept values from random starts; returns the dataset, read lazily.
 
@@ -66,7 +69,8 @@ def run_batch(
         threads: native threads; 0 for one a processor.
         resume: go on with what an earlier call has begun there, if there is such a folder.
         cluster: address of a Dask scheduler to run on.
-        progress: called after each chunk.
+        progress: True to tell on stderr how long it takes and how far it is, as the command does;
+            or what is called after each chunk.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
@@ -79,10 +83,14 @@ def run_batch(
             source, changes, system=system, sweeps=_sweeps(sweep or {}), starts=runs, seed=seed,
             spread=spread, record=parse_record(record), chunk=chunk,
         )  # fmt: skip
-        with connected(cluster) as client:
+        with connected(cluster) as client, if_asked(progress) as tell:
             begin = Store.resume if resume and Path(out).exists() else Store.create
             store = begin(Path(out), plan)
-            execute(store, threads=threads, cluster=client, progress=progress)
+            words = ahead(plan, threads, cluster)
+            shown = of_runs(tell, words, quiet=not progress)
+            if callable(progress):
+                shown = progress
+            execute(store, threads=threads, cluster=client, progress=shown)
         return store.dataset()
 
 

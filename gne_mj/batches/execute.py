@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.cluster import on_cluster
+from gne_mj.batches.plan import Plan
 from gne_mj.batches.progress import Progress, count_early
 from gne_mj.batches.store import Store
 from gne_mj.bounds import check_count
@@ -20,6 +21,13 @@ MOST_THREADS = 1024
 def cores() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def ahead(plan: Plan, threads: int, cluster: str | None) -> str:
+    """What a batch's runs are, in words: how long, and where they are computed."""
+    threads = threads or cores()
+    where = f"the cluster at {cluster}" if cluster else f"{threads} processor{'s' * (threads > 1)}"
+    return f"runs of {plan.duration:g} s on {where}"
 
 
 def execute(

@@ -139,6 +139,11 @@ class Plan:
         return self._loaded.clock()
 
     @property
+    def duration(self) -> float:
+        """Of every run, in s."""
+        return self._clock.duration
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Values of each sweep."""
         return tuple(len(sweep.values) for sweep in self.sweeps)

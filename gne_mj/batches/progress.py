@@ -1,11 +1,13 @@
 """How far a batch is."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batches.store import Store
+from gne_mj.progress import Tell, say
 from gne_mj.run_metrics import SUCCESSES
 
 
@@ -40,3 +42,25 @@ class Progress:
 def count_early(statuses: NDArray[np.str_]) -> int:
     """How many of these runs ended early, or could not begin; those not run yet do not count."""
     return int(np.sum(~np.isin(statuses, ["", *SUCCESSES])))
+
+
+def of_runs(tell: Tell, ahead: str, *, quiet: bool = False) -> Callable[[Progress], None]:
+    """What a batch calls with its progress, to tell it.
+
+    Args:
+        tell: of :func:`gne_mj.progress.telling`.
+        ahead: what the runs are, see :func:`gne_mj.batches.execute.ahead`.
+        quiet: do not say when a cluster begins to have no workers.
+    """
+    begun = lonely = False
+
+    def note(now: Progress) -> None:
+        nonlocal begun, lonely
+        if now.workers == 0 and not (lonely or quiet):
+            say("gne-mj: waiting: the cluster has no workers (Ctrl-C ends)")
+        lonely = now.workers == 0
+        words = f"{now.done} of {now.total} runs, {now.ended_early} ended early"
+        tell(now.done, now.total, words if begun else f"{now.total - now.done} {ahead}")
+        begun = True
+
+    return note

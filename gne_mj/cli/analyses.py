@@ -10,8 +10,9 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import JSON, OUT, SCENARIO, SET, SYSTEM, meaning, settings
-from gne_mj.cli.output import PREPARING, Results, emit, progress, say, working
+from gne_mj.cli.output import Results, emit
 from gne_mj.cli.signals import stopping
+from gne_mj.progress import PREPARING, Tell, say, telling
 
 if TYPE_CHECKING:
     from gne_mj.exit_map import Cell
@@ -53,15 +54,15 @@ def solve(
         need("plots", "the figure of a path")
     path_rhos = [] if path is None else meaning("path", solving.parse_path, path)
     results = Results(out)
-    with working(as_json, PREPARING):
+    with telling(PREPARING, quiet=as_json):
         loaded = load_scenario(source, settings(set_))
         wanted = None if system is None else loaded.name_of(system)
         every, moved = loaded.inside_systems()
-        solutions: list[Solution] = []
-        for built in every:
-            if wanted in (None, built.name):
-                with loaded.naming(built.name):
-                    solutions.append(solving.solve_system(built, rhos or (), path_rhos))
+    solutions: list[Solution] = []
+    for built in every:
+        if wanted in (None, built.name):
+            with telling(f"solving {built.name}", quiet=as_json) as tell, loaded.naming(built.name):
+                solutions.append(solving.solve_system(built, rhos or (), path_rhos, tell))
     report = json.dumps(
         {each.name: {**each.to_dict(), "start_found": moved.get(each.name)} for each in solutions},
         indent=2,
@@ -131,11 +132,13 @@ def certify(
     from gne_mj.theory import certify as examine
     from gne_mj.theory import report_text, search_epsilon, search_period, search_push
 
-    loaded = load_scenario(source, settings(set_))
-    systems, moved = loaded.inside_systems()
+    with telling(PREPARING, quiet=as_json):
+        loaded = load_scenario(source, settings(set_))
+        systems, moved = loaded.inside_systems()
     reports = {}
     for system in systems:
-        with loaded.naming(system.name):
+        what = f"matrices of {system.name}, of {system.game.actions} actions"
+        with telling(what, quiet=as_json), loaded.naming(system.name):
             reports[system.name] = examine(system, loaded.clock())
     distributed, implicit = "no system has the distributed law", "no system is in mode 'implicit'"
     for wanted, kind in (
@@ -162,7 +165,7 @@ class _Search:
     """
 
     option: str
-    seek: Callable[["System", "Clock", Callable[[str], None]], Any]
+    seek: Callable[["System", "Clock", Tell], Any]
     part: str
     entry: str
     missing: str
@@ -184,10 +187,8 @@ class _Search:
         filled = dict(reports)
         for system in chosen:
             report = reports[system.name]
-            with (
-                working(as_json, f"searching for {system.name}") as tell,
-                loaded.naming(system.name),
-            ):
+            what = f"searching for {system.name}"
+            with telling(what, quiet=as_json) as tell, loaded.naming(system.name):
                 found = asdict(self.seek(system, loaded.clock(), tell))
             part: dict[str, Any] = {self.part: {**getattr(report, self.part), self.entry: found}}
             filled[system.name] = replace(report, **part)
@@ -207,8 +208,8 @@ def check(source: SCENARIO, set_: SET = None, as_json: JSON = False) -> None:
     loaded = load_scenario(source, settings(set_))
     reports = {}
     for name, table in loaded.systems.items():
-        with working(as_json, PREPARING):
-            reports[name] = examine(*table.game_and_start(name))
+        with telling(PREPARING, quiet=as_json) as tell:
+            reports[name] = examine(*table.game_and_start(name), progress=tell)
         if not as_json:
             head = f"\n{name}: {reports[name].game}, {reports[name].points} profiles"
             print("\n".join([head, *(f"  {line}" for line in reports[name].summary())]))
@@ -241,11 +242,11 @@ def passivity(
     loaded = load_scenario(source, settings(set_))
     reports = {}
     for name in loaded.systems if system is None else (loaded.name_of(system),):
-        with working(as_json, PREPARING):
+        with telling(PREPARING, quiet=as_json):
             built = loaded.systems[name].build(name, loaded.simulation)
         of_clock = {key: f"clock.{key}" for key in ("timestep", "duration")}
         with (
-            progress(100.0, as_json, "% of all trials") as show,
+            telling(PREPARING, quiet=as_json) as tell,
             loaded.naming(name),
             named(build="system.agents.count", **of_clock),
         ):
@@ -257,7 +258,7 @@ def passivity(
                 seed=seed,
                 outputs=built.game.box or (-1.0, 1.0),
                 owners=built.game.agent_of_action,
-                progress=show,
+                progress=tell,
             )
         if not as_json:
             print("\n".join([f"\n{name}", *(f"  {line}" for line in reports[name].summary())]))
@@ -283,7 +284,7 @@ def map_(
     pushes: Annotated[
         str, typer.Option("--pushes", metavar="A,B,...", help="Forces on every agent.")
     ] = "0,2,10",
-    runs: Annotated[int, typer.Option("--runs", help="Random starts for each cell.")] = 20,
+    runs: Annotated[int, typer.Option("--runs", help="Random starts for each cell.")] = 5,
     duration: Annotated[float, typer.Option("--duration", help="Of each run, in s.")] = 3.0,
     seed: Annotated[int, typer.Option("--seed", help="Of starts and directions.")] = 0,
     out: OUT = None,
@@ -312,11 +313,11 @@ def map_(
         seed=seed,
     )
     results = Results(out)
-    built = loaded.systems[name].build(name, loaded.simulation)
     with stopping() as stop:
-        with progress(float(grid.total), as_json, "runs") as show:
+        with telling(PREPARING, quiet=as_json) as tell:
+            built = loaded.systems[name].build(name, loaded.simulation)
             cells = mapping.exit_map(
-                built, loaded.simulation.timestep, grid, show, stopped=stop.is_set
+                built, loaded.simulation.timestep, grid, tell, stopped=stop.is_set
             )
         if cells:
             _keep_map(cells, results)

@@ -12,8 +12,9 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from gne_mj.cli.ending import watched
-from gne_mj.cli.output import emit, give_up, results_only, results_stream, say
+from gne_mj.cli.output import emit, results_only, results_stream
 from gne_mj.cli.signals import came, received, unwinding
+from gne_mj.progress import give_up, say
 
 
 class Interrupted(Exception):

@@ -1,8 +1,6 @@
 """Commands that run many runs, and tell of them."""
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,8 +18,9 @@ from gne_mj.cli.arguments import (
     meaning,
     settings,
 )
-from gne_mj.cli.output import by_the_minute, console, emit, folder_for, on_terminal, say
+from gne_mj.cli.output import emit, folder_for
 from gne_mj.cli.signals import stopping
+from gne_mj.progress import PREPARING, telling
 
 if TYPE_CHECKING:
     from gne_mj.batches import Plan, Progress, Store, Sweep
@@ -99,7 +98,7 @@ def batch(
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
     that was stopped or killed goes on with --resume, and ends as if it had not been.
     """
-    from gne_mj.batches import connected, execute, make_plan, parse_record
+    from gne_mj.batches import ahead, connected, execute, make_plan, of_runs, parse_record
     from gne_mj.errors import InvalidInput, named
     from gne_mj.extras import need
 
@@ -125,7 +124,8 @@ def batch(
                 chunk=chunk,
             )
         store = _opened(plan, folder, resume)
-        with _showing(store.plan.runs, as_json) as show:
+        with telling(PREPARING, quiet=as_json) as tell:
+            show = of_runs(tell, ahead(store.plan, threads, cluster), quiet=as_json)
             now = execute(
                 store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
             )
@@ -228,59 +228,3 @@ def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> 
     print(f"\nruns        {store.folder / 'runs.zarr'}")
     for path in report.paths:
         print(f"{'figure' if path.stem == 'summary' else 'table':11} {path}")
-
-
-@contextmanager
-def _showing(total: int, quiet: bool) -> Iterator[Any]:
-    """A progress bar on a terminal's stderr: runs done, rate, time left, early ends so far.
-
-    Elsewhere a line every minute. That a cluster has no workers is said at once.
-    """
-    if quiet:
-        yield None
-        return
-    if not on_terminal(quiet):
-        with by_the_minute(quiet, f"0 of {total} runs") as change:
-            lonely = _Lonely(say)
-
-            def note(now: "Progress") -> None:
-                lonely.look(now)
-                if change is not None:
-                    change(f"{now.done} of {total} runs, {now.ended_early} ended early")
-
-            yield note
-        return
-    from rich import progress
-
-    with progress.Progress(
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TextColumn("runs  {task.fields[rate]}"),
-        progress.TimeRemainingColumn(),
-        progress.TextColumn("{task.fields[early]} ended early"),
-        console=console(),
-        transient=True,
-    ) as bar:
-        task = bar.add_task("runs", total=total, rate="", early=0)
-        lonely = _Lonely(bar.console.print)
-
-        def show(now: "Progress") -> None:
-            lonely.look(now)
-            speed = bar.tasks[0].speed
-            rate = f"{speed:.3g}/s" if speed else ""
-            bar.update(task, completed=now.done, early=now.ended_early, rate=rate)
-
-        yield show
-
-
-class _Lonely:
-    """Says once that a cluster has no workers, whenever it has none."""
-
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say, self._said = say, False
-
-    def look(self, now: "Progress") -> None:
-        """Now."""
-        if now.workers == 0 and not self._said:
-            self._say("gne-mj: waiting: the cluster has no workers (Ctrl-C ends)")
-        self._said = now.workers == 0

@@ -1,22 +1,17 @@
-"""Where commands write: result folders, progress, words."""
+"""Where commands write: result folders, results, words."""
 
 import json
 import os
 import sys
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any, TextIO
+
+from gne_mj.progress import say
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from gne_mj.trajectory import Trajectory
-
-
-PREPARING = "preparing (a first run compiles for a few seconds)"
-MINUTE = 60.0  # s between lines of progress where nobody watches
 
 _stdout: TextIO | None = None  # of results, where all else that is printed goes to stderr
 
@@ -174,111 +169,6 @@ def folder_for(out: Path | None, own: Path) -> Path:
     with storing("out", out):
         out.mkdir(parents=True, exist_ok=True)
     return out
-
-
-def say(line: str) -> None:
-    """A line on stderr, if that is open: what is told there must not end a command."""
-    if sys.stderr is not None:
-        try:
-            print(line, file=sys.stderr, flush=True)
-        except OSError:
-            give_up(sys.stderr)
-
-
-def give_up(stream: TextIO) -> None:
-    """Let what a stream still holds go nowhere, or Python complains of it at its end."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    with suppress(OSError, ValueError):  # it is no file of the system's own
-        os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
-
-
-class _Terminal:
-    """stderr, which may be closed while something is shown there: that must not end a run."""
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(sys.stderr, name)
-
-    def write(self, text: str) -> int:
-        with suppress(OSError):
-            return sys.stderr.write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        with suppress(OSError):
-            sys.stderr.flush()
-
-
-def console() -> "Console":
-    """Rich's, on stderr."""
-    from rich.console import Console
-
-    return Console(file=cast(TextIO, _Terminal()))
-
-
-def on_terminal(quiet: bool) -> bool:
-    """Whether somebody watches, and wants to."""
-    return not quiet and sys.stderr is not None and sys.stderr.isatty()
-
-
-@contextmanager
-def by_the_minute(quiet: bool, words: str) -> Iterator[Callable[[str], None] | None]:
-    """A line on stderr every minute meanwhile, for logs; what is handed out changes its words."""
-    if quiet:
-        yield None
-        return
-    ended = threading.Event()
-
-    def tell() -> None:
-        minutes = 0
-        while not ended.wait(MINUTE):
-            minutes += 1
-            say(f"gne-mj: {minutes} min: {words}")
-
-    def change(to: str) -> None:
-        nonlocal words
-        words = to
-
-    thread = threading.Thread(target=tell, name="gne-mj progress", daemon=True)
-    thread.start()
-    try:
-        yield change
-    finally:
-        ended.set()
-        thread.join()
-
-
-@contextmanager
-def working(quiet: bool, what: str) -> Iterator[Any]:
-    """A word on a terminal's stderr meanwhile, else every minute; what is handed out changes it."""
-    if not on_terminal(quiet):
-        with by_the_minute(quiet, what) as change:
-            yield change
-        return
-    with console().status(what) as status:
-        yield status.update
-
-
-@contextmanager
-def progress(total: float, quiet: bool, unit: str = "s") -> Iterator[Any]:
-    """A progress bar on a terminal's stderr, else a line every minute."""
-    if not on_terminal(quiet):
-        with by_the_minute(quiet, f"0 of {total:g} {unit}") as change:
-            yield change and (lambda now: change(f"{now:.6g} of {total:g} {unit}"))
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    with Progress(
-        TextColumn(
-            f"{{task.completed:{'.1f' if unit == 's' else '.0f'}}} of {{task.total:g}} {unit}"
-        ),
-        BarColumn(),
-        TimeRemainingColumn(),
-        console=console(),
-        transient=True,
-    ) as bar:
-        task = bar.add_task("run", total=total)
-        yield lambda now: bar.update(task, completed=now)
 
 
 def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:

@@ -1,5 +1,6 @@
 """Commands that run scenarios, draw stored runs and list what is shipped."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,8 @@ from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, INDEX, JSON, OUT, PORT, REPLACE, SET, WHERE, formats
 from gne_mj.cli.output import Results, folder_for, tell
 from gne_mj.cli.simulating import simulate, source_of, stored
-from gne_mj.cli.views import watch
+from gne_mj.cli.views import REPLAY, watch
+from gne_mj.progress import telling
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
@@ -80,7 +82,8 @@ def paper(
     need("plots", "drawing figures")
     need("view", "a replay")
     results = Results(out, replace=True)
-    trajectory = simulate("paper", set_, results, quiet=as_json, illustrate=_illustrate)
+    illustrate = partial(_illustrate, quiet=as_json)
+    trajectory = simulate("paper", set_, results, quiet=as_json, illustrate=illustrate)
     out = results.out or out
     tell(trajectory, as_json, out)
     if not as_json:
@@ -90,12 +93,14 @@ def paper(
     raise typer.Exit(0 if trajectory.holds else 1)
 
 
-def _illustrate(trajectory: "Trajectory", folder: Path) -> None:
+def _illustrate(trajectory: "Trajectory", folder: Path, quiet: bool) -> None:
     from gne_mj import plots
     from gne_mj.viewer import write_html
 
-    plots.save(trajectory, folder)
-    write_html(trajectory, folder / "replay.html", "paper")
+    with telling("drawing", quiet=quiet) as shown:
+        plots.save(trajectory, folder, progress=shown)
+    with telling(REPLAY, quiet=quiet):
+        write_html(trajectory, folder / "replay.html", "paper")
 
 
 @app.command()
@@ -119,8 +124,9 @@ def plot(
     kinds = formats(format_)
     trajectory = stored(folder)
     target = folder_for(out, folder)
-    with named(folder="out"):
-        paths = plots.save(trajectory, target, kinds, replace=replace or target == folder)
+    with named(folder="out"), telling("drawing") as shown:
+        anyway = replace or target == folder
+        paths = plots.save(trajectory, target, kinds, replace=anyway, progress=shown)
     for path in paths:
         print(path)
 

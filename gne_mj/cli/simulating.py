@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gne_mj.cli.arguments import settings
-from gne_mj.cli.output import PREPARING, Results, progress, say, working
+from gne_mj.cli.output import Results
 from gne_mj.cli.signals import stopping
+from gne_mj.progress import PREPARING, of_time, say, telling
 
 if TYPE_CHECKING:
     from gne_mj.simulation import Simulation
@@ -56,16 +57,18 @@ def simulate(
     Args:
         scenario, changes: what to run, with what --set changes.
         results: where to keep it, if anywhere.
-        quiet: show no progress.
+        quiet: show no progress but on a terminal.
         illustrate: writes pictures beside the trajectory.
     """
     simulation = load(scenario, changes, quiet=quiet)
     with stopping():  # the writing too: a first Ctrl-C never loses what was computed
-        with progress(simulation.clock.duration, quiet) as show:
-            trajectory = simulation.run(show)
+        duration = simulation.clock.duration
+        with telling(PREPARING, quiet=quiet) as tell:
+            trajectory = simulation.run(of_time(tell, duration))
         with results.written() as folder:
             if folder is not None:
-                keep(trajectory, folder)
+                with telling("writing", quiet=quiet):
+                    keep(trajectory, folder)
                 if illustrate is not None:
                     illustrate(trajectory, folder)
     return trajectory
@@ -103,5 +106,5 @@ def load(
     """The simulation of a scenario with what --set changes."""
     from gne_mj.scenario import load_scenario
 
-    with working(quiet, PREPARING):
+    with telling(PREPARING, quiet=quiet):
         return load_scenario(scenario, settings(changes)).simulation_object()

@@ -14,12 +14,15 @@ import typer
 
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import INDEX, PORT, REPLACE, settings
-from gne_mj.cli.output import PREPARING, Results, on_terminal, say, tell, working
+from gne_mj.cli.output import Results, tell
 from gne_mj.cli.signals import stopping
 from gne_mj.cli.simulating import is_batch, keep, simulate, source_of, stored
+from gne_mj.progress import PREPARING, on_terminal, say, telling
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
+
+REPLAY = "preparing the replay"
 
 
 @app.command()
@@ -62,7 +65,8 @@ def view(
     if html is not None:
         from gne_mj.viewer import html_page
 
-        page = html_page(trajectory, title)
+        with telling(REPLAY):
+            page = html_page(trajectory, title)
         with written("html", html, replace=replace) as new:
             new.write_text(page, encoding="utf-8")
         print(html)
@@ -98,7 +102,7 @@ def watch(
     need("view", "a live page")
     factor = _speed(speed)
     with stopping() as stop, ExitStack() as page:
-        with working(as_json, PREPARING):
+        with telling(PREPARING, quiet=as_json):
             from gne_mj.viewer import Session
 
             scenario = load_scenario(source, settings(changes))
@@ -124,7 +128,7 @@ def _title(name: str) -> str:
 
 def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
     with stopping() as stop:
-        with working(False, "preparing the replay"):
+        with telling(REPLAY):
             from gne_mj.viewer import serve
 
             server = serve(trajectory, title, port=port or 0)
@@ -161,7 +165,7 @@ def _announced(url: str) -> Iterator[None]:
     """
     say(f"view        {url}   (Ctrl-C ends)")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if not (on_terminal(False) and (screen or sys.platform == "darwin")):
+    if not (on_terminal() and (screen or sys.platform == "darwin")):
         yield
         return
     with tempfile.NamedTemporaryFile("w", prefix="gne-mj-", suffix=".html") as file:

@@ -11,6 +11,7 @@ from gne_mj.game_check import claims, derivatives, members
 from gne_mj.game_check.functions import Functions
 from gne_mj.game_check.report import Comparison, Report
 from gne_mj.game_model import Game
+from gne_mj.progress import Tell, nothing
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,13 @@ _compared: WeakKeyDictionary[ModuleType, set[int]] = WeakKeyDictionary()
 _compared_games: WeakSet[Game] = WeakSet()
 
 
-def examine(game: Game, start: Array, points: int = _ASKED[0], most: int = _ASKED[1]) -> Report:
+def examine(
+    game: Game,
+    start: Array,
+    points: int = _ASKED[0],
+    most: int = _ASKED[1],
+    progress: Tell = nothing,
+) -> Report:
     """Compare all that is written twice in a game.
 
     Args:
@@ -32,12 +39,13 @@ def examine(game: Game, start: Array, points: int = _ASKED[0], most: int = _ASKE
         start: (m,) a profile strictly inside.
         points: how many profiles to look at, ``start`` among them.
         most: agents, actions and constraints for each profile; of more a part is drawn.
+        progress: called after every profile.
 
     Raises:
         UserCodeError: a function fails at ``start``, or is no finite number there.
     """
     with np.errstate(all="ignore"):
-        return _Examination(game, points, most).of(start)
+        return _Examination(game, points, most).of(start, progress)
 
 
 def refuse(game: Game, start: Array) -> None:
@@ -102,8 +110,9 @@ class _Examination:
             ),
         )
 
-    def of(self, start: Array) -> Report:
+    def of(self, start: Array, progress: Tell) -> Report:
         good: list[Array] = []
+        progress(0, self.points, f"{self.f.game.name} at {self.points} profiles")
         for n, y in enumerate(interior_profiles(self.f, start, self.points, self.rng)):
             try:
                 self._compare(y)
@@ -113,6 +122,7 @@ class _Examination:
                 self.failures.append(str(error))
             else:
                 good.append(y)
+            progress(n + 1, self.points, f"{n + 1} of {self.points} profiles")
         found = [self.in_cost, self.in_constraint, self.gradient, *self.others]
         return Report(
             self.f.game.name, len(good), (*found, *self._claims(good)), tuple(self.failures)

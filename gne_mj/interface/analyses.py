@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from gne_mj import game_check
 from gne_mj.errors import InvalidInput, named
 from gne_mj.interface.running import Run
+from gne_mj.progress import if_asked
 from gne_mj.scenario import Scenario, Source, load_scenario
 from gne_mj.scenario_tables.scenario import RecordingTable, SimulationTable
 from gne_mj.solutions import Solution, solve_system
@@ -19,6 +20,7 @@ def solve(
     rho: float | Sequence[float] | None = None,
     path: Sequence[float] = (),
     system: str | None = None,
+    progress: bool = False,
 ) -> Solution:
     """The penalised and the variational equilibria of a game, with their multipliers.
 
@@ -29,6 +31,7 @@ def solve(
         rho: one penalty or several; the scenario's own if left out.
         path: further penalties, each equilibrium started from the one before.
         system: which; may be left out if there is only one.
+        progress: tell on stderr how long it takes and how far it is, as the command does.
 
     Raises:
         InvalidInput: a penalty that is not positive; no start inside was found.
@@ -38,8 +41,8 @@ def solve(
         rhos: Sequence[float] = ()
     else:
         rhos = (rho,) if isinstance(rho, int | float) else tuple(rho)
-    with named(rhos="rho", path_rhos="path"):
-        return solve_system(_system(source, system)[0], rhos, tuple(path))
+    with named(rhos="rho", path_rhos="path"), if_asked(progress) as tell:
+        return solve_system(_system(source, system)[0], rhos, tuple(path), tell)
 
 
 def certify(

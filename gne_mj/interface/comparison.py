@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.interface.running import Run, part_changes, run_scenario
+from gne_mj.progress import Tell, if_asked
 from gne_mj.scenario import Source, load_scenario
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def compare(
     vary: Mapping[str, Sequence[Any]],
     changes: Mapping[str, Any] | None = None,
     *,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | bool = False,
 ) -> Comparison:
     """Run all combinations of a few values, and put the runs beside each other.
 
@@ -81,7 +82,8 @@ def compare(
         source: a scenario, or a game.
         vary: dotted keys, or the names that :func:`gne_mj.setup` has for parts, with their values.
         changes: of all runs.
-        progress: called before each run with its number, from 0, and how many there are.
+        progress: True to tell on stderr how long it takes and how far it is, as commands do; or
+            what is called before each run with its number, from 0, and how many there are.
 
     Raises:
         InvalidInput: names the key, the value and what would be right; before anything is run.
@@ -96,13 +98,24 @@ def compare(
         )
     base = load_scenario(source, changes)
     scenarios = [load_scenario(base, part_changes(source, each)) for each in combinations]
-    runs = []
-    for number, scenario in enumerate(scenarios):
-        if progress is not None:
-            progress(number, len(scenarios))
-        runs.append(run_scenario(scenario))
-    words = tuple({key: _words(value) for key, value in each.items()} for each in combinations)
-    return Comparison(words, tuple(runs))
+    total = sum(scenario.clock().duration for scenario in scenarios)
+    runs: list[Run] = []
+    with if_asked(progress) as tell:
+        tell(0.0, total, f"{len(scenarios)} runs, {total:g} s of them together")
+        done = 0.0
+        for number, scenario in enumerate(scenarios):
+            if callable(progress):
+                progress(number, len(scenarios))
+            words = f"run {number + 1} of {len(scenarios)}"
+            runs.append(run_scenario(scenario, _within(tell, done, total, words)))
+            done += scenario.clock().duration
+    varied = tuple({key: _words(value) for key, value in each.items()} for each in combinations)
+    return Comparison(varied, tuple(runs))
+
+
+def _within(tell: Tell, done: float, total: float, words: str) -> Callable[[float], None]:
+    """What one of several simulations calls with its time."""
+    return lambda time: tell(done + time, total, words)
 
 
 def _words(value: Any) -> str:

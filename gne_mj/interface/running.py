@@ -11,6 +11,7 @@ from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.interface.laws import own_law
+from gne_mj.progress import if_asked, of_time
 from gne_mj.scenario import Scenario, Source, load_scenario
 from gne_mj.scenario_tables.faults import FaultTable
 from gne_mj.simulation import Simulation
@@ -172,7 +173,7 @@ def run(
     faults: Sequence[FaultTable] | None = None,
     tolerance: float | None = None,
     seed: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool = False,
 ) -> Run:
     """Run a scenario, or a game with what plays it, to its end.
 
@@ -182,7 +183,8 @@ def run(
     Args:
         source, changes, agents, law, rho, start, duration, timestep, control_period,
         sample_period, engine, integrator, faults, tolerance, seed: see :func:`gne_mj.setup`.
-        progress: called now and then with the simulated time in s.
+        progress: True to tell on stderr how long it takes and how far it is, as the command does;
+            or what is called now and then with the simulated time in s.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
@@ -192,8 +194,10 @@ def run(
     return run_scenario(setup(source, changes, **given), progress)
 
 
-def run_scenario(scenario: Scenario, progress: Callable[[float], None] | None = None) -> Run:
+def run_scenario(scenario: Scenario, progress: Callable[[float], None] | bool = False) -> Run:
     """Run it to its end."""
-    simulation: Simulation = scenario.simulation_object()
-    tree = simulation.run(progress).tree
+    with if_asked(progress) as tell:
+        simulation: Simulation = scenario.simulation_object()
+        shown = progress if callable(progress) else of_time(tell, simulation.clock.duration)
+        tree = simulation.run(shown).tree
     return Run(tree, scenario, {each.name: each for each in simulation.systems})

@@ -33,6 +33,7 @@ from gne_mj.passivity.trials import (
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.ode import OdePlant
+from gne_mj.progress import Tell, nothing
 
 # How many times the outputs' range is gone through; beyond SIMULATED only where V is negative, by
 # more than rounding
@@ -74,7 +75,7 @@ def examine(
     equilibrium: Rest | None = None,
     storage: Storage | Literal["agents"] | None = "agents",
     reaches: Sequence[float] = REACHES,
-    progress: Callable[[float], None] | None = None,
+    progress: Tell = nothing,
 ) -> PassivityReport:
     """Look for a violation of equilibrium-independent passivity.
 
@@ -94,8 +95,8 @@ def examine(
         reaches: how many times the outputs' range amplitudes and deviations are in proportion to,
             one after the other until a violation is found or the step no longer resolves the
             motion; beyond a thousand times only where V is seen to be negative.
-        progress: called now and then with the share of all trials that is done, in percent; some
-            may not be needed.
+        progress: called now and then with the share of all trials that is done; some may not be
+            needed.
 
     Raises:
         InvalidInput: numbers that cannot be used, or a plant that does not rest at its equilibria.
@@ -104,14 +105,14 @@ def examine(
     subject = _subject(build, extent, outputs, owners, equilibrium, storage)
     levels: list[_Level] = []
     unresolved = None
+    reaches = [reach for reach in reaches if _is_of_use(subject, reach)]
+    progress(0.0, 1.0, f"{_words(extent, subject.owner)}, at up to {len(reaches)} amplitudes")
     for number, reach in enumerate(reaches):
 
         def tell(share: float, number: int = number) -> None:
-            if progress is not None:
-                progress(100.0 * (number + share) / len(reaches))
+            done = (number + share) / len(reaches)
+            progress(done, 1.0, f"{done:.0%} of all trials")
 
-        if reach > SIMULATED and not least_storage(subject, reach) < -ROUNDING:
-            continue
         level = _level(subject, extent, reach, tell)
         sure = level.counterexample is None or level.counterexample.confirmed
         if levels and (not sure or (level.escaped and level.counterexample is None)):
@@ -121,6 +122,10 @@ def examine(
         if level.counterexample is not None or level.escaped:
             break
     return _report(levels, unresolved, subject.owner, extent)
+
+
+def _is_of_use(subject: Subject, reach: float) -> bool:
+    return reach <= SIMULATED or least_storage(subject, reach) < -ROUNDING
 
 
 def _extent(trials: int, timestep: float, duration: float, seed: int) -> Extent:
@@ -175,7 +180,12 @@ def _level(subject: Subject, extent: Extent, reach: float, tell: Callable[[float
     ranges = []
     trials, batch = extent.trials, max(1, _CHANNELS // len(subject.owner))
     for first in range(0, trials, batch):
-        part = Trials(subject, extent, range(first, min(first + batch, trials)), reach)
+        own = range(first, min(first + batch, trials))
+
+        def part_done(share: float, own: range = own) -> None:
+            tell((own.start + share * len(own)) / trials)
+
+        part = Trials(subject, extent, own, reach, part_done)
         examined = min(examined, float(part.time[-1]))
         escaped, has_storage = escaped or part.escaped, part.has_storage
         ranges.append(part.range())
@@ -189,8 +199,12 @@ def _level(subject: Subject, extent: Extent, reach: float, tell: Callable[[float
             counterexample is None or _rank(shown) > _rank(counterexample.finding)
         ):
             counterexample = part.counterexample(shown)
-        tell(min(1.0, (first + batch) / trials))
     return _Level(worst, counterexample, examined, escaped, has_storage, widest(ranges))
+
+
+def _words(extent: Extent, owner: NDArray[np.int64]) -> str:
+    agents = len(set(owner.tolist()))
+    return f"{extent.trials} trials of {extent.duration:g} s for each of {agents} agents"
 
 
 def _report(
@@ -210,10 +224,7 @@ def _report(
     findings = tuple(worst[place] for place in sorted(worst))
     agents = len(set(owner.tolist()))
     examined = min(level.examined for level in levels)
-    message = (
-        f"{extent.trials} trials of {extent.duration:g} s for each of {agents} agents, seed"
-        f" {extent.seed}"
-    )
+    message = f"{_words(extent, owner)}, seed {extent.seed}"
     if len(levels) > 1:
         message += f", at {len(levels)} amplitudes"
     if not last.has_storage:

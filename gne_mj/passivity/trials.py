@@ -90,9 +90,17 @@ class Trials:
         extent: of all trials.
         trials: the numbers of these ones.
         reach: how many times the outputs' range amplitudes and deviations are in proportion to.
+        tell: called at every held input with the share of these trials that is done.
     """
 
-    def __init__(self, subject: Subject, extent: Extent, trials: range, reach: float = 1.0) -> None:
+    def __init__(
+        self,
+        subject: Subject,
+        extent: Extent,
+        trials: range,
+        reach: float = 1.0,
+        tell: Callable[[float], None] = lambda share: None,
+    ) -> None:
         timestep, owner, build = extent.timestep, subject.owner, subject.build
         steps = round(extent.duration / timestep)
         self.substeps = 2 * max(1, -(-steps // (2 * HOLDS)))
@@ -123,7 +131,7 @@ class Trials:
         states = self.rest_state.shape[1]
         deviation = np.concatenate([deviations(rng, width, states) for rng in generators])
         self.initial_state = self.rest_state + np.where(self.at_rest[:, None], 0.0, deviation)
-        self._simulate(holds)
+        self._simulate(holds, tell)
 
     def _check_rest(self) -> None:
         plant = self.plants[0]
@@ -140,7 +148,7 @@ class Trials:
                 f" {moved[worst]:.3g} off",
             )
 
-    def _simulate(self, holds: int) -> None:
+    def _simulate(self, holds: int, tell: Callable[[float], None]) -> None:
         channels = len(self.rest_output)
         self.input = np.zeros((holds, channels))
         supplied = np.zeros((2, holds + 1, channels))
@@ -167,6 +175,7 @@ class Trials:
             if not np.all(np.maximum(*away) <= _ESCAPED * self.width):
                 break
             done = k + 1
+            tell(done / holds)
             states = np.abs(self.plants[1].state - self.rest_state)
             self.farthest = np.maximum(self.farthest, np.max(states, axis=0))
             self.farthest_output = max(self.farthest_output, float(np.max(away)))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gne_mj.files import refuse_existing, written
 from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style, pyplot
+from gne_mj.progress import Tell, nothing
 from gne_mj.run_metrics import SUCCESSES
 from gne_mj.trajectory import Trajectory
 
@@ -47,6 +48,7 @@ def save(
     formats: tuple[str, ...] = ("png",),
     *,
     replace: bool = True,
+    progress: Tell = nothing,
 ) -> list[Path]:
     """Write every figure of :func:`draw` into a folder; returns the files' paths.
 
@@ -55,6 +57,7 @@ def save(
         folder: where to.
         formats: each one of ``FORMATS``.
         replace: files of the same names are replaced, each once the new one is whole.
+        progress: called after every file.
 
     Raises:
         InvalidInput: files exist and may not be replaced, or the folder cannot be written to.
@@ -62,6 +65,8 @@ def save(
     """
     figures = draw(trajectory)
     paths = {name: [Path(folder) / f"{name}.{kind}" for kind in formats] for name in figures}
+    files, done = len(figures) * len(formats), 0
+    progress(done, files, f"{files} figures")
     try:
         if not replace:
             refuse_existing("folder", [path for each in paths.values() for path in each])
@@ -69,6 +74,8 @@ def save(
             for path in paths[name]:
                 with written("folder", path, replace=replace) as new:
                     figure.savefig(new, dpi=200)
+                done += 1
+                progress(done, files, f"{done} of {files} figures")
     finally:
         for figure in figures.values():
             pyplot().close(figure)

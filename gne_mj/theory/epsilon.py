@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gne_mj.errors import InvalidInput, part_of
+from gne_mj.progress import Tell, nothing
 from gne_mj.system import Clock, System
 from gne_mj.theory.trials import stays_inside
 
@@ -38,15 +39,13 @@ class EpsilonSearch:
 
 
 @part_of("system", "clock")
-def search_epsilon(
-    system: System, clock: Clock, progress: Callable[[str], None] | None = None
-) -> EpsilonSearch:
+def search_epsilon(system: System, clock: Clock, progress: Tell = nothing) -> EpsilonSearch:
     """Double or halve the system's epsilon until a bracket is found, then bisect its logarithm.
 
     Args:
         system: under the fully distributed law.
         clock: duration and steps of every trial.
-        progress: called with a few words before every trial.
+        progress: called before every trial; those that are ahead are told as the most there can be.
 
     Raises:
         InvalidInput: another law.
@@ -59,16 +58,25 @@ def search_epsilon(
             "only the distributed law has an epsilon",
         )
     trials: list[tuple[float, bool]] = []
+    largest = MOST * clock.duration
+    doublings = np.log2(max(largest / law.epsilon, 1.0))
+    halvings = np.ceil(np.log2(np.log(2.0) / np.log(PRECISION)))
+    most = int(max(doublings, -np.log2(LEAST)) + halvings) + 1
 
     def stays(epsilon: float) -> bool:
-        if progress is not None:
-            progress(f"{system.name}: trying epsilon = {epsilon:.4g} s")
+        done = len(trials)
+        words = (
+            f"{system.name}: trying epsilon = {epsilon:.4g} s"
+            if done
+            else (f"at most {most} runs of {clock.duration:g} s with other epsilon")
+        )
+        progress(done, max(most, done + 1), words)
         trial = replace(system, law=replace(law, epsilon=epsilon))  # type: ignore[type-var]
         stayed = stays_inside(trial, clock)
         trials.append((epsilon, stayed))
         return stayed
 
-    good, bad, note = _bracket(stays, law.epsilon, MOST * clock.duration)
+    good, bad, note = _bracket(stays, law.epsilon, largest)
     while note is None and bad / good > PRECISION:
         middle = float(np.sqrt(good * bad))
         if stays(middle):

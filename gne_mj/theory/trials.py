@@ -3,7 +3,7 @@
 What trials show holds for the start, the duration and the values that were tried.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,11 +14,14 @@ from gne_mj.faults import Fault, Push, steady_push
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import with_margin
 from gne_mj.plain import raise_pending
+from gne_mj.progress import Tell, nothing
 from gne_mj.system import Clock, System, mode_of
 
 # How the ends of a bracket may differ, as a factor
 PRECISION = 1.02
 LARGEST_PUSH = 1e6
+# Runs to bisect the size of a push, and a period between two that differ by a fifth, at most
+HALVINGS, PERIOD_HALVINGS = 7, 4
 
 
 @dataclass(frozen=True)
@@ -76,13 +79,16 @@ def held_for(system: System, timestep: float, steps: int) -> System:
 
 
 @part_of("system", "clock")
-def search_period(
-    system: System, clock: Clock, progress: Callable[[str], None] | None = None
-) -> PeriodSearch:
+def search_period(system: System, clock: Clock, progress: Tell = nothing) -> PeriodSearch:
     """Longer and longer control periods until one leaves the set between instants or at one.
 
     Periods are whole numbers of steps, each a fifth longer than the one before, then bisected. The
     duration is rounded up to whole periods.
+
+    Args:
+        system: in a mode that holds its input.
+        clock: steps and duration of every run.
+        progress: called before every run; those that are ahead are told as the most there can be.
 
     Raises:
         InvalidInput: mode continuous, which has no period.
@@ -91,10 +97,15 @@ def search_period(
         raise InvalidInput("mode", system.mode, "it holds no input")
     trials: list[tuple[float, bool]] = []
 
-    def stays(steps: int) -> bool:
+    def stays(steps: int, ahead: int) -> bool:
         period = steps * clock.timestep
-        if progress is not None:
-            progress(f"{system.name}: trying a period of {period:.4g} s")
+        done = len(trials)
+        words = (
+            f"{system.name}: trying a period of {period:.4g} s"
+            if done
+            else (f"at most {ahead} runs of {clock.duration:g} s with longer and longer periods")
+        )
+        progress(done, done + ahead, words)
         duration = np.ceil(clock.duration / period - 1e-9) * period
         try:
             trial = held_for(system, clock.timestep, steps)
@@ -105,15 +116,17 @@ def search_period(
         return stayed
 
     most = max(1, clock.steps(clock.duration) // 2)
-    steps, good = 1, 0
-    while steps <= most and stays(steps):
+    tried = list(_longer(most))
+    good, bad = 0, None
+    for k, steps in enumerate(tried):
+        if not stays(steps, len(tried) - k + PERIOD_HALVINGS):
+            bad = steps
+            break
         good = steps
-        steps = max(steps + 1, int(1.2 * steps))
-    bad = steps if steps <= most else None
     note = "each a fifth longer than the last, then bisected"
     while bad is not None and good and bad - good > 1 and bad / good > PRECISION:
         middle = (good + bad) // 2
-        if stays(middle):
+        if stays(middle, (bad - good - 1).bit_length()):
             good = middle
         else:
             bad = middle
@@ -123,19 +136,31 @@ def search_period(
     return PeriodSearch(good * h if good else None, bad and bad * h, tuple(trials), note)
 
 
+def _longer(most: int) -> Iterator[int]:
+    """Steps of a period, each a fifth more than the last."""
+    steps = 1
+    while steps <= most:
+        yield steps
+        steps = max(steps + 1, int(1.2 * steps))
+
+
 @part_of("system", "clock")
-def search_push(
-    system: System, clock: Clock, progress: Callable[[str], None] | None = None
-) -> PushSearch:
+def search_push(system: System, clock: Clock, progress: Tell = nothing) -> PushSearch:
     """The smallest push that leaves the set: every pattern is doubled until it does, and bisected.
 
     Patterns push the agents of one constraint the ways that raise it, steadily, in squares of
     several periods, or once from some time on; the scenario's own faults stay.
+
+    Args:
+        system, clock: what is run.
+        progress: called before every pattern, with how many runs are expected.
     """
     best, pattern, runs, tried = np.inf, None, 0, 0.0
+    patterns = list(_patterns(system, clock))
+    progress(0, _expected(0, len(patterns)), _ahead(len(patterns), clock))
     if not stays_inside(system, clock):
         return PushSearch(0.0, "without any push", 0.0, 1)
-    for name, pushes in _patterns(system, clock):
+    for number, (name, pushes) in enumerate(patterns):
 
         def stays(size: float, pushes: tuple[Push, ...] = pushes) -> bool:
             nonlocal runs, tried
@@ -144,8 +169,8 @@ def search_push(
             faults: tuple[Fault, ...] = (*system.faults, *scaled)
             return stays_inside(replace(system, faults=faults), clock)
 
-        if progress is not None:
-            progress(f"{system.name}: pushing, {name}")
+        total = runs + 1 + _expected(number, len(patterns))
+        progress(runs + 1, total, f"{system.name}: pushing, {name}")
         high = min(best, LARGEST_PUSH) if pattern is not None else 1.0
         if pattern is None:
             while high < LARGEST_PUSH and stays(high):
@@ -167,6 +192,19 @@ def search_push(
                 break
         best, pattern = high, name
     return PushSearch(best if pattern is not None else None, pattern, tried, runs)
+
+
+def _expected(done: int, patterns: int) -> float:
+    """Runs of the patterns that are left: one of each, and some more where it breaks sooner.
+
+    In random order the k-th of them does so with probability 1/k.
+    """
+    return sum(1.0 + HALVINGS / k for k in range(done + 1, patterns + 1))
+
+
+def _ahead(patterns: int, clock: Clock) -> str:
+    runs = _expected(0, patterns)
+    return f"{patterns} patterns of pushes, some {runs:.0f} runs of {clock.duration:g} s"
 
 
 def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, ...]]]:

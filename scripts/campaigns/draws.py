@@ -1,14 +1,10 @@
 """Random systems for the campaigns: games, fleets, starts, periods."""
 
-import sys
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
 
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput
@@ -22,6 +18,7 @@ from gne_mj.games import (
 )
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
+from gne_mj.progress import telling
 from gne_mj.system import Clock, System
 
 LONGEST_STEP = 5e-3  # s
@@ -176,15 +173,9 @@ def towards_bound(
 
 
 def progress(done: Iterable[Any], total: int, what: str) -> Iterator[Any]:
-    """The same, with a progress bar on a terminal and else a line a minute."""
-    terminal, begun = sys.stderr.isatty(), time.monotonic()
-    told = begun
-    with Progress(console=Console(stderr=True), disable=not terminal) as bar:
-        task = bar.add_task(what, total=total)
+    """The same, telling on stderr how far it is."""
+    with telling(what) as tell:
+        tell(0, total, f"{total} {what}")
         for count, each in enumerate(done, start=1):
             yield each
-            bar.advance(task)
-            now = time.monotonic()
-            if not terminal and now - told >= 60.0:
-                told = now
-                print(f"{count} of {total} {what}, {now - begun:.0f} s", file=sys.stderr)
+            tell(count, total, f"{count} of {total} {what}")
