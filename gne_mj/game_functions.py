@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from gne_mj.linked_game import compiled_for
 from gne_mj.native import address_in, call_integer, call_number, callback, kernel, source_key
 from gne_mj.parameter_block import floats_at, integers_at
 
@@ -53,6 +54,10 @@ def compiled_functions(game: ModuleType) -> NDArray[np.int64]:
 @cache
 def _compiled(game: ModuleType) -> list[Any]:
     """The C functions, in the order of their numbers; q and y are given by address and length."""
+    return compiled_for(game, _made)
+
+
+def _made(game: ModuleType) -> list[Any]:
     source = source_key(game)
     return [*_own_functions(game, source), *_functions_of_many(game, source)]
 

@@ -10,9 +10,10 @@ import platform
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,22 +80,59 @@ def joined(parts: Sequence[SystemRecord]) -> list[SystemRecord]:
     ]
 
 
+class _Unlabelled(NamedTuple):
+    """A tree that is not made yet: that, and xarray with it, takes longer than many a run.
+
+    Attributes:
+        attributes: of its root.
+        parts: as :meth:`Trajectory.from_parts` has them.
+    """
+
+    attributes: dict[str, Any]
+    parts: dict[str, tuple[list[SystemRecord], Certificate]]
+
+    def tree(self) -> "xarray.DataTree":
+        """The tree."""
+        import xarray
+
+        groups = {"/": xarray.Dataset(attrs=self.attributes)}
+        for name, part in self.parts.items():
+            groups[f"/{name}"] = _dataset(*part)
+        return xarray.DataTree.from_dict(groups)
+
+
 class Trajectory:
     """What a run recorded and showed.
 
+    Args:
+        tree: the DataTree.
+
     Attributes:
-        tree: the DataTree; ``tree["robots"].dataset`` is one system's dataset on dimensions
-            time, agent, constraint and component (of the state); agents whose actions have
-            several entries add a dimension action, with coordinates owner and axis.
         reports: for each system its certificate as plain data.
     """
 
-    def __init__(self, tree: "xarray.DataTree") -> None:
-        self.tree = tree
+    def __init__(self, tree: "xarray.DataTree | _Unlabelled") -> None:
+        self._given = tree
+        if isinstance(tree, _Unlabelled):
+            self._attributes: dict[Any, Any] = tree.attributes
+            reports = {name: _report(certificate) for name, (_, certificate) in tree.parts.items()}
+        else:
+            self._attributes = tree.attrs
+            reports = {str(name): group.attrs["certificate"]
+                       for name, group in tree.children.items()}  # fmt: skip
         self.reports: dict[str, dict[str, Any]] = {
-            str(name): json.loads(group.attrs["certificate"])
-            for name, group in tree.children.items()
+            name: json.loads(report) for name, report in reports.items()
         }
+
+    @cached_property
+    def tree(self) -> "xarray.DataTree":
+        """The DataTree, made when it is first asked for.
+
+        ``tree["robots"].dataset`` is one system's dataset on dimensions time, agent, constraint and
+        component (of the state); agents whose actions have several entries add a dimension action,
+        with coordinates owner and axis.
+        """
+        return self._given.tree() if isinstance(self._given, _Unlabelled) else self._given
 
     @classmethod
     def from_parts(
@@ -114,26 +152,18 @@ class Trajectory:
             wall_time: real time in s that it took.
             interventions: what the user did meanwhile, each with its time in s.
         """
-        import xarray
-
-        groups: dict[str, xarray.Dataset] = {
-            "/": xarray.Dataset(
-                attrs={
-                    "scenario": source,
-                    "seed": seed,
-                    "versions": json.dumps(versions()),
-                    "wall_time": wall_time,
-                    "interventions": json.dumps(list(interventions)),
-                    "status": _worst(certificate.status for _, certificate in parts.values()),
-                    "message": "; ".join(
-                        f"{name}: {certificate.message}" for name, (_, certificate) in parts.items()
-                    ),
-                }
-            )
+        attributes = {
+            "scenario": source,
+            "seed": seed,
+            "versions": json.dumps(versions()),
+            "wall_time": wall_time,
+            "interventions": json.dumps(list(interventions)),
+            "status": _worst(certificate.status for _, certificate in parts.values()),
+            "message": "; ".join(
+                f"{name}: {certificate.message}" for name, (_, certificate) in parts.items()
+            ),
         }
-        for name, part in parts.items():
-            groups[f"/{name}"] = _dataset(*part)
-        return cls(xarray.DataTree.from_dict(groups))
+        return cls(_Unlabelled(attributes, parts))
 
     def __repr__(self) -> str:
         words = ", ".join(f"{name}: {report['status']}" for name, report in self.reports.items())
@@ -142,7 +172,7 @@ class Trajectory:
     @property
     def status(self) -> str:
         """The worst of the systems' statuses."""
-        return str(self.tree.attrs["status"])
+        return str(self._attributes["status"])
 
     @property
     def holds(self) -> bool:
@@ -152,7 +182,7 @@ class Trajectory:
     @property
     def interventions(self) -> list[dict[str, Any]]:
         """What the user did while it ran: "time" in s, and "what" in words."""
-        done: list[dict[str, Any]] = json.loads(self.tree.attrs.get("interventions", "[]"))
+        done: list[dict[str, Any]] = json.loads(self._attributes.get("interventions", "[]"))
         return done
 
     def __getitem__(self, system: str) -> "xarray.Dataset":
@@ -162,7 +192,7 @@ class Trajectory:
 
     def report(self) -> dict[str, Any]:
         """The whole report as plain data, for JSON."""
-        attributes = self.tree.attrs
+        attributes = self._attributes
         return {
             "status": self.status,
             "systems": self.reports,
@@ -234,12 +264,16 @@ def variables_of_parts(parts: Sequence[SystemRecord]) -> Labelled:
     return variables
 
 
+def _report(certificate: Certificate) -> str:
+    return json.dumps(certificate.to_dict())
+
+
 def _dataset(parts: list[SystemRecord], certificate: Certificate) -> "xarray.Dataset":
     """The dataset of a system."""
     import xarray
 
     system = parts[-1].system
-    game, report = system.game, certificate.to_dict()
+    game = system.game
     drawn = [variable for variable in declared(system) if variable.figure]
     time = np.concatenate([part.time for part in parts])
     return xarray.Dataset(
@@ -257,7 +291,7 @@ def _dataset(parts: list[SystemRecord], certificate: Certificate) -> "xarray.Dat
             "rho": system.rho,
             "status": certificate.status,
             "message": certificate.message,
-            "certificate": json.dumps(report),
+            "certificate": _report(certificate),
         },
     )
 

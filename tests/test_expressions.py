@@ -3,6 +3,7 @@
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from random_expressions import RandomGame, hyper_dual
 
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.expressions import fixed, game
+from gne_mj.expressions.llvm import llvm
+from gne_mj.expressions.nodes import FUNCTIONS
 from gne_mj.expressions.table import ExpressionsTable
 from gne_mj.scenario import load_scenario
 
@@ -87,6 +90,54 @@ def test_random_games_have_the_derivatives_of_hyper_dual_numbers(seed):
 @pytest.mark.slow
 def test_two_hundred_random_games():
     assert max(random_error(seed) for seed in range(200)) < 1e-11
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_machine_code_of_random_games_computes_what_their_kernels_say(seed):
+    drawn = RandomGame(seed)
+    made = game(drawn.count, drawn.cost, drawn.constraints, near=fixed(drawn.near), **drawn.numbers)
+    q, y, kernels, each = made.parameters, drawn.y, made.kernels, range(drawn.count)
+    rows = np.zeros((drawn.count, drawn.count))
+    for i in each:
+        kernels.add_cost_hessian(q, i, i, y, 1.0, rows[i])
+    _agree(made.pseudo_gradient_jacobian(y), rows)
+    _agree(made.costs(y), [kernels.cost(q, i, y) for i in each])
+    _agree(made.pseudo_gradient(y), [kernels.cost_gradient(q, i, i, y) for i in each])
+    _agree(made.constraints(y), [kernels.constraint(q, k, y) for k in each])
+    slopes = made.constraint_jacobian(y)
+    for k, own in enumerate(made.in_constraint):
+        _agree(slopes[k, own], [kernels.constraint_gradient(q, k, a, y) for a in own])
+        bends = [[kernels.constraint_hessian(q, k, a, b, y) for b in own] for a in own]
+        _agree(made.constraint_hessian(k, y), bends)
+
+
+def test_machine_code_has_every_function_of_numpy_that_formulas_have():
+    inside, names = ("arcsin", "arccos", "arctanh"), sorted(set(FUNCTIONS) - {"abs"})
+    powers = (
+        lambda y, p: (2.0 + y) ** p.power,
+        lambda y, p: (2.0 + y) ** -3,
+        lambda y, p: abs(y - 0.1) + p.base**y,
+        lambda y, p: y**7 - 2 * y**2,
+    )
+
+    def cost(i, y, p):
+        if i < len(powers):
+            return powers[i](y[i], p) / (2.0 + y[i - 1])
+        name = names[i - len(powers)]
+        return getattr(np, name)(0.1 * y[i] if name in inside else 1.1 + y[i])
+
+    numbers = {"power": 2.5, "base": 1.7}
+    plain, count = SimpleNamespace(**numbers), len(names) + len(powers)
+    made, y = game(count, cost, lower=-1.0, upper=3.0, **numbers), np.linspace(0.2, 1.3, count)
+    _agree(made.costs(y), [cost(i, y, plain) for i in range(count)])
+    for i, at in enumerate(np.eye(count) * 1e-5):
+        slope = (cost(i, y + at, plain) - cost(i, y - at, plain)) / 2e-5
+        assert made.pseudo_gradient(y)[i] == pytest.approx(slope, rel=1e-7)
+
+
+def test_machine_code_of_what_kernels_never_have_is_refused():
+    with pytest.raises(NotImplementedError, match="While"):
+        llvm("def cost(q, i, y):\n    while i > 0:\n        pass\n")
 
 
 def test_the_energy_game_says_what_it_is():

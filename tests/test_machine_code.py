@@ -69,6 +69,15 @@ def test_what_a_version_with_other_modules_left_is_made_anew(locked, tmp_path):
     assert b"no_more" not in index.read_bytes(), "kept again"
 
 
+def test_what_is_kept_is_loaded_without_what_compiles(locked, tmp_path):
+    program = f"{COMPILE}\nimport sys\nprint('numba.np.linalg' in sys.modules, double(2.5))"
+    first, second = (
+        python(locked, program, NUMBA_CACHE_DIR=str(tmp_path)).stdout.split() for _ in range(2)
+    )
+    assert first == ["42", "True", "5.0"]
+    assert second == ["42", "False", "5.0"]
+
+
 def test_a_folder_that_is_named_is_used_without_a_word(locked, tmp_path):
     done = python(locked, COMPILE, NUMBA_CACHE_DIR=str(tmp_path))
     assert (done.stdout, done.stderr) == ("42\n", "")

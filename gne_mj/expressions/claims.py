@@ -202,15 +202,14 @@ def _tighten(which: NDArray[np.int64], slope: NDArray[np.float64], most: float,
     which, slope = which[keep], slope[keep]
     least = np.where(slope > 0, slope * lower[which], slope * upper[which])
     unknown = ~np.isfinite(least)
-    total = np.sum(least[~unknown])
-    for k, a in enumerate(which):
-        if np.count_nonzero(unknown) - unknown[k]:
-            continue
-        bound = (most - total + (0.0 if unknown[k] else least[k])) / slope[k]
-        if slope[k] > 0:
-            upper[a] = min(upper[a], bound)
-        else:
-            lower[a] = max(lower[a], bound)
+    found = np.ones(len(which), dtype=bool) if not np.any(unknown) else unknown
+    if np.count_nonzero(unknown) > 1 or not len(which):
+        return
+    known = np.where(unknown, 0.0, least)
+    bound = ((most - np.sum(known) + known) / slope)[found]
+    which, rises = which[found], slope[found] > 0
+    upper[which[rises]] = np.minimum(upper[which[rises]], bound[rises])
+    lower[which[~rises]] = np.maximum(lower[which[~rises]], bound[~rises])
 
 
 def _affine_parts(root: Node) -> tuple[dict[int, float], float]:

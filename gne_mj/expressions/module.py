@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.expressions import source
+from gne_mj.expressions.llvm import llvm
 from gne_mj.expressions.nodes import Node
 from gne_mj.expressions.structure import Analysis, Instance, Program, Tables
 from gne_mj.expressions.tracing import Trace
@@ -119,6 +120,7 @@ def _module(text: str) -> ModuleType:
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         module = ModuleType(name, "Kernels made of a game's expressions.")
         module.__file__ = file
+        module.__dict__["llvm"] = llvm(text)
         sys.modules[name] = module  # where numba looks for it
         exec(compile(text, file, "exec"), module.__dict__)
         _modules[digest] = module

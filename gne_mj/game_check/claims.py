@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from gne_mj.errors import UserCodeError
 from gne_mj.game_check.derivatives import chosen
@@ -141,6 +140,8 @@ def _unbounded(f: Functions, a: int, y: Array) -> tuple[str, list[float], str]:
 
 def _farthest(f: Functions, y: Array, a: int, sign: float) -> Array:
     """A profile strictly inside with y_a as great (sign 1) or small (-1) as a search finds it."""
+    from scipy.optimize import minimize  # slow to load, and for few games only
+
     game, goal = f.game, -sign * unit(len(y), a)
     try:
         found = minimize(

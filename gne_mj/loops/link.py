@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gne_mj.barrier import scheduled
 from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
+from gne_mj.linked_game import compiled_for
 from gne_mj.loops import functions, implicit
 from gne_mj.loops.layout import (
     Instant,
@@ -73,6 +74,11 @@ def link(
 @cache
 def action(law: ModuleType, game: ModuleType) -> Any:
     """The law's action in a game."""
+    (found,) = compiled_for(game, _action, law)
+    return found
+
+
+def _action(game: ModuleType, law: ModuleType) -> list[Any]:
     source = source_key(law, game)
 
     def action(block, y, weights, memory, profile, now, u):
@@ -84,7 +90,7 @@ def action(law: ModuleType, game: ModuleType) -> Any:
             floats_at(memory, steps.memory), law_work_at(profile, now, m), floats_at(u, m),
         )  # fmt: skip
 
-    return callback(_whole(*[_whole] * 7), action)
+    return [callback(_whole(*[_whole] * 7), action)]
 
 
 @cache
@@ -138,6 +144,14 @@ def penalty(fall: Callable[[float, float], float]) -> Any:
 @cache
 def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any]:
     """What mode implicit solves a law for, each agent by itself if ``alone``."""
+    entries = (
+        functions.PREPARE, functions.BARRIER_FREE_TERMS, functions.ADD_BARRIER_FREE_SLOPE,
+        functions.MEMORY_OUTPUTS, functions.OWN_PROFILE,
+    )  # fmt: skip
+    return dict(zip(entries, compiled_for(game, _of_implicit, law, alone), strict=False))
+
+
+def _of_implicit(game: ModuleType, law: ModuleType, alone: bool) -> list[Any]:
     source = source_key(law, game)
 
     def prepare(block, first, last, y, memory):
@@ -185,14 +199,14 @@ def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any
         law.memory_outputs(floats_at(prediction, m), floats_at(held, m))
         return 0
 
-    found = {
-        functions.PREPARE: callback(_whole(*[_whole] * 5), prepare),
-        functions.BARRIER_FREE_TERMS: callback(_whole(*[_whole] * 6), barrier_free_terms),
-        functions.ADD_BARRIER_FREE_SLOPE: callback(_whole(*[_whole] * 6), add_barrier_free_slope),
-        functions.MEMORY_OUTPUTS: callback(_whole(*[_whole] * 3), memory_outputs),
-    }
+    found = [
+        callback(_whole(*[_whole] * 5), prepare),
+        callback(_whole(*[_whole] * 6), barrier_free_terms),
+        callback(_whole(*[_whole] * 6), add_barrier_free_slope),
+        callback(_whole(*[_whole] * 3), memory_outputs),
+    ]
     if alone:
-        found[functions.OWN_PROFILE] = callback(_real(*[_whole] * 5), own_profile)
+        found.append(callback(_real(*[_whole] * 5), own_profile))
     return found
 
 

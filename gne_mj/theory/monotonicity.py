@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from gne_mj.theory import spectra
 
@@ -69,6 +68,8 @@ def least_eigenvalue(short: Array, long: Array) -> Bound:
         slope = np.sum((unit @ seen) ** 2, axis=1) / (16.0 * s[:, 0] ** 2)
         slope -= np.sum((change @ seen) ** 2, axis=1)
         return -bound / size, -slope * s[:, 0] / size
+
+    from scipy.optimize import minimize  # slow to load, and for few games only
 
     # What is best if all directions count alike
     log_s = -np.log(4.0 * np.linalg.norm(change, axis=1))
