@@ -277,7 +277,7 @@ PLACE = 1.2 * np.array([[1.0, 0.0], [0.3, 1.0], [-0.8, 0.6], [-0.8, -0.6], [0.3,
 LAWS = {
     "full": FullInformation(),
     "partial": PartialInformation(graphs.ring(5), coupling=20.0, time_constant=0.1),
-    "distributed": FullyDistributed(graphs.ring(5), 2e-3, 0.2),
+    "distributed": FullyDistributed(graphs.ring(5), 5e-3, 1.0),
 }
 
 

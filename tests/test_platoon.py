@@ -200,7 +200,7 @@ START = [2.0, 1.15, -1.8, -2.7, -5.6]  # two spacings near 0.8 m, two near 3 m
 LAWS = {
     "full": FullInformation(),
     "partial": PartialInformation(graphs.ring(5), coupling=12.0, time_constant=0.1),
-    "distributed": FullyDistributed(graphs.ring(5), 2e-3, 0.2),
+    "distributed": FullyDistributed(graphs.ring(5), 5e-3, 1.0),
 }
 
 
