@@ -67,7 +67,7 @@ def random_region(rng):
         if rng.random() < 0.5:
             given |= {"center": rng.uniform(-1, 1, 2), "radius": rng.uniform(2.0, 5.0)}
         if rng.random() < 0.4:
-            angle = np.sort(rng.uniform(0, 2 * np.pi, 4)) + 1e-2 * np.arange(4)
+            angle = 0.5 * np.pi * (np.arange(4) + rng.uniform(0.1, 0.9, 4))
             corners = rng.uniform(2.0, 4.0) * np.column_stack([np.cos(angle), np.sin(angle)])
             given |= {"vertices": corners[:: rng.choice([1, -1])] + rng.uniform(-0.3, 0.3, 2)}
         if rng.random() < 0.4:

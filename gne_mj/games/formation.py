@@ -19,7 +19,6 @@ neighbours (rows j, w_ij, o_ij)].
 """
 
 import sys
-from collections.abc import Sequence
 from functools import partial
 from typing import Literal
 
@@ -46,7 +45,7 @@ HEADER, ROW = 4, 4  # numbers before the sides, and of each neighbour
 def formation_game(
     desired_place: ArrayLike,
     edges: graph.Pairs,
-    place_weight: Sequence[float],
+    place_weight: ArrayLike,
     region: Region,
     *,
     edge_weight: ArrayLike = 1.0,
@@ -70,50 +69,38 @@ def formation_game(
     Raises:
         InvalidInput: a bad number or pair, or a connected part of the edges without a leader.
     """
-    weight = np.asarray(place_weight, dtype=np.float64)
-    if weight.ndim != 1 or not len(weight):
-        raise InvalidInput("place_weight", place_weight, "it must list a number for each agent")
+    weight = np.atleast_1d(np.asarray(place_weight, dtype=np.float64))
     agents = len(weight)
-    weight = graph.numbers("place_weight", place_weight, agents, "agent", "not negative")
+    weight = graph.numbers("place_weight", weight, agents, "agent", "not negative")
     place = _vectors("desired_place", desired_place, agents, "agent")
     pairs = graph.checked("edges", edges, agents)
     graph.leaders("place_weight", pairs, weight)
-    stiff = graph.numbers("edge_weight", edge_weight, len(pairs), "edge", "positive")
-    first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    given = place[first] - place[second] if desired_offset is None else desired_offset
-    offset = _vectors("desired_offset", given, len(pairs), "edge")
-    tied = pairs if links is None else graph.checked("links", links, agents)
-    length = graph.numbers("link_length", link_length, len(tied), "link", "positive")
-    sides = len(region.offsets)
-    kept = sides + region.disc  # constraints of each agent's place
     neighbours = graph.neighbours(pairs, agents)
+    sides = len(region.offsets)
+    each = sides + region.disc  # constraints of an agent's place
+    tied = pairs if links is None else graph.checked("links", links, agents)
+    check_count("links", len(tied) + each * agents, MOST_ACTIONS, "these and the region's bounds")
+    length = graph.numbers("link_length", link_length, len(tied), "link", "positive")
     return Game(
-        name="formation",
-        kernels=sys.modules[__name__],
+        name="formation", kernels=sys.modules[__name__],
         parameters=np.concatenate([
-            [agents, len(tied), sides, region.disc],
-            np.column_stack([region.normals, region.offsets]).ravel(),
-            [*region.center, region.radius] * region.disc,
-            weight, place.ravel(),
-            [number for pair, r in zip(tied, length, strict=True) for number in (*pair, r)],
-            *_neighbour_rows(pairs, stiff, offset, agents),
+            [agents, len(tied), sides, region.disc], *_region_rows(region),
+            weight, place.ravel(), np.column_stack([_ends(tied), length]).ravel(),
+            *_neighbour_rows(pairs, edge_weight, desired_offset, place),
         ], dtype=np.float64),
         sizes=(2,) * agents,
         in_cost=[[i, *near] for i, near in enumerate(neighbours)],
-        in_constraint=[*map(list, tied), *([i] for i in range(agents) for _ in range(kept))],
+        in_constraint=[*map(list, tied), *([i] for i in range(agents) for _ in range(each))],
         constraint_names=_constraint_names(tied, agents, sides, region.disc),
-        action_name="position",
-        action_unit="m",
+        action_name="position", action_unit="m",
         affine=True,
         box=(np.tile(region.box[0], agents), np.tile(region.box[1], agents)),
         # with sides not all constraints are bounds on gaps
         gap_bounds=None if sides else np.concatenate([length, np.full(agents, region.radius)]),
-        agent_name="robot",
-        axes=("x", "y"),
-        quantities=_quantities(tied, length, region, kept * agents),
+        agent_name="robot", axes=("x", "y"),
+        quantities=_quantities(tied, length, region, each * agents),
         constraint_class="quadratic" if tied or region.disc else "affine",
-        smooth=True,
-        tested=True,
+        smooth=True, tested=True,
     )  # fmt: skip
 
 
@@ -128,11 +115,26 @@ def _vectors(key: str, given: ArrayLike, count: int, what: str) -> Array:
     return vectors
 
 
+def _region_rows(region: Region) -> tuple[Array, list[float]]:
+    """The numbers of its sides, and of its disc if it has one."""
+    sides = np.column_stack([region.normals, region.offsets])
+    return sides.ravel(), [*region.center, region.radius] * region.disc
+
+
+def _ends(pairs: graph.Pairs) -> NDArray[np.int64]:
+    """(pairs, 2) both agents of each."""
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
 def _neighbour_rows(
-    pairs: graph.Pairs, weight: Array, offset: Array, agents: int
+    pairs: graph.Pairs, edge_weight: ArrayLike, desired_offset: ArrayLike | None, place: Array
 ) -> tuple[NDArray[np.int64], Array]:
     """Where each agent's neighbours start, and rows j, w_ij, o_ij of all, agent by agent."""
-    rows: list[list[list[float]]] = [[] for _ in range(agents)]
+    first, second = _ends(pairs).T
+    given = place[first] - place[second] if desired_offset is None else desired_offset
+    offset = _vectors("desired_offset", given, len(pairs), "edge")
+    weight = graph.numbers("edge_weight", edge_weight, len(pairs), "edge", "positive")
+    rows: list[list[list[float]]] = [[] for _ in place]
     for (i, j), w, o in zip(pairs, weight, offset, strict=True):
         rows[i].append([j, w, *o])
         rows[j].append([i, w, *-o])
@@ -164,7 +166,7 @@ def _quantities(
     nothing = np.full(others, np.nan)
     lengths = Quantity(
         name="link_length", long_name="link length", unit="m",
-        values=partial(_link_lengths, np.array(links).T, nothing), each="constraint",
+        values=partial(_link_lengths, _ends(links).T, nothing), each="constraint",
         symbol="|y_i - y_j|", bound=np.concatenate([length, nothing]),
     )  # fmt: skip
     return lengths, share
@@ -338,7 +340,7 @@ class FormationTable(GameTable):
         return formation_game(
             _circle(count) if self.desired_place is None else self.desired_place,
             graph.pairs_of(self.edges, count),
-            weight.tolist(),
+            weight,
             region,
             edge_weight=self.edge_weight,
             desired_offset=self.desired_offset,

@@ -78,46 +78,45 @@ def platoon_game(
     check_count("agents", agents, MOST_AGENTS)
     pairs = agents - 1
     lower, upper = _bounds(pairs, least_spacing, greatest_spacing, leader_range)
-    middle = 0.5 * (lower[1:] + upper[1:])
-    given = middle if desired_spacing is None else desired_spacing
+    given = 0.5 * (lower + upper)[1:] if desired_spacing is None else desired_spacing
     desired = numbers("desired_spacing", given, pairs, "pair of neighbours")
     behind = -np.cumsum([0.0, *desired])
     given = behind if desired_place is None else desired_place
     place = numbers("desired_place", given, agents, "agent")
     own = numbers("spacing_weight", spacing_weight, pairs, "pair of neighbours", "not negative")
-    given = np.eye(agents)[0] if place_weight is None else place_weight
+    given = np.append(1.0, np.zeros(pairs)) if place_weight is None else place_weight
     weight = numbers("place_weight", given, agents, "agent", "not negative")
     _check_monotone(own, weight, spacing_weight)
     ahead = [[] if i == 0 else [i - 1] for i in range(agents)]
     columns = (lower, upper, [0.0, *desired], [0.0, *own], place, weight)
     return Game(
-        name="platoon",
-        kernels=sys.modules[__name__],
+        name="platoon", kernels=sys.modules[__name__],
         parameters=np.concatenate(columns, dtype=np.float64),
         sizes=(1,) * agents,
         in_cost=[[i, *near] for i, near in enumerate(ahead)],
         in_constraint=[[*near, i] for i, near in enumerate(ahead)] * 2,
-        constraint_names=tuple(
-            f"{word} {'place of agent 1' if i == 0 else f'spacing of agents {i} and {i + 1}'}"
-            for word in ("least", "greatest")
-            for i in range(agents)
-        ),
-        action_name="position",
-        action_unit="m",
+        constraint_names=_constraint_names(agents),
+        action_name="position", action_unit="m",
         affine=True,
         box=(lower[0] - np.cumsum([0.0, *upper[1:]]), upper[0] - np.cumsum([0.0, *lower[1:]])),
         agent_name="robot",
         quantities=_quantities(lower, upper),
         constraint_class="affine",
-        smooth=True,
-        tested=True,
-    )
+        smooth=True, tested=True,
+    )  # fmt: skip
+
+
+def _constraint_names(agents: int) -> tuple[str, ...]:
+    each = ("place of agent 1", *(f"spacing of agents {i} and {i + 1}" for i in range(1, agents)))
+    return tuple(f"{word} {name}" for word in ("least", "greatest") for name in each)
 
 
 def _bounds(
     pairs: int, least: ArrayLike, greatest: ArrayLike, leader: tuple[float, float]
 ) -> tuple[Array, Array]:
     """(N,) lower and upper bounds: of the leader's place, then of the spacings."""
+    if pairs < 0:
+        raise InvalidInput("agents", pairs + 1, "there must be one at least")
     ends = np.asarray(leader, dtype=np.float64)
     if ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
         expected = "it must be [least, greatest], two finite numbers, the first one below"

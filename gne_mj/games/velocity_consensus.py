@@ -59,13 +59,8 @@ def velocity_consensus_game(
     pairs = graph.checked("edges", edges, agents)
     leaders = graph.leaders("leader_weight", pairs, weight)
     of_edges = graph.numbers("gap_bound", gap_bound, len(pairs), "edge", "positive")
-    of_leaders = graph.numbers(
-        "leader_gap_bound", leader_gap_bound, len(leaders), "leader", "positive"
-    )
-    rows, bounds = (
-        [*pairs, *((int(i), agents) for i in leaders)],
-        np.concatenate([of_edges, of_leaders]),
-    )
+    own = graph.numbers("leader_gap_bound", leader_gap_bound, len(leaders), "leader", "positive")
+    rows, bounds = [*pairs, *((int(i), agents) for i in leaders)], np.concatenate([of_edges, own])
     neighbours, (first, second) = graph.neighbours(pairs, agents), np.array(rows).T
     gaps = Quantity(
         name="gap", long_name="velocity gap", unit="m/s",
