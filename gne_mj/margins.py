@@ -110,34 +110,65 @@ def influence(
 def tightening(game: Game, error: Array) -> Array:
     """How much a difference of outputs of at most ``error`` (m,) can add to g, shape (p,).
 
-    Exact for affine constraints; for bounds on gaps t is such that |gap|^2 <= delta^2 - t leaves
-    room for the greatest change of the gap.
+    Exact for affine constraints; for bounds on gaps, |gap|^2 <= delta^2 with any affine gap, t is
+    such that |gap|^2 <= delta^2 - t leaves room for the greatest change of the gap.
 
     Raises:
         InvalidInput: constraints of another form, or an error as great as a bound on a gap.
     """
     y = np.zeros(game.actions) if game.box is None else 0.5 * (game.box[0] + game.box[1])
-    if game.gap_bounds is not None:
-        t = np.zeros(game.constraints_count)
-        for k, bound in enumerate(game.gap_bounds):
-            weights = np.zeros(game.constraints_count)
-            weights[k] = 0.5
-            form = np.abs(game.weighted_constraint_hessian(y, weights))
-            change = float(np.sqrt(error @ form @ error))
-            if change >= bound:
-                raise InvalidInput(
-                    "error",
-                    f"{change:.4g} of '{game.constraint_names[k]}'",
-                    f"disturbances could use up all of the bound, {bound:g}; a shorter control"
-                    " period or smaller disturbances leave room",
-                )
-            t[k] = 2.0 * bound * change - change**2
-        return t
-    if not is_affine(game, y):
+    bent = game.gap_bounds is not None or (
+        game.constraint_class == "quadratic" and game.has_constraint_hessian
+    )
+    if not bent and not is_affine(game, y):
+        raise _other_form(game)
+    slopes = game.constraint_jacobian(y)
+    t = np.abs(slopes) @ error
+    for k in range(game.constraints_count if bent else 0):
+        start, actions = game.actions_in_constraints
+        own = actions[start[k] : start[k + 1]]
+        form = 0.5 * game.constraint_hessian(k, y)
+        if np.any(form):
+            change = float(np.sqrt(error[own] @ np.abs(form) @ error[own]))
+            t[k] = _room(game, k, change, _gap_bound(game, k, y, slopes[k, own], form))
+    return t
+
+
+def _room(game: Game, constraint: int, change: float, bound: float) -> float:
+    """By how much delta^2 must be less for a gap that changes by ``change``."""
+    if change >= bound:
         raise InvalidInput(
-            "game", game.name, "margins are computed for affine constraints and bounds on gaps"
+            "error",
+            f"{change:.4g} of '{game.constraint_names[constraint]}'",
+            f"disturbances could use up all of the bound, {bound:g}; a shorter control"
+            " period or smaller disturbances leave room",
         )
-    return np.abs(game.constraint_jacobian(y)) @ error
+    return 2.0 * bound * change - change**2
+
+
+def _gap_bound(game: Game, constraint: int, y: Array, slope: Array, form: Array) -> float:
+    """delta of a quadratic constraint: where the gap vanishes g is least, and -delta^2.
+
+    Args:
+        game: whose.
+        constraint: its number.
+        y: (m,) where slope and form, half of the second derivatives, were taken.
+        slope, form: in the actions of the constraint's own agents.
+    """
+    if game.gap_bounds is not None:
+        return float(game.gap_bounds[constraint])
+    away = -0.5 * np.linalg.pinv(form, hermitian=True) @ slope
+    least = game.constraints(y)[constraint] + 0.5 * slope @ away
+    slanted = np.max(np.abs(slope + 2.0 * form @ away)) > 1e-9 * np.max(np.abs(slope), initial=1.0)
+    if slanted or not least < 0.0:  # it goes on for ever somewhere, or is never kept
+        raise _other_form(game)
+    return float(np.sqrt(-least))
+
+
+def _other_form(game: Game) -> InvalidInput:
+    return InvalidInput(
+        "game", game.name, "margins are computed for affine constraints and bounds on gaps"
+    )
 
 
 def is_affine(game: Game, y: Array) -> bool:

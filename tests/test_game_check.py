@@ -13,6 +13,7 @@ from commands import gne_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from own_games import boxed, coupled
+from position_games import random_formation, random_platoon
 
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput, UserCodeError
@@ -241,6 +242,7 @@ def test_the_packages_games_agree_with_themselves(seed):
         (cournot_game(n, rng.uniform(0, 5, n).tolist(), 7.0, lower, lower + 3.0), lower + 1.0),
         (osnr_game(**p), rng.uniform(0.01, 0.2, 10)),
         (draw.game, draw.interior()),
+        *((each.game, each.interior()) for each in (random_platoon(seed), random_formation(seed))),
     ]  # fmt: skip
     for game, start in games:
         assert game.tested

@@ -16,7 +16,9 @@ from builders import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from position_games import random_formation
 
+import gne_mj as gm
 from gne_mj.controllers import FullInformation
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium
@@ -24,7 +26,10 @@ from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.faults import Noise, Push, SensorDelay
 from gne_mj.games import (
     cournot_game,
+    formation_game,
     osnr_game,
+    platoon_game,
+    region_of,
     ten_channels,
     velocity_consensus_game,
     velocity_game,
@@ -150,7 +155,8 @@ def test_constraints_that_only_look_affine_in_one_point_are_refused():
     from types import SimpleNamespace
 
     game = SimpleNamespace(
-        name="cubic", actions=1, box=None, gap_bounds=None, constraints_count=1,
+        name="cubic", actions=1, box=None, gap_bounds=None, constraint_class=None,
+        constraints_count=1,
         weighted_constraint_hessian=lambda y, w: np.array([[6.0 * y[0] * w[0]]]),
         constraint_jacobian=lambda y: np.array([[3.0 * y[0] ** 2]]),
     )  # fmt: skip
@@ -163,6 +169,9 @@ GAMES = {
     "plane": lambda: velocity_consensus_game([(0, 1)], [1.0, 0.0], [1.0, 0.0], 1.5, 2.0),
     "OSNR": lambda: osnr_game(**ten_channels()),
     "Cournot": lambda: cournot_game(3),
+    "platoon": lambda: platoon_game(4),
+    # sides are affine, links and discs bounds on gaps
+    "formation": lambda: random_formation(8, count=3).game,
 }
 
 
@@ -189,6 +198,36 @@ def test_inside_the_tightened_set_no_such_error_leads_out(name):
             assert worst <= 1e-9
             closest = min(closest, -worst / np.max(t))
     assert closest < 0.35, "and no more is given away than needed"
+
+
+def test_a_quadratic_constraint_is_a_bound_on_a_gap_that_is_found():
+    """The same set as bounds on gaps that are declared, beside sides that are affine."""
+    numbers = {
+        "desired_place": np.zeros((3, 2)), "edges": [(0, 1), (2, 1)], "place_weight": [1, 0, 0],
+        "link_length": [1.5, 2.5],
+    }  # fmt: skip
+    disc = {"center": [0.3, -0.2], "radius": 4.0}
+    error = np.random.default_rng(0).uniform(0.0, 0.3, 6)
+    declared = tightening(formation_game(region=region_of(**disc), **numbers), error)
+    mixed = formation_game(region=region_of(box=[[-9, -9], [9, 9]], **disc), **numbers)
+    assert mixed.gap_bounds is None
+    found = tightening(mixed, error)
+    curved = [0, 1, 6, 11, 16]
+    np.testing.assert_allclose(found[curved], declared, rtol=1e-12)
+    np.testing.assert_allclose(found[[2, 3, 4, 5]], error[[1, 0, 1, 0]], rtol=1e-12)
+
+
+def test_a_parabola_has_no_margin():
+    """y_1^2 <= y_2 is convex and quadratic, and no bound on a gap: it goes on for ever."""
+
+    def constraints(y, p):
+        yield "parabola", y[0] ** 2 - y[1] <= 0.0
+        yield "top", y[1] <= p.top
+
+    game = gm.game(2, lambda i, y, p: y[i] ** 2, constraints, top=4.0)
+    assert game.constraint_class == "quadratic"
+    with pytest.raises(InvalidInput, match="affine constraints and bounds on gaps"):
+        tightening(game, np.array([0.1, 0.1]))
 
 
 def test_an_error_beyond_a_bound_is_refused():

@@ -23,7 +23,10 @@ from gne_mj.errors import InfeasibleStart, InvalidInput, Refusal, named, part_of
 from gne_mj.exit_map import Grid
 from gne_mj.games import (
     cournot_game,
+    formation_game,
     osnr_game,
+    platoon_game,
+    region_of,
     ten_channels,
     velocity_consensus_game,
     velocity_game,
@@ -41,6 +44,7 @@ from gne_mj.system import Clock, System
 from gne_mj.user_files import load_game, load_law
 
 STATE, GAME = robot_state(FIVE), velocity_game(5, 3.0, 3.0)
+DISC = region_of(radius=1.0)
 NETWORK = PartialInformation(graph.ring(5))
 
 
@@ -73,6 +77,10 @@ CALLS = [
     (velocity_consensus_game, ([(0, 2)], [1.0, 0.0], [0.0], 1.0, 1.0), {}, "edges"),
     (velocity_consensus_game, ([(0, 1)], [0.0, 0.0], [0.0], 1.0, 1.0), {}, "leader_weight"),
     (velocity_consensus_game, ([(0, 1)], [1.0, 0.0], [0.0], 1.0, 0.0), {}, "leader_gap_bound"),
+    (platoon_game, (2,), {"leader_range": (1.0, 0.0)}, "leader_range"),
+    (platoon_game, (3,), {"spacing_weight": [1.0, 9.0]}, "spacing_weight"),
+    (region_of, (), {"vertices": [[0.0, 0.0]]}, "vertices"),
+    (formation_game, (np.zeros((1, 2)), [], 1.0, DISC), {"links": [(0, 1)]}, "links"),
     (partial(replace, GAME, box=None), (), {"sizes": (0,) * 5}, "sizes"),
     (partial(replace, GAME), (), {"in_cost": [[7]] * 5}, "in_cost"),
     (partial(replace, GAME), (), {"box": (1.0, 2.0)}, "box"),

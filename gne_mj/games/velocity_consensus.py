@@ -19,13 +19,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
-from gne_mj import graph as graphs
 from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Box, Game
+from gne_mj.games import edges as graph
 from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
@@ -57,15 +56,12 @@ def velocity_consensus_game(
     reference = _finite("reference_velocity", reference_velocity)
     weight = _weights(leader_weight)
     agents, dimension = len(weight), len(reference)
-    pairs = _checked(edges, agents)
-    leaders = _leaders(pairs, weight)
-    of_edges = _bounds("gap_bound", gap_bound, len(pairs), "edge")
-    of_leaders = _bounds("leader_gap_bound", leader_gap_bound, len(leaders), "leader")
-    rows, bounds = (
-        [*pairs, *((int(i), agents) for i in leaders)],
-        np.concatenate([of_edges, of_leaders]),
-    )
-    neighbours, (first, second) = _neighbours(pairs, agents), np.array(rows).T
+    pairs = graph.checked("edges", edges, agents)
+    leaders = graph.leaders("leader_weight", pairs, weight)
+    of_edges = graph.numbers("gap_bound", gap_bound, len(pairs), "edge", "positive")
+    own = graph.numbers("leader_gap_bound", leader_gap_bound, len(leaders), "leader", "positive")
+    rows, bounds = [*pairs, *((int(i), agents) for i in leaders)], np.concatenate([of_edges, own])
+    neighbours, (first, second) = graph.neighbours(pairs, agents), np.array(rows).T
     gaps = Quantity(
         name="gap", long_name="velocity gap", unit="m/s",
         values=partial(_distances, first, second, reference), each="constraint",
@@ -103,15 +99,6 @@ def _lists(rows: Sequence[Sequence[int]]) -> list[NDArray[np.int64]]:
     return [np.cumsum([0, *map(len, rows)]), np.array(whole, dtype=np.int64)]
 
 
-def _neighbours(pairs: Sequence[tuple[int, int]], agents: int) -> list[list[int]]:
-    """Of each agent those that it has an edge with."""
-    neighbours: list[list[int]] = [[] for _ in range(agents)]
-    for i, j in pairs:
-        neighbours[i].append(j)
-        neighbours[j].append(i)
-    return neighbours
-
-
 def _constraint_names(rows: Sequence[tuple[int, int]], agents: int) -> tuple[str, ...]:
     return tuple(
         f"gap of agent {i + 1} to v_0" if j == agents else f"gap of agents {i + 1} and {j + 1}"
@@ -143,60 +130,11 @@ def _finite(key: str, given: Sequence[float]) -> NDArray[np.float64]:
     return values
 
 
-def _bounds(key: str, given: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
-    bounds = np.asarray(given, dtype=np.float64)
-    if bounds.shape not in ((), (count,)):
-        raise InvalidInput(
-            key, given, f"it must be one number or a list of {count}, one for each {what}"
-        )
-    if not np.all(bounds > 0) or not np.all(np.isfinite(bounds)):
-        raise InvalidInput(key, given, "every bound must be positive and finite")
-    return np.broadcast_to(bounds, (count,))
-
-
-def _checked(edges: Sequence[tuple[int, int]], agents: int) -> list[tuple[int, int]]:
-    seen = set()
-    for i, j in edges:
-        shown = [i + 1, j + 1]
-        if not (0 <= i < agents and 0 <= j < agents):
-            raise InvalidInput("edges", shown, f"agents are numbered 1 to {agents}")
-        if i == j:
-            raise InvalidInput("edges", shown, "an edge joins two agents")
-        if frozenset((i, j)) in seen:
-            raise InvalidInput("edges", shown, "each pair may be listed once only")
-        seen.add(frozenset((i, j)))
-    return [(int(i), int(j)) for i, j in edges]
-
-
-def _symmetric(first: ArrayLike, second: ArrayLike, values: ArrayLike, vertices: int) -> csr_array:
-    pairs = (np.asarray(first, dtype=np.int64), np.asarray(second, dtype=np.int64))
-    return csr_array((np.asarray(values), pairs), shape=(vertices, vertices))
-
-
 def _weights(leader_weight: Sequence[float]) -> NDArray[np.float64]:
     weight = _finite("leader_weight", leader_weight)
     if np.any(weight < 0):
         raise InvalidInput("leader_weight", leader_weight, "no entry may be negative")
     return weight
-
-
-def _leaders(pairs: list[tuple[int, int]], weight: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Agents of positive weight, of which each connected part must have one."""
-    graph = _symmetric(
-        [i for i, _ in pairs], [j for _, j in pairs], np.ones(len(pairs)), len(weight)
-    )
-    _, part = connected_components(graph, directed=False)
-    led = np.isin(part, part[weight > 0])
-    if not np.all(led):
-        apart = [int(i) + 1 for i in np.flatnonzero(part == part[np.argmin(led)])]
-        shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
-        raise InvalidInput(
-            "leader_weight",
-            weight.tolist(),
-            "each connected part of the edges needs a leader, an agent of positive weight, and"
-            f" that of agent{'s' * (len(apart) > 1)} {shown} has none",
-        )
-    return np.flatnonzero(weight > 0)
 
 
 def _box(
@@ -207,7 +145,7 @@ def _box(
     agents: int,
 ) -> Box:
     """No agent is farther from v_0 than the shortest way there over edges of length delta."""
-    lengths = _symmetric(first, second, bounds, agents + 1)
+    lengths = graph.symmetric(first, second, bounds, agents + 1)
     reach = dijkstra(lengths, directed=False, indices=agents)[:agents, None]
     return (reference - reach).ravel(), (reference + reach).ravel()
 
@@ -311,10 +249,11 @@ class VelocityConsensusTable(GameTable):
 
     type: Literal["velocity-consensus"]
     reference_velocity: list[float] = Field([1.0, 1.0], description="v_0 in m/s")
-    edges: Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]] = (
-        Field("ring", description="a name, or pairs of agents numbered from 1; of the game, not"
-              " of who hears whom")
-    )  # fmt: skip
+    edges: graph.Edges = Field(
+        "ring",
+        description="a name, or pairs of agents numbered from 1; of the game, not of who hears"
+        " whom",
+    )
     leader_weight: PerAgent | None = Field(
         None, description="w_i, positive for leaders and 0 for others; if left out agent 1 leads"
     )
@@ -333,17 +272,12 @@ class VelocityConsensusTable(GameTable):
         if given is None:
             weight[0] = 1.0
         return velocity_consensus_game(
-            self._edges(count),
+            graph.pairs_of(self.edges, count),
             weight.tolist(),
             self.reference_velocity,
             self.gap_bound,
             self.leader_gap_bound,
         )
-
-    def _edges(self, count: int) -> list[tuple[int, int]]:
-        if not isinstance(self.edges, str):
-            return [(i - 1, j - 1) for i, j in self.edges]
-        return list(graphs.NAMED[self.edges](count).edges)
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """Everyone half a leader's bound below the reference, along the first axis."""

@@ -211,6 +211,7 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
     """Directions that raise one constraint, each with several courses in time, of size 1."""
     game = system.game
     period = clock.control_period
+    gaps = game.gap_bounds is not None or game.constraint_class == "quadratic"
     slopes = game.constraint_jacobian(system.start)
     around = game.constraint_jacobian(0.5 * (system.start + system.centre))
     courses: list[tuple[str, dict[str, Any]]] = [("steadily", {})]
@@ -224,7 +225,7 @@ def _patterns(system: System, clock: Clock) -> Iterator[tuple[str, tuple[Push, .
         direction = np.sign(np.where(slopes[k] != 0, slopes[k], around[k]))
         if not np.any(direction):
             continue
-        for sign in (1.0, -1.0) if game.gap_bounds is not None else (1.0,):
+        for sign in (1.0, -1.0) if gaps else (1.0,):
             for course, options in courses:
                 pushes = steady_push(game, sign * direction, **options)
                 yield f"'{name}', {'+' if sign > 0 else '-'}, {course}", pushes

@@ -205,8 +205,8 @@ class ZeroOrderHold:
         why = "the barrier is tightened by what they can do within a control period"
         if system.game.tested:
             return Assumption(label, MET, why)
-        kind = "affine" if system.game.gap_bounds is None else "bounds on gaps"
-        return Assumption(label, ASSUMED, f"{why}, the constraints being {kind}")
+        kinds = "the constraints being affine or bounds on gaps"
+        return Assumption(label, ASSUMED, f"{why}, {kinds}")
 
 
 def _harmless(delay: int) -> str:

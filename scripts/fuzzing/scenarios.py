@@ -38,6 +38,8 @@ OTHERS = (
 TABLES = (
     "{ type = 'velocity-synchronization' }", "{ type = 'velocity-consensus' }",
     "{ type = 'cournot' }", "{ type = 'osnr' }", "{ type = 'integrator', count = 4 }",
+    "{ type = 'platoon' }", "{ type = 'formation' }", "{ radius = 1e300 }",
+    "{ vertices = [[0, 0], [1, 0], [0, 1e-300]] }", "{ box = [[-1, -1], [1, 1]], radius = 1 }",
     "{ type = 'custom', file = 'nothing.py' }", "{ type = 'flexible-robot', count = 3 }",
     "{ type = 'planar-flexible-robot', count = 2 }", "{ type = 'pi-cascade', count = 10 }",
     "{ type = 'mixed', groups = [] }", "{ type = 'mixed', groups = [{ type = 'mixed' }] }",
