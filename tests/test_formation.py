@@ -209,6 +209,8 @@ def test_the_order_of_vertices_is_no_matter():
         ({"vertices": [[np.cos(t), np.sin(t)] for t in 0.8 * np.pi * np.arange(5)]}, "vertices",
          "in order round it"),
         ({"radius": 0.0}, "radius", "positive and finite"),
+        ({"radius": 1e-300}, "radius", "from 1e-100"),
+        ({"box": [[-1e154, -1e154], [1e154, 1e154]]}, "box", "at most 1e\\+100"),
         ({"center": [0.0, 0.0]}, "radius", "a disc has"),
         ({"center": [0.0], "radius": 1.0}, "center", "two finite numbers"),
         ({"vertices": SQUARE, "center": [3.0, 3.0], "radius": 1.0}, "region", "well inside"),
@@ -260,6 +262,7 @@ def test_few_digits_are_lost_close_to_a_link_of_any_direction():
     [
         {},
         {"link_length": 0.1, "edges": "line"},
+        {"link_length": [], "links": []},
         {"region": {"center": [9.0, 0.0], "radius": 0.5}, "links": "complete"},
         {"region": {"vertices": [[0, 0], [4, 0], [0, 3]], "radius": 2.0}, "links": []},
     ],

@@ -351,7 +351,7 @@ class FormationTable(GameTable):
     def default_start(self, count: int) -> Array:
         """On a circle about the region's middle, half way to its boundary or less for the links."""
         region = self.region.build()
-        radius = min(0.5 * region.depth, 0.25 * float(np.min(self.link_length)))
+        radius = min(0.5 * region.depth, 0.25 * np.min(self.link_length, initial=np.inf))
         return (region.middle + radius * _directions(count)).ravel()
 
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _SIDES = 64  # of a polygon within the disc, which stands for it where a point inside is looked for
 _THINNEST = 1e-6  # of a region, as a share of its length
+_FARTHEST = 1e100  # m, so that squares are numbers
 _STEPS = 100  # towards the least barrier; some 10 are taken
 
 
@@ -76,10 +77,9 @@ class Region:
     @cached_property
     def _middle(self) -> tuple[Array, float]:
         lower, upper = self.box
-        with np.errstate(over="ignore"):
-            size = float(np.max(upper - lower))
-        if not np.all(lower < upper) or not np.isfinite(size):
+        if not np.all(lower < upper):
             return np.zeros(2), 0.0
+        size = float(np.max(upper - lower))
         about = lower + 0.5 * (upper - lower)  # so that lengths are of the order of 1
         offsets = (self.offsets - self.normals @ about) / size
         center, radius = (self.center - about) / size, self.radius / size
@@ -147,8 +147,9 @@ def region_of(
     boxes = [(np.min(each, axis=0), np.max(each, axis=0)) for each in corners]
     middle = np.zeros(2) if center is None else _points("center", [center])[0]
     if radius is not None:
-        if not (np.isfinite(radius) and radius > 0.0):
-            raise InvalidInput("radius", radius, "it must be positive and finite")
+        if not 1.0 / _FARTHEST <= radius <= _FARTHEST:
+            expected = f"it must be positive and finite, from {1.0 / _FARTHEST:g} to {_FARTHEST:g}"
+            raise InvalidInput("radius", radius, expected)
         boxes.append((middle - radius, middle + radius))
     elif center is not None:
         raise InvalidInput("radius", None, "a disc has a center and a radius")
@@ -158,7 +159,7 @@ def region_of(
     for points in corners:
         along = np.roll(points, -1, axis=0) - points
         outward = np.column_stack([along[:, 1], -along[:, 0]])
-        normals.append(outward / np.linalg.norm(outward, axis=1)[:, None])
+        normals.append(outward / np.hypot(*outward.T)[:, None])
         offsets.append(np.sum(normals[-1] * points, axis=1))
     lower, upper = (np.array([each[k] for each in boxes]) for k in (0, 1))
     return Region(
@@ -175,8 +176,9 @@ def _points(key: str, given: Any) -> Array:
         points = np.asarray(given, dtype=np.float64)
     except ValueError:  # lists of unequal lengths
         points = np.zeros(0)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidInput(key, given, "every point must be [x, y], two finite numbers")
+    if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.abs(points) <= _FARTHEST):
+        expected = f"every point must be [x, y], two finite numbers of at most {_FARTHEST:g}"
+        raise InvalidInput(key, given, expected)
     return points
 
 
