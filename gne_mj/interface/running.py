@@ -110,9 +110,9 @@ class Run(Trajectory):
     """
 
     def __init__(
-        self, tree: "xarray.DataTree", scenario: Scenario, systems: Mapping[str, System]
+        self, trajectory: Trajectory, scenario: Scenario, systems: Mapping[str, System]
     ) -> None:
-        super().__init__(tree)
+        super().__init__(trajectory._given)
         self.scenario, self.systems = scenario, dict(systems)
 
     @property
@@ -195,5 +195,5 @@ def run(
 def run_scenario(scenario: Scenario, progress: Callable[[float], None] | None = None) -> Run:
     """Run it to its end."""
     simulation: Simulation = scenario.simulation_object()
-    tree = simulation.run(progress).tree
-    return Run(tree, scenario, {each.name: each for each in simulation.systems})
+    trajectory = simulation.run(progress)
+    return Run(trajectory, scenario, {each.name: each for each in simulation.systems})
