@@ -111,9 +111,9 @@ class Run(Trajectory):
     """
 
     def __init__(
-        self, tree: "xarray.DataTree", scenario: Scenario, systems: Mapping[str, System]
+        self, trajectory: Trajectory, scenario: Scenario, systems: Mapping[str, System]
     ) -> None:
-        super().__init__(tree)
+        super().__init__(trajectory._given)
         self.scenario, self.systems = scenario, dict(systems)
 
     @property
@@ -199,5 +199,5 @@ def run_scenario(scenario: Scenario, progress: Callable[[float], None] | bool = 
     with if_asked(progress) as tell:
         simulation: Simulation = scenario.simulation_object()
         shown = progress if callable(progress) else of_time(tell, simulation.clock.duration)
-        tree = simulation.run(shown).tree
-    return Run(tree, scenario, {each.name: each for each in simulation.systems})
+        trajectory = simulation.run(shown)
+    return Run(trajectory, scenario, {each.name: each for each in simulation.systems})
