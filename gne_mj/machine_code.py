@@ -25,7 +25,7 @@ def kept(compile: Callable[[bool], Any]) -> Any:
     Args:
         compile: a decorator of numba's, told whether to keep machine code.
     """
-    with _older_versions_ignored():
+    with older_versions_ignored():
         try:
             return compile(True)
         except RuntimeError as error:
@@ -46,7 +46,7 @@ class _Index(IndexDataCacheFile):
 
 
 @contextmanager
-def _older_versions_ignored() -> Iterator[None]:
+def older_versions_ignored() -> Iterator[None]:
     """Numba reads an index before it asks whether the source is newer."""
     caching.IndexDataCacheFile = _Index
     try:
