@@ -35,7 +35,18 @@ def kept(compile: Callable[[bool], Any]) -> Any:
 
 
 class _Index(IndexDataCacheFile):
-    """Which machine code is kept for a function: none where it is of modules that are gone."""
+    """Which code is kept for a function: none where it is of modules that are gone.
+
+    Two processes that keep something of one function at a time give it the same file name, and
+    only one of them is in the index after; so each file says what it is of.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (key, data))
+
+    def load(self, key: Any) -> Any:
+        found = super().load(key)
+        return found[1] if found is not None and found[0] == key else None
 
     def _load_index(self) -> dict[Any, str]:
         try:
