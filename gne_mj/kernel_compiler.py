@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba import _dynfunc, types
-from numba.core.codegen import JITCodeLibrary
+from numba import types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import register_pass
 from numba.core.datamodel.models import TupleModel, UniTupleModel
 from numba.core.typed_passes import NativeLowering
 from numba.extending import register_model
+
+from gne_mj.kernel_cache import KernelLibrary, cache_for, entry_of
 
 
 @contextmanager
@@ -82,6 +83,17 @@ class LoopCompiler(CompilerBase):
 class KernelCompiler(LoopCompiler):
     """Compiles kernels, of which nothing but their part of a loop is ever run."""
 
+    def compile_extra(self, function: Any) -> Any:
+        """As numba's compilers have it."""
+        arguments = tuple(self.state.args)
+        kept = cache_for(function, arguments)
+        found = kept.load_overload(arguments, self.state.targetctx) if kept else None
+        if found is None:
+            found = super().compile_extra(function)
+            if kept:
+                kept.save_overload(arguments, found)
+        return found
+
     def define_pipelines(self) -> list[Any]:
         """As numba's compilers have it."""
         (passes,) = super().define_pipelines()
@@ -101,27 +113,13 @@ class _KernelLowering(NativeLowering):
     def run_pass(self, state: Any) -> bool:
         """As numba's passes have it."""
         context, name = state.targetctx, state.func_id.func_qualname
-        state.library = _KernelLibrary(context.codegen(), name)
+        state.library = KernelLibrary(context.codegen(), name)
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]
-        # callers know it by a function object of its own, that cannot be called
-        entry = _dynfunc.make_function(
-            lowered.fndesc.lookup_module(), name, "", 0, lowered.env, (state.library,)
-        )
-        context.insert_user_function(entry, lowered.fndesc, [state.library])
+        entry = entry_of(context, state.library, lowered.fndesc, lowered.env)
         state["cr"] = lowered._replace(cfunc=entry)
         return True
-
-
-class _KernelLibrary(JITCodeLibrary):
-    """Code that is optimised where it is inlined, and of which there is no machine code."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
 
 
 def _handed_over_whole(plain: Any) -> Any:

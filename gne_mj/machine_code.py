@@ -26,7 +26,7 @@ def kept(compile: Callable[[bool], Any]) -> Any:
     Args:
         compile: a decorator of numba's, told whether to keep machine code.
     """
-    with _older_versions_ignored():
+    with older_versions_ignored():
         try:
             return compile(True)
         except RuntimeError as error:
@@ -36,7 +36,18 @@ def kept(compile: Callable[[bool], Any]) -> Any:
 
 
 class _Index(IndexDataCacheFile):
-    """Which machine code is kept for a function: none where it is of modules that are gone."""
+    """Which code is kept for a function: none where it is of modules that are gone.
+
+    Two processes that keep something of one function at a time give it the same file name, and
+    only one of them is in the index after; so each file says what it is of.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (key, data))
+
+    def load(self, key: Any) -> Any:
+        found = super().load(key)
+        return found[1] if found is not None and found[0] == key else None
 
     def _load_index(self) -> dict[Any, str]:
         try:
@@ -62,7 +73,7 @@ def _make_caches(kind: type) -> None:
 
 
 @contextmanager
-def _older_versions_ignored() -> Iterator[None]:
+def older_versions_ignored() -> Iterator[None]:
     """Numba reads an index before it asks whether the source is newer; loads as caches here do."""
     caching.IndexDataCacheFile = _Index
     _make_caches(_Cache)

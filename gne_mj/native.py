@@ -16,8 +16,6 @@ import hashlib
 import inspect
 import math
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -28,6 +26,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 from numba.np.arrayobj import make_array, populate_array
 
+from gne_mj.kernel_cache import package_digest
 from gne_mj.kernel_compiler import KernelCompiler, LoopCompiler
 from gne_mj.machine_code import kept
 
@@ -103,22 +102,9 @@ def intrinsic_or(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], An
     return (lambda written: plain) if INTERPRETED else intrinsic
 
 
-@cache
-def _package_digest() -> str:
-    """Digest of all files that can hold kernels, loops or constants that are baked into them."""
-    digest = hashlib.sha256()
-    root = Path(__file__).parent
-    native = [path for path in root.glob("*.py") if b"gne_mj.native" in path.read_bytes()]
-    for folder in ("controllers", "games", "plants", "loops"):
-        native.extend((root / folder).glob("*.py"))
-    for path in sorted([*native, Path(__file__), root / "kernel_compiler.py"]):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def source_key(*modules: ModuleType) -> str:
     """Digest of this package's sources and of ``modules``' own, for a compiled closure to hold."""
-    digest = hashlib.sha256(_package_digest().encode())
+    digest = hashlib.sha256(package_digest().encode())
     for module in modules:
         digest.update(inspect.getsource(module).encode())
     return digest.hexdigest()[:16]

@@ -84,6 +84,22 @@ def test_a_folder_that_is_named_is_used_without_a_word(locked, tmp_path):
     assert list(tmp_path.rglob("settings.twice-*.nbi"))
 
 
+def test_code_that_another_process_has_put_in_its_place_is_not_taken(tmp_path):
+    """Both find no index, both call their file number 1: numba would run the other's code."""
+    cache = machine_code._Index(str(tmp_path), "function", "stamp")
+    index = tmp_path / "function.nbi"
+    cache.save("mine", "my code")
+    assert cache.load("mine") == "my code"
+    kept = index.read_bytes()
+    index.unlink()
+    cache.save("other's", "other code")
+    index.write_bytes(kept)
+    assert [path.name for path in tmp_path.glob("*.nbc")] == ["function.1.nbc"]
+    assert cache.load("mine") is None
+    cache.save("mine", "my code")
+    assert cache.load("mine") == "my code"
+
+
 def test_commands_work_without_any_folder(locked):
     """Not even a temporary one; `scenarios` ended in a traceback."""
     everywhere = f"import tempfile; tempfile.gettempdir = lambda: '/dev/null'; {SCENARIOS}"

@@ -6,7 +6,7 @@ column j, which is symmetric and positive definite. With L_j Q = Q diag(lambda) 
 w = Q'(estimates) obey epsilon w' = lambda (Q'1 y_r - w), each by itself.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,11 @@ from gne_mj.native import kernel
 class Modes(NamedTuple):
     """Eigenbases of all columns, read-only; modes are kept flat, as (N - 1, m)."""
 
-    owner: np.ndarray  # (m,) the agent that each column belongs to
-    rates: np.ndarray  # (N - 1, m) eigenvalues lambda of the owner's L_j
-    rest: np.ndarray  # (N - 1, m) Q'1, the modes at rest for an action of 1
-    vectors: np.ndarray  # (N - 1, N, m) Q, by mode, agent and column; zero for the owner itself
+    owner: Annotated[np.ndarray, "m", int]  # the agent that each column belongs to
+    rates: Annotated[np.ndarray, "N - 1, m"]  # eigenvalues lambda of the owner's L_j
+    rest: Annotated[np.ndarray, "N - 1, m"]  # Q'1, the modes at rest for an action of 1
+    # Q, by mode, agent and column; zero for the owner itself
+    vectors: Annotated[np.ndarray, "N - 1, N, m"]
 
 
 def modes_of(graph: Graph, owner: NDArray[np.int64]) -> Modes:

@@ -12,7 +12,7 @@ the last row of STAGE gives the new state. Its difference from the embedded solu
 the last k. The method is L-stable: what decays at once is gone after a step, however long.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,16 +110,15 @@ _DENSE: tuple[tuple[float, ...], ...] = (
 class Method(NamedTuple):
     """The coefficients as arrays, and what accuracy is asked for."""
 
-    stage: np.ndarray  # (STAGES + 1, STAGES)
-    rate: np.ndarray  # (STAGES, STAGES)
-    dense: np.ndarray  # (3, STAGES)
-    rtol: float
-    atol: float
+    stage: Annotated[np.ndarray, "stages + 1, stages"]
+    rate: Annotated[np.ndarray, "stages, stages"]
+    dense: Annotated[np.ndarray, "3, stages"]
+    tolerance: Annotated[np.ndarray, "2"]  # relative, absolute
 
 
 def method(rtol: float, atol: float) -> Method:
     """The method for native code, with these tolerances."""
-    return Method(_table(_STAGE), _table(_RATE), _table(_DENSE), rtol, atol)
+    return Method(_table(_STAGE), _table(_RATE), _table(_DENSE), np.array([rtol, atol]))
 
 
 def _table(rows: tuple[tuple[float, ...], ...]) -> NDArray[np.float64]:

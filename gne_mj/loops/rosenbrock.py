@@ -14,6 +14,7 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from gne_mj.controllers.settings import EPSILON
@@ -29,6 +30,7 @@ from gne_mj.loops.layout import (
     clock_in,
     ode_parameter_block,
     problem_in,
+    steps_in,
 )
 from gne_mj.loops.linear import add_multiple
 from gne_mj.loops.ode import measure
@@ -41,11 +43,21 @@ from gne_mj.loops.stage_system import (
     solve_stage,
     stage_system,
 )
-from gne_mj.native import compiled, copy, kernel, source_key
-from gne_mj.numbers import Numbers
+from gne_mj.native import (
+    address_in,
+    call_integer,
+    call_number,
+    callback,
+    compiled,
+    copy,
+    kernel,
+    source_key,
+)
+from gne_mj.numbers import Numbers, names_of, numbers_in
+from gne_mj.parameter_block import ParameterBlock, floats_at
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.agents import Agents, input_columns
-from gne_mj.records import by_name, dtype_of, in_array
+from gne_mj.records import arrays, by_name, dtype_of, in_array, in_parameter_block
 
 # How the step is chosen: Gustafsson's predictive controller with the figures of Hairer's RODAS.
 SAFETY, GROW, SHRINK = 0.9, 6.0, 0.2
@@ -54,6 +66,7 @@ POWER = 1.0 / ORDER
 # looked whether the boundary is why, relative to the time from 1 s on
 SMALLEST, EARLY = 1e-12, 1e-6
 AHEAD = 1e-6
+_whole, _real = types.int64, types.float64
 
 
 class Steps(Numbers):
@@ -69,16 +82,24 @@ class Steps(Numbers):
 
 
 class RosenbrockState(NamedTuple):
-    """Arrays that a step works on; n is the length of states and memory, w that of the modes."""
+    """Arrays that a step works on, as a parameter block of their own; n entries each."""
 
-    trial: np.ndarray  # (n + w,) the flat vector at a stage
-    k: np.ndarray  # (STAGES, n + w)
-    dense: np.ndarray  # (5, n) what the dense output of the last accepted step needs
-    greatest: np.ndarray  # (states,) each state's greatest magnitude so far
-    u: np.ndarray  # (m,) input at a stage
+    functions: Annotated[np.ndarray, "n", int]  # addresses, in the order below
+    state: Annotated[np.ndarray, "n"]  # the flat vector
+    trial: Annotated[np.ndarray, "n"]  # at a stage
+    k: Annotated[np.ndarray, "stages, n // stages"]
+    # states and memory: what the dense output of the last accepted step needs
+    dense: Annotated[np.ndarray, "5, n // 5"]
+    greatest: Annotated[np.ndarray, "n"]  # each state's greatest magnitude so far
+    u: Annotated[np.ndarray, "n"]  # input at a stage
     system: StageSystem
     modes: Modes  # read-only
     method: Method  # read-only
+
+
+ACT, OBSERVE, SOLVE_STAGE, TRY_STEP = range(4)
+_solver_in = in_parameter_block(RosenbrockState, stages=STAGES)
+_exit_in, _EXIT_LENGTH = numbers_in(watch.MonitorNumbers), len(names_of(watch.MonitorNumbers))
 
 
 class Rows(NamedTuple):
@@ -102,6 +123,14 @@ _SCRATCH = SCRATCH | {"history": 0, "solver": 0}
 _length, _workspace_in = in_array(Workspace, "m p agents", **_SCRATCH)
 
 
+class Place(NamedTuple):
+    """Addresses of where a run's numbers lie."""
+
+    parameter_block: int
+    workspace: int
+    solver: int
+
+
 class Run(NamedTuple):
     """What kernels of a run change."""
 
@@ -112,34 +141,49 @@ class Run(NamedTuple):
     u: np.ndarray
     work: StepScratch
     solver: RosenbrockState
+    place: Place
 
 
 @kernel
-def run_in(parameter_block, flat, solver):
-    """What does not change in a run, and what does, from its parameter block and workspace."""
+def run_in(parameter_block, workspace, solver):
+    """What does not change in a run, and what does, from the addresses of where it lies."""
+    steps = steps_in(parameter_block)
+    arrays = _solver_in(solver, steps.agents, steps.actions, steps.states)
     fixed = Fixed(
-        problem_in(parameter_block), channels_in(parameter_block), solver.modes, solver.method
+        problem_in(parameter_block), channels_in(parameter_block), arrays.modes, arrays.method
     )
-    data = fixed.problem.data
-    m, p, agents = len(data.owner), len(data.member_pointer) - 1, len(data.offsets) - 1
-    workspace = _workspace_in(flat, 0, m, p, agents)
-    watched, figures = workspace.monitor.numbers, workspace.monitor
+    sizes = steps.actions, steps.constraints, steps.agents
+    found = _workspace_in(floats_at(workspace, _length(*sizes)), 0, *sizes)
     return fixed, Run(
-        workspace.progress, watched, figures, workspace.exit, workspace.u, workspace.work, solver
-    )
+        found.progress, found.monitor.numbers, found.monitor, found.exit, found.u, found.work,
+        arrays, Place(parameter_block, workspace, solver),
+    )  # fmt: skip
 
 
 @kernel
-def control_step(fixed, run, time, state, latch, u):
-    """Measure, act and observe; fill u. False, with the exit in ``latch``, if there is no input."""
-    channels, work = fixed.channels, run.work
-    measure(channels, state, work.y)
-    memory = state[channels.equilibrium_state.size :]
-    if not feedback(fixed.problem, time, 0, work.y, memory, work, latch, u):
-        return False
-    storage = agents_functions.stored(channels, state, run.solver.system.known)
-    watch.observe(run.monitor, run.figures, time, work, u, u, storage)
-    return True
+def act(run, time, stage, state, latch, u):
+    """Measure and act; fill u. False, with the exit in ``latch``, if there is no input."""
+    good = call_integer(
+        run.solver.functions[ACT],
+        (
+            run.place.parameter_block, run.place.workspace, run.place.solver, time, stage,
+            address_in(state), address_in(latch), address_in(u),
+        ),
+    )  # fmt: skip
+    return good != 0
+
+
+@kernel
+def control_step(run, time, state, latch, u):
+    """The same, and observe."""
+    good = call_integer(
+        run.solver.functions[OBSERVE],
+        (
+            run.place.parameter_block, run.place.workspace, run.place.solver, time,
+            address_in(state), address_in(latch), address_in(u),
+        ),
+    )  # fmt: skip
+    return good != 0
 
 
 @kernel
@@ -155,7 +199,7 @@ def error_of(output, agents, method, states, state, solver):
     at_z = m * states + agents * m
     worst = 0.0
     for a in range(states):
-        allowed = method.atol + method.rtol * magnitude(states, state, solver, a)
+        allowed = method.tolerance[1] + method.tolerance[0] * magnitude(states, state, solver, a)
         for r in range(m):
             error = abs(k[r * states + a])
             if a == output:
@@ -181,15 +225,14 @@ def magnitude(states, state, solver, a):
 
 
 @kernel
-def try_step(fixed, run, time, h, state):
+def step_to_trial(fixed, run, time, h):
     """Fill trial with the flat vector after a step of length h; return its weighted error.
 
     The error is infinite, and run.exit says why, if a stage or the new state is not inside.
     """
     problem, channels, method = fixed.problem, fixed.channels, fixed.method
-    work, solver = run.work, run.solver
-    size, agents = channels.equilibrium_state.size, len(problem.data.offsets) - 1
-    trial, k = solver.trial, solver.k
+    solver, agents = run.solver, len(problem.data.offsets) - 1
+    state, trial, k, place = solver.state, solver.trial, solver.k, run.place
     run.exit.exit = watch.INSIDE
     if not prepare(fixed, h, solver.system):
         watch.leave(run.exit, watch.DIVERGED, time, -1, -1, np.inf, 1)
@@ -202,12 +245,13 @@ def try_step(fixed, run, time, h, state):
                 add_multiple(method.stage[stage, j], k[j], trial)
         else:
             add_multiple(1.0, k[stage - 1], trial)
-        if stage > 0:
-            measure(channels, trial, work.y)
-            if not feedback(problem, time, stage, work.y, trial[size:], work, run.exit, solver.u):
-                return np.inf
+        if stage > 0 and not act(run, time, stage, trial, run.exit, solver.u):
+            return np.inf
         if stage < STAGES:
-            solve_stage(fixed, h, stage, trial, solver.u, k, solver.system)
+            call_integer(
+                solver.functions[SOLVE_STAGE],
+                (place.parameter_block, place.workspace, place.solver, h, stage),
+            )
     states = channels.equilibrium_state.shape[1]
     error = error_of(channels.output, agents, method, states, trial, solver)
     if not error <= 1.0:  # latched only if the run ends here
@@ -216,34 +260,31 @@ def try_step(fixed, run, time, h, state):
 
 
 @kernel
-def look_ahead(fixed, run, time, h, state):
+def look_ahead(run, time, h):
     """Tell in run.exit if the boundary is why even the smallest step has failed.
 
     Next to the boundary the demand grows so fast that no step is accurate. The trial vector is
     moved on along the step of length h, until it is outside or a microsecond away.
     """
-    problem, channels, work, solver = fixed.problem, fixed.channels, run.work, run.solver
-    y, trial, size = work.y, solver.trial, channels.equilibrium_state.size
+    state, trial = run.solver.state, run.solver.trial
     while h < AHEAD * max(1.0, time):
         h *= 2.0
         for r in range(len(trial)):
             trial[r] += trial[r] - state[r]
-        measure(channels, trial, y)
         why = run.exit.exit
         run.exit.exit = watch.INSIDE
-        if not feedback(
-            problem, time, STAGES, y, trial[size:], work, run.exit, solver.u
-        ) and run.exit.exit != watch.DIVERGED:  # fmt: skip
+        good = act(run, time, STAGES, trial, run.exit, run.solver.u)
+        if not good and run.exit.exit != watch.DIVERGED:
             return
         run.exit.exit = why
 
 
 @kernel
-def accept(fixed, run, h, state):
+def accept(fixed, run, h):
     """Move to the trial state, and keep what the dense output of the step needs."""
     problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
     progress, solver = run.progress, run.solver
-    at, states = problem.data.offsets, channels.equilibrium_state.shape[1]
+    at, states, state = problem.data.offsets, channels.equilibrium_state.shape[1], solver.state
     m, agents = len(solver.u), len(at) - 1
     size, n = m * states, solver.dense.shape[1]
     copy(state[:n], solver.dense[0])
@@ -272,11 +313,11 @@ def accept(fixed, run, h, state):
 
 
 @kernel
-def step_on(fixed, run, state):
+def step_on(fixed, run):
     """Take one accepted step from its end; False, with the exit latched, if there is none."""
-    progress, monitor = run.progress, run.monitor
+    progress, monitor, state = run.progress, run.monitor, run.solver.state
     time = progress.end
-    if not control_step(fixed, run, time, state, monitor, run.u):
+    if not control_step(run, time, state, monitor, run.u):
         return False
     monitor.steps = progress.accepted
     linearise(fixed, state, run.u, run.work, run.solver.system)
@@ -285,13 +326,16 @@ def step_on(fixed, run, state):
         smallest = SMALLEST * max(EARLY, time)
         if not h > smallest:
             h = smallest
-        error = try_step(fixed, run, time, h, state)
+        error = call_number(
+            run.solver.functions[TRY_STEP],
+            (run.place.parameter_block, run.place.workspace, run.place.solver, time, h),
+        )
         if error <= 1.0:
             break
         if h == smallest:
             why = run.exit
             if why.exit == watch.DIVERGED:
-                look_ahead(fixed, run, time, h, state)
+                look_ahead(run, time, h)
             watch.leave(
                 monitor, int(why.exit), time, why.exit_agent, why.exit_constraint,
                 why.exit_value, why.exit_stage,
@@ -300,7 +344,7 @@ def step_on(fixed, run, state):
         progress.rejected += 1.0
         retried = True
         h *= max(SHRINK, SAFETY * error**-POWER) if error < np.inf else 0.5
-    accept(fixed, run, h, state)
+    accept(fixed, run, h)
     error = max(error, 1e-12)
     factor = min(GROW, SAFETY * error**-POWER)
     if progress.last_step > 0.0:
@@ -325,22 +369,73 @@ def interpolate(progress, time, dense, out):
 
 
 @cache
-def build() -> tuple[Any, Any]:
-    """The native loop and its last observation, for all agents and games."""
+def parts() -> list[Any]:
+    """C functions of a step's parts, for all agents and games, in the order of their numbers."""
+    source = source_key()
+
+    def act(block, workspace, solver, time, stage, state, latch, u):
+        _ = source
+        fixed, run = run_in(block, workspace, solver)
+        size, y = fixed.channels.equilibrium_state.size, run.work.y
+        vector = floats_at(state, size + steps_in(block).memory)
+        measure(fixed.channels, vector, y)
+        good = feedback(
+            fixed.problem, time, stage, y, vector[size:], run.work,
+            _exit_in(floats_at(latch, _EXIT_LENGTH), 0), floats_at(u, len(y)),
+        )  # fmt: skip
+        return 1 if good else 0
+
+    def observe(block, workspace, solver, time, state, latch, u):
+        _ = source
+        fixed, run = run_in(block, workspace, solver)
+        good = call_integer(
+            run.solver.functions[ACT], (block, workspace, solver, time, 0, state, latch, u)
+        )
+        if good != 0:
+            vector = floats_at(state, fixed.channels.equilibrium_state.size)
+            delivered = floats_at(u, len(run.u))
+            storage = agents_functions.stored(fixed.channels, vector, run.solver.system.known)
+            watch.observe(run.monitor, run.figures, time, run.work, delivered, delivered, storage)
+        return good
+
+    def solve(block, workspace, solver, h, stage):
+        _ = source
+        fixed, run = run_in(block, workspace, solver)
+        arrays = run.solver
+        solve_stage(fixed, h, stage, arrays.trial, arrays.u, arrays.k, arrays.system)
+        return 0
+
+    def try_step(block, workspace, solver, time, h):
+        _ = source
+        fixed, run = run_in(block, workspace, solver)
+        return step_to_trial(fixed, run, time, h)
+
+    place = [_whole] * 3
+    return [
+        callback(_whole(*place, _real, *[_whole] * 4), act),
+        callback(_whole(*place, _real, *[_whole] * 3), observe),
+        callback(_whole(*place, _real, _whole), solve),
+        callback(_real(*place, _real, _real), try_step),
+    ]
+
+
+@cache
+def build() -> Any:
+    """The native loop, for all agents and games."""
     source = source_key()
 
     @compiled
-    def advance(parameter_block, workspace, solver, step, every, state, rows):
+    def advance(place, step, every, rows):
         """Fill rows, each followed by ``every`` sample steps; how many, and the step then."""
         _ = source
-        fixed, run = run_in(parameter_block, workspace, solver)
-        progress, monitor, period = run.progress, run.monitor, clock_in(parameter_block).h
+        fixed, run = run_in(place.parameter_block, place.workspace, place.solver)
+        progress, monitor, period = run.progress, run.monitor, clock_in(place.parameter_block).h
         for sample in range(len(rows.u)):
             row, time = rows.state[sample], step * period
-            interpolate(progress, time, solver.dense, row)
+            interpolate(progress, time, run.solver.dense, row)
             # Outside between two states inside is the interpolation's doing and ends no run.
             latch = run.exit if progress.end > 0.0 else monitor
-            if not control_step(fixed, run, time, row, latch, rows.u[sample]):
+            if not control_step(run, time, row, latch, rows.u[sample]):
                 if progress.end == 0.0:
                     return sample, step
                 for r in range(len(run.u)):
@@ -348,24 +443,12 @@ def build() -> tuple[Any, Any]:
             monitor.steps = progress.accepted
             time = (step + every) * period
             while progress.end < time:
-                if not step_on(fixed, run, state):
+                if not step_on(fixed, run):
                     return sample + 1, step
             step += every
         return len(rows.u), step
 
-    @compiled
-    def finish(parameter_block, workspace, solver, time, rows):
-        _ = source
-        fixed, run = run_in(parameter_block, workspace, solver)
-        row, u, progress = rows.state[0], rows.u[0], run.progress
-        interpolate(progress, time, solver.dense, row)
-        latch = run.exit if progress.end > 0.0 else run.monitor
-        if not control_step(fixed, run, time, row, latch, u):
-            for r in range(len(u)):
-                u[r] = np.nan
-        run.monitor.steps = progress.accepted
-
-    return advance, finish
+    return advance
 
 
 class RosenbrockLoop(ClosedLoop):
@@ -394,21 +477,22 @@ class RosenbrockLoop(ClosedLoop):
         rtol: float = 1e-6,
         atol: float = 1e-9,
     ) -> None:
-        self._advance, self._finish = build()
+        self._advance = build()
         self._agents, self._shape = agents, state.shape
         data, m = setup.problem.data, len(state)
         constraints = len(data.member_pointer) - 1
         modes = modes_of(graph, np.repeat(np.arange(graph.agents), np.diff(data.offsets)))
         self._length, self._estimates = state.size + len(memory), graph.agents * m
-        self._take(setup)
         self._h = setup.clock.h
         self._step = 0
         self._state = self._flat(modes, state, memory)
         sizes = {"m": m, "p": constraints, "agents": graph.agents}
         self._workspace = np.zeros(_length(*sizes.values()))
         workspace = by_name(self._workspace, dtype_of(Workspace, **sizes, **_SCRATCH))
-        self._progress, self.monitor = workspace, workspace.monitor
+        self._progress, self.monitor, self._exit = workspace, workspace.monitor, workspace.exit
         self._solver = RosenbrockState(
+            functions=np.array([each.address for each in parts()]),
+            state=self._state,
             trial=np.zeros_like(self._state),
             k=np.zeros((STAGES, len(self._state))),
             dense=np.zeros((5, self._length)),
@@ -418,6 +502,8 @@ class RosenbrockLoop(ClosedLoop):
             modes=modes,
             method=method(rtol, atol),
         )
+        self._solver_block = ParameterBlock(arrays(self._solver))
+        self._take(setup)
         self._begin()
 
     def _take(self, setup: Setup) -> None:
@@ -455,22 +541,26 @@ class RosenbrockLoop(ClosedLoop):
         """See the base class."""
         rows, done = self._rows(samples), 0
         if self.monitor.exit == watch.INSIDE:
-            done, self._step = self._advance(
-                self._parameter_block.address,
-                self._workspace,
-                self._solver,
-                self._step,
-                every,
-                self._state,
-                rows,
-            )
+            done, self._step = self._advance(self._place, self._step, every, rows)
         return self._samples(rows.state[:done], rows.u[:done])
 
     def finish(self) -> Samples:
         """See the base class."""
-        rows = self._rows(1)
-        self._finish(self._parameter_block.address, self._workspace, self._solver, self.time, rows)
+        rows, progress = self._rows(1), self._progress
+        (row,), (u,) = rows
+        interpolate(progress, self.time, self._solver.dense, row)
+        latch = self._exit if progress.end > 0.0 else self.monitor
+        where = (*self._place, self.time, address_in(row), address_in(latch), address_in(u))
+        if not call_integer(self._solver.functions[OBSERVE], where):
+            u[:] = np.nan
+        self.monitor.steps = progress.accepted
         return self._samples(*rows)
+
+    @property
+    def _place(self) -> Place:
+        return Place(
+            self._parameter_block.address, self._workspace.ctypes.data, self._solver_block.address
+        )
 
     def _rows(self, count: int) -> Rows:
         return Rows(np.empty((count, self._length)), np.empty((count, self._shape[0])))
