@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from gne_mj.files import written
 from gne_mj.interface.tables import made
-from gne_mj.plants.flexible_robot import PlanarRobotAgents, RobotAgents
 from gne_mj.plants.integrator import IntegratorAgents
 from gne_mj.plants.mixed import MixedAgents
 from gne_mj.plants.mjcf_robot import MjcfAgents
 from gne_mj.plants.pi_cascade import PiCascadeAgents
+from gne_mj.plants.robot_tables import PlanarRobotAgents, RobotAgents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.toml_table import Table
 from gne_mj.user_files import CustomAgents

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gne_mj.controllers.settings import EPSILON
 from gne_mj.graph import Graph
 from gne_mj.loops import monitor as watch
+from gne_mj.loops import positions
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import Modes, add_from_modes, modes_of, to_modes
 from gne_mj.loops.feedback import StepScratch, feedback
@@ -139,6 +140,7 @@ def control_step(fixed, run, time, state, latch, u):
         return False
     storage = agents_functions.stored(channels, state, run.solver.system.known)
     watch.observe(run.monitor, run.figures, time, work, u, u, storage)
+    positions.observe(fixed.problem, channels, work, run.monitor, time, state)
     return True
 
 

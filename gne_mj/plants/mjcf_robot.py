@@ -15,7 +15,9 @@ from pydantic import Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
+from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.lookahead import LookaheadKeys
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import Fills, Sizes
@@ -86,16 +88,23 @@ def storage(q, x, equilibrium_state):
 
 
 @AGENTS.register
-class MjcfAgents(AgentsTable):
-    """Robots of the user's own."""
+class MjcfAgents(AgentsTable, LookaheadKeys):
+    """Robots of the user's own; with a lookahead their outputs are positions."""
 
     engine: ClassVar[str] = "mujoco"
     type: Literal["mjcf-robot"]
     file: Annotated[str | list[str], Fills("path")] = Field(
         description="MJCF file, one for all or one each"
     )
-    output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
+    output: str | list[str] = Field(
+        description="joint or velocity sensor that is y_i; the joint of y = q + tau v"
+    )
     input: str | list[str] = Field(description="actuator that u_i drives")
+
+    @property
+    def positions(self) -> bool:
+        """See the base class."""
+        return self.lookahead is not None
 
     def build(self, sizes: Sizes) -> Agents:
         """The agents, for actions of one entry each."""
@@ -108,4 +117,11 @@ class MjcfAgents(AgentsTable):
                 raise InvalidInput(key, given, f"it must be one name or a list of {self.count}")
             columns.append(each)
         robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
-        return mjcf_robots(robots, self.limits(sizes))
+        if self.lookahead is None:
+            self.check_unused("it is for robots with a lookahead, whose outputs are positions")
+            return mjcf_robots(robots, self.limits(sizes))
+        tau = np.full(len(robots), self.lookahead)
+        columns_of = tau, self.damping_rows(sizes, None), self.reference_rows(sizes)
+        return MjcfRobots(
+            mjcf_position, np.column_stack(columns_of), self.limits(sizes), robots=robots
+        )

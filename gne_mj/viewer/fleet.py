@@ -59,7 +59,7 @@ class Fleet:
                 )
             return recorded
         state, at = values["state"], self.plant.places
-        extension, position = state[:, :, 0], state[:, :, 3]
+        extension, position = state[:, :, 0], values.get("place", state[:, :, 3])
         found = np.zeros((len(state), self.plant.model.nq))
         found[:, at.main_q] = position
         found[:, at.appendage_q] = position - extension
