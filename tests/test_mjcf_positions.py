@@ -5,6 +5,7 @@ import pytest
 from builders import UNEQUAL, position_robots, relative_error, run_loop, with_damping
 from mjcf_files import MOTOR, flexible
 
+import gne_mj as gm
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.games import velocity_game
@@ -94,3 +95,87 @@ def test_outputs_must_be_joints(tmp_path, sensor):
     with pytest.raises(InvalidInput, match=r"^agents.output: got '.*'.*lookahead.*joint"):
         MjcfPlant(fleet(tmp_path, sensor), 0.01)
     assert MjcfPlant(fleet(tmp_path, "joint_speed"), 0.01).outputs == ["joint_speed"] * COUNT
+
+
+PLANAR = """
+<mujoco><option gravity="0 0 0"><flag contact="disable"/></option>
+  <worldbody>
+    <body name="front">
+      <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+      <geom size=".1" mass="{main_mass}"/>
+    </body>
+    <body name="rear">
+      <joint name="rear_x" type="slide" axis="1 0 0"/>
+      <joint name="rear_y" type="slide" axis="0 1 0"/>
+      <geom size=".1" mass="{appendage_mass}"/>
+    </body>
+  </worldbody>
+  <tendon>
+    <fixed stiffness="{stiffness}" damping="{damping}" springlength="0">
+      <joint joint="x" coef="1"/><joint joint="rear_x" coef="-1"/>
+    </fixed>
+    <fixed stiffness="{stiffness}" damping="{damping}" springlength="0">
+      <joint joint="y" coef="1"/><joint joint="rear_y" coef="-1"/>
+    </fixed>
+  </tendon>
+  <actuator><motor name="u_x" joint="x"/><motor name="u_y" joint="y"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("mode", ["continuous", "implicit"])
+def test_two_axes_in_one_plane(tmp_path, mode):
+    """Two slide joints each; all robots are at one place, as their positions say."""
+    files = []
+    for i in range(3):
+        numbers = {name: values[i] for name, values in LINEAR.items()}
+        files.append(tmp_path / f"planar{i}.xml")
+        files[-1].write_text(PLANAR.format(**numbers))
+    _, damping = with_damping(LINEAR, TAU)
+    keys = {
+        "lookahead": TAU, "local_damping": damping[:3].tolist(), "reference_velocity": [1.0, -0.5]
+    }  # fmt: skip
+    start = {"action": [[0.5, 0.0], [0.0, 0.5], [-0.5, 0.0]], "velocity": [0.3, -0.2]}
+    robots = gm.mjcf_robots(3, files, output=["x", "y"], input=["u_x", "u_y"], **keys)
+    names = ("main_mass", "appendage_mass", "stiffness", "atan_coefficient", "damping")
+    numbers = {name: LINEAR[name][:3] for name in names}
+    # whose appendages rest in the world, as those of files do
+    rest = {"appendage_velocity": [-1.0, 0.5], "extension": (np.array([[0.5, 0.0], [0.0, 0.5],
+            [-0.5, 0.0]]) - TAU * np.array([0.3, -0.2])).tolist()}  # fmt: skip
+    found = {}
+    for name, agents, more in (
+        ("file", robots, {}),
+        ("ode", gm.planar_robots(3, output="position", **numbers, **keys), rest),
+    ):
+        agents_table = agents.model_dump(exclude_none=True)
+        scenario = {
+            "simulation": {"duration": 1.0, "timestep": 0.01, "integrator": "euler"},
+            "systems": {"r": {
+                "game": {"type": "velocity-consensus", "reference_velocity": [0.0, 0.0]},
+                "agents": agents_table, "initial": {**start, **more},
+                "controller": {"information": "full", "mode": mode},
+            }},
+        }  # fmt: skip
+        run = gm.run(scenario)
+        assert run.reports["r"]["positions"]["outside"] == 0
+        found[name] = run["r"]
+    for name in ("action", "position", "velocity"):
+        assert relative_error(found["file"][name], found["ode"][name]) < 1e-8
+    assert np.allclose(found["file"]["configuration"][0, [0, 4]], [0.5 - 0.3 * TAU, -0.3 * TAU])
+
+
+def test_robots_at_one_place_must_not_overlap(tmp_path):
+    path = tmp_path / "planar.xml"
+    numbers = {name: values[0] for name, values in LINEAR.items()}
+    text = PLANAR.format(**numbers).replace('<flag contact="disable"/>', "")
+    path.write_text(text.replace('mass="0.5"', 'mass="0.5" contype="0" conaffinity="0"'))
+    robots = tuple(RobotFile(path, *axis) for axis in (("x", "u_x"), ("y", "u_y")) * 2)
+    table, limit = np.tile([TAU, 9.0, 0.0], (4, 1)), np.full(4, np.inf)
+    agents = MjcfRobots(mjcf_position, table, limit, 2, robots, together=True)
+    plant = MjcfPlant(agents, 0.01)
+    apart = np.array([0.0, 0.0, 1.0, 0.0])
+    plant.reset(np.column_stack([apart, apart]))
+    with pytest.raises(InvalidInput, match=r"agent 1 overlaps .* of agent 2: let their positions"):
+        plant.reset(np.column_stack([0.1 * apart, 0.1 * apart]))
+    assert not agents.repeated(2).together
+    assert agents.repeated(1).together

@@ -48,6 +48,9 @@ from gne_mj.records import by_name
 __all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
+# What to do where they do
+BESIDE = f", {SPACING:g} m beside it: make its file narrower, or its floor a plane, which all share"
+TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
 SENSOR = mujoco.mjtSensor
 VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
 
@@ -78,7 +81,8 @@ def passive_callback(at: Offsets) -> Any:
 class MjcfPlant(FleetPlant):
     """A fleet of the user's own robots in MuJoCo.
 
-    Each file's bodies are attached to one world, side by side; all must have the same options
+    Each file's bodies are attached to one world, side by side, or at one place where their
+    positions are what they decide; all must have the same options
     (gravity, density, flags and so on); contacts are between a robot's own geoms and whatever its
     file brings along, a floor that several bring being one. A fleet starts from the models'
     reference pose at the given outputs. An input is the force of its actuator, gain and gear
@@ -118,7 +122,7 @@ class MjcfPlant(FleetPlant):
         numbers = self._lookahead(agents)
         self.passive = passive_callback(offsets()) if len(numbers) else None
         with named(path="agents.path"):
-            world, sizes_of_robots, memory_asked = _world(agents.robots)
+            world, sizes_of_robots, memory_asked = _world(agents)
         with named(world="agents.path"):
             self.model = compile_model(
                 world, timestep=timestep, integrator=INTEGRATORS[integrator],
@@ -176,7 +180,7 @@ class MjcfPlant(FleetPlant):
         return bool(np.all(self.places.output >= 0))
 
     def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
-        model, prefix = self.model, f"robot_{i + 1}/"
+        model, prefix = self.model, f"robot_{i // self.agents.dimension + 1}/"
         joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + robot.output)
         sensor = _named(model, mujoco.mjtObj.mjOBJ_SENSOR, prefix + robot.output)
         actuator = _named(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input)
@@ -217,7 +221,8 @@ class MjcfPlant(FleetPlant):
             raise InvalidInput(
                 "agents.input_limit",
                 float(self.agents.input_limit[i]),
-                f"actuator '{robot.input}' of agent {i + 1} clamps its force: give a limit of at"
+                f"actuator '{robot.input}' of agent"
+                f" {i // self.agents.dimension + 1} clamps its force: give a limit of at"
                 f" most {least:g}",
             )
 
@@ -268,8 +273,9 @@ class MjcfPlant(FleetPlant):
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
+        advice = TOGETHER if self.agents.together else BESIDE
         with named(robots="agents.path"):
-            check_apart(self.model, self.data, self._owners, self.agents.robots)
+            check_apart(self.model, self.data, self._owners, self.agents.files, advice)
         missed = np.abs(self.state[:, 0] - state[:, 0])
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
@@ -290,10 +296,11 @@ class MjcfPlant(FleetPlant):
 PLANT = MjcfPlant
 
 
-def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:
+def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
     """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
-    floor, across = world.geom("floor"), 0.5 * SPACING * (len(robots) - 1)
+    robots, spacing = agents.files, 0.0 if agents.together else SPACING
+    floor, across = world.geom("floor"), 0.5 * spacing * (len(robots) - 1)
     floor.pos[1], floor.size[1] = across, floor.size[1] + across
     for path in dict.fromkeys(robot.path for robot in robots):
         mjcf_file.alone(path)  # which finds what is wrong with it
@@ -305,7 +312,7 @@ def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], i
         mjcf_file.check_options(world, spec, robot.path)
         sizes.append(sizes_of(spec))
         memory += max(spec.memory, 0)
-        place = (0.0, SPACING * i, 0.0)
+        place = (0.0, spacing * i, 0.0)
         mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
     return world, sizes, memory
 

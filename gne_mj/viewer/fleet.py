@@ -92,7 +92,7 @@ class Fleet:
         plant, model, count = self.plant, self.plant.model, self.agents
         if isinstance(plant, MujocoPlant):
             return [int(model.body(f"robot_{i + 1}/main").id) for i in range(count)]
-        joints = plant.output_joints
+        joints = plant.output_joints[:: plant.agents.dimension]
         return [
             int(model.dof_bodyid[joint]) if joint >= 0 else _first_body(model, f"robot_{i + 1}/")
             for i, joint in enumerate(joints)
