@@ -240,13 +240,18 @@ class SystemTable(Table):
         system = table.model_copy(update={"initial": initial}).build(name, simulation)
         return system, {"why": why, "action": profile.tolist()}
 
-    def starting_at(self, y: NDArray[np.float64], sizes: Sizes) -> "SystemTable":
-        """The same system with y(0) = y, shape (m,)."""
-        blocks = np.split(y, np.cumsum(sizes)[:-1])
-        action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
-        update: dict[str, Any] = {"action": action}
-        if getattr(self.agents, "positions", False):  # at rest at y, so that q is inside too
-            update |= {"position": None, "velocity": None}
+    def starting_at(
+        self, y: NDArray[np.float64], sizes: Sizes, position: NDArray[np.float64] | None = None
+    ) -> "SystemTable":
+        """The same system with y(0) = y, shape (m,).
+
+        Where positions follow outputs q(0) is ``position`` (m,) or, if left out, y: at rest, and
+        inside as y is.
+        """
+        update: dict[str, Any] = {"action": _by_agent(y, sizes)}
+        if getattr(self.agents, "positions", False):
+            at = None if position is None else _by_agent(position, sizes)
+            update |= {"position": at, "velocity": None}
         return self.model_copy(update={"initial": self.initial.model_copy(update=update)})
 
     def _parts(self, simulation: "SimulationTable") -> tuple[Game, Agents]:
@@ -428,6 +433,12 @@ class Scenario(Table):
 def _kind(table: Table) -> str:
     """Which of the tables that may stand there it is."""
     return str(getattr(table, "type", None) or getattr(table, "information", ""))
+
+
+def _by_agent(y: NDArray[np.float64], sizes: Sizes) -> Any:
+    """Numbers (m,) as a table has them: a list, of lists where actions are vectors."""
+    blocks = np.split(y, np.cumsum(sizes)[:-1])
+    return [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
 
 
 def _places(sizes: Sizes) -> NDArray[np.float64]:
