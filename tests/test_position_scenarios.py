@@ -6,8 +6,10 @@ import pytest
 import gne_mj as gm
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.plan import make_plan
+from gne_mj.environment import load_environment
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.plants import mjcf_position, position_robot
+from gne_mj.plants.ode import OdePlant
 from gne_mj.scenario import load_scenario
 from gne_mj.summary import summary
 from gne_mj.system import Clock
@@ -232,3 +234,18 @@ def test_robots_of_a_file_need_their_damping(tmp_path):
     system = gm.setup(game, agents=robots).system_objects()[0]
     assert system.agents.kind is mjcf_position
     assert np.array_equal(system.agents.parameters, [[TAU, 8.0, -1.0], [TAU, 9.0, -1.0]])
+
+
+def test_environments_begin_at_rest_and_move_as_the_plant():
+    environment = load_environment(LANE, {"plant.engine": "mujoco"}, start="random", random=3)
+    environment.reset()
+    physics, plant = environment.physics, OdePlant(built().agents, 0.01, "euler")
+    begun = physics.state
+    assert np.array_equal(begun[:, 1], begun[:, 3])
+    assert np.any(begun[:, 1] != 0.0)
+    u = np.array([3.0, -1.0, 2.0])
+    plant.reset(begun)
+    for _ in range(5):
+        environment.step(u)
+        plant.step(u)
+    assert np.allclose(physics.state, plant.state, atol=1e-12)
