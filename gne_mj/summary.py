@@ -19,7 +19,7 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
     if report["positions"] is not None:
         seen = report["positions"]
         rows["positions"] = (
-            f"outside at {seen['outside']} of {seen['observed']} steps; least margin -g ="
+            f"outside at {seen['outside']} of {seen['observed']} observations; least margin -g ="
             f" {seen['least_margin']:.6g}, constraint '{seen['constraint']}' at"
             f" {seen['time']:.4g} s"
         )

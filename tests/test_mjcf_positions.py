@@ -164,6 +164,15 @@ def test_two_axes_in_one_plane(tmp_path, mode):
     assert np.allclose(found["file"]["configuration"][0, [0, 4]], [0.5 - 0.3 * TAU, -0.3 * TAU])
 
 
+@pytest.mark.parametrize("names", ["x", ["x", "y", "z"], [["x", "y"]] * 3, [["x", "y"], ["x"]]])
+def test_as_many_names_as_axes(tmp_path, names):
+    path = tmp_path / "planar.xml"
+    path.write_text(PLANAR.format(**{name: values[0] for name, values in LINEAR.items()}))
+    robots = gm.mjcf_robots(2, path, output=names, input=["u_x", "u_y"])
+    with pytest.raises(InvalidInput, match=r"output: .*list of 2 names or a list of 2 such"):
+        robots.build((2, 2))
+
+
 def test_robots_at_one_place_must_not_overlap(tmp_path):
     path = tmp_path / "planar.xml"
     numbers = {name: values[0] for name, values in LINEAR.items()}

@@ -154,7 +154,7 @@ def test_reports_trajectories_and_batches(tmp_path):
     y, q, v = (data[name].values for name in ("action", "position", "velocity"))
     assert np.allclose(y, q + TAU * v)
     assert np.allclose(data["place"], q + 3.0 * data["time"].values[:, None])
-    assert summary(run.reports["r"])["positions"].startswith("outside at 0 of 41 steps")
+    assert summary(run.reports["r"])["positions"].startswith("outside at 0 of 41 observations")
     none = gm.run("velocity-sync", {"simulation.duration": 0.1}).reports["robots"]
     assert none["positions"] is None
     gm.batch(LANE, runs=5, spread=0.99, out=tmp_path / "runs")

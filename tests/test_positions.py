@@ -184,6 +184,20 @@ def test_every_law_and_mode_in_mujoco_as_the_ode(law, mode, integrator):
         assert relative_error(got, expected) < 1e-9
 
 
+def test_the_adaptive_method_looks_at_positions_too():
+    law, found = LAWS["distributed"], {}
+    for integrator in ("rosenbrock", "rk4"):
+        system = system_of(law=law, bound=4.0 * BOUND, integrator=integrator)
+        states, _, _, loop = run_loop(system, 0.002, 500, every=50)
+        seen = loop.monitor
+        assert seen.exit == watch.INSIDE
+        assert seen.positions >= seen.steps + 1  # rows in between are looked at as well
+        assert seen.positions_outside == 0
+        found[integrator] = states, seen.positions_worst
+    assert relative_error(found["rosenbrock"][0], found["rk4"][0]) < 1e-5
+    assert found["rosenbrock"][1] == pytest.approx(found["rk4"][1], rel=1e-3)
+
+
 @pytest.mark.parametrize("mujoco", [True, False])
 def test_the_one_step_map_of_mode_implicit(mujoco):
     """dy+/du = (h/M)(tau + h), of Euler's step."""
@@ -247,7 +261,8 @@ def test_positions_stay_inside_from_the_very_edge(engine, mode, integrator):
         states, _, _, loop = run_loop(system, h, steps)
         seen = loop.monitor
         assert seen.exit == watch.INSIDE
-        assert seen.positions >= steps + 1
+        assert seen.positions == seen.steps + 1  # once at the start of each piece, and at the end
+        assert seen.steps >= steps
         assert seen.positions_outside == 0
         at_samples = system.game.constraints(states[:, :, 3])
         assert np.all(at_samples < 0)

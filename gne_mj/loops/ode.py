@@ -107,8 +107,8 @@ def control_step(faults, place, parts, at, storage, state, memory):
     if at.stage == 0:
         before = work.u if clock.mode == CONTINUOUS else parts.u
         storage += functions.storage(problem, memory)
-        watch.observe(monitor, parts.figures, at.time, work, before, work.u, storage)
         positions.observe(problem, parts.channels, work, monitor, at.time, state)
+        watch.observe(monitor, parts.figures, at.time, work, before, work.u, storage)
         copy(work.u, parts.u)
     return True
 

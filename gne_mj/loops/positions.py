@@ -10,9 +10,13 @@ from gne_mj.native import kernel
 
 @kernel
 def observe(problem, channels, work, monitor, time, state):
-    """Note the constraints' values at the positions of a flat state, if agents have such."""
+    """Note the constraints' values at the positions of a flat state, if agents have such.
+
+    Before :func:`gne_mj.loops.monitor.observe`: the same instant is not looked at twice, as where a
+    piece of a step is taken again.
+    """
     data = problem.data
-    if channels.position < 0:
+    if channels.position < 0 or (monitor.positions > 0.0 and not time > monitor.time):
         return
     positions, g = work.profile, work.at_positions
     states = channels.equilibrium_state.shape[1]

@@ -139,8 +139,8 @@ def control_step(fixed, run, time, state, latch, u):
     if not feedback(fixed.problem, time, 0, work.y, memory, work, latch, u):
         return False
     storage = agents_functions.stored(channels, state, run.solver.system.known)
-    watch.observe(run.monitor, run.figures, time, work, u, u, storage)
     positions.observe(fixed.problem, channels, work, run.monitor, time, state)
+    watch.observe(run.monitor, run.figures, time, work, u, u, storage)
     return True
 
 

@@ -144,6 +144,7 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         else:
             rows = [[entry] if isinstance(entry, str) else entry for entry in given]
         if [len(row) for row in rows] != [axes] * self.count:
-            what = "one name" if axes == 1 else f"a list of {axes} names"
-            raise InvalidInput(key, given, f"it must be {what}, or {self.count} of these in a list")
+            one = "one name" if axes == 1 else f"a list of {axes} names"
+            many = "" if axes == 1 else " such lists"
+            raise InvalidInput(key, given, f"it must be {one} or a list of {self.count}{many}")
         return [name for row in rows for name in row]
