@@ -6,6 +6,7 @@ import pytest
 import gne_mj as gm
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.plan import make_plan
+from gne_mj.batches.sweep import Sweep
 from gne_mj.environment import load_environment
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.plants import mjcf_position, position_robot
@@ -249,3 +250,23 @@ def test_environments_begin_at_rest_and_move_as_the_plant():
         environment.step(u)
         plant.step(u)
     assert np.allclose(physics.state, plant.state, atol=1e-12)
+
+
+def test_sweeps_of_an_agents_numbers_in_mujoco(tmp_path):
+    """Rows of one fleet, each with a look-ahead, a reference and masses of its own."""
+    changes = {"plant.engine": "mujoco", "agents.reference_velocity": 3.0}
+    scenario = load_scenario(LANE, changes)
+    sweeps = {
+        "agents.lookahead": [0.3, 0.8], "agents.reference_velocity": [0.0, 5.0],
+        "agents.main_mass": [1.0, 2.0],
+    }  # fmt: skip
+    rows = gm.batch(scenario, sweeps, runs=2, out=tmp_path / "runs")
+    assert set(rows["status"].values) <= {"completed", "converged"}
+    plan = make_plan(
+        scenario, sweeps=[Sweep(key, tuple(values)) for key, values in sweeps.items()], starts=2
+    )
+    for run in (0, 5, 10, 15):
+        alone = gm.run(plan.alone(run)).reports["r"]
+        found = rows.isel(run=run)
+        assert float(found["position_margin"]) == alone["positions"]["least_margin"]
+        assert float(found["peak_input"]) == alone["actuators"]["peak"]
