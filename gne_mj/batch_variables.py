@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gne_mj import run_metrics, variables
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
 from gne_mj.system import System, mode_of
 from gne_mj.system.modes import Figure, Mode
@@ -150,6 +151,11 @@ def _status(runs: Runs) -> Array:
     return run_metrics.status(runs.monitors, tail, runs.tolerance)
 
 
+def follow(system: System) -> bool:
+    """Whether agents have positions that follow their outputs."""
+    return followed_position(system.agents.kind) >= 0
+
+
 def _of_monitor(name: str, entry: str, **about: Any) -> Variable:
     return Variable(name, ("run",), lambda runs: runs.seen(entry), **about)
 
@@ -242,6 +248,15 @@ JUDGED = (
         "lyapunov_rise", ("run",), _rise, long_name="largest rise of V from one step to the next"
     ),
     _of_monitor("steps", "steps"),
+    _of_monitor(
+        "positions_outside", "positions_outside", there=follow,
+        long_name="observations of positions that follow outputs outside the set",
+    ),
+    Variable(
+        "position_margin", ("run",),
+        lambda runs: _where(runs.observed, -runs.seen("positions_worst")), there=follow,
+        long_name="least -g at positions that follow outputs",
+    ),
 )  # fmt: skip
 
 

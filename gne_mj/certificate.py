@@ -14,6 +14,7 @@ from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
 from gne_mj.run_metrics import EXITS, SUCCESSES, TAIL
 from gne_mj.system import System, mode_of
@@ -42,6 +43,8 @@ class Certificate:
             claims that it never rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long
             as no input limit is met.
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
+        positions: of agents whose positions follow their outputs: how often these were observed
+            and how often outside, and the least margin -g at them; None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
@@ -59,6 +62,7 @@ class Certificate:
     settling_time: float | None
     lyapunov: dict[str, Any]
     actuators: dict[str, Any]
+    positions: dict[str, Any] | None
     exit: dict[str, Any] | None
     of_modes: dict[str, Any]
     steps: int
@@ -126,6 +130,7 @@ def certify_run(
         settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
+        positions=_positions(system, monitor),
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
@@ -301,6 +306,19 @@ def _worst_constraint(system: System, monitor: Any) -> dict[str, Any] | None:
         "margin": float(-worst[index]),
         "each": [float(-value) if np.isfinite(value) else None for value in worst],
         "time": float(when[index]),
+    }
+
+
+def _positions(system: System, monitor: Any) -> dict[str, Any] | None:
+    """Where positions stood that follow outputs, at every integration step."""
+    if followed_position(system.agents.kind) < 0 or not monitor.positions:
+        return None
+    return {
+        "observed": int(monitor.positions),
+        "outside": int(monitor.positions_outside),
+        "least_margin": -float(monitor.positions_worst),
+        "constraint": system.game.constraint_names[int(monitor.positions_constraint)],
+        "time": float(monitor.positions_worst_time),
     }
 
 

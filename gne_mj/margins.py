@@ -248,7 +248,10 @@ class _Channel:
             slopes.append(slope)
         self.linear = bool(np.array_equal(slopes[0], slopes[1]))
         positions = list(getattr(kind, "POSITIONS", ()))
-        steps = [_step(slope, column, h, integrator, positions) for slope in slopes]
+        if integrator == "euler" and hasattr(kind, "physical"):
+            steps = _turned_steps(kind.physical(q), slopes, column, h, positions)
+        else:
+            steps = [_step(slope, column, h, integrator, positions) for slope in slopes]
         self._exact = steps[0]
         if integrator == "rk4" and not self.linear:
             # Stages with slopes of their own: absolute values bound every mixture of them.
@@ -257,7 +260,10 @@ class _Channel:
         self._a = np.max([np.abs(a) for a, _ in steps], axis=0)
         self._change = np.max([np.abs(a - identity) for a, _ in steps], axis=0)
         self._b = np.max([np.abs(b) for _, b in steps], axis=0)
+        # what the input alone does in a step: of Euler's, in which no spring acts on it, exactly
         self._free = h * column[self._output]
+        if integrator == "euler":
+            self._free = self._exact[1][self._output]
 
     def gains(self, steps: int) -> tuple[float, float]:
         """Bounds of |dy| for pushes of at most 1, and for an output that is read wrong by 1."""
@@ -290,6 +296,17 @@ class _Channel:
             taken += float(self._change[self._output] @ size)
             size = self._a @ size + self._b
         return float(steps * (2.0 * self._free - self._b[self._output]) - taken)
+
+
+def _turned_steps(
+    physical: Array, slopes: list[Array], column: Array, h: float, positions: list[int]
+) -> list[tuple[Array, Array]]:
+    """Euler's, in the states, where it is semi-implicit in others that ``physical`` leads from."""
+    back, found = np.linalg.inv(physical), []
+    for slope in slopes:
+        a, b = _step(back @ slope @ physical, back @ column, h, "euler", positions)
+        found.append((physical @ a @ back, physical @ b))
+    return found
 
 
 def _step(

@@ -15,7 +15,7 @@ LEAST_SQUARES = 60  # steps for each
 
 
 def random_starts(
-    game: Game, middle: NDArray[np.float64], seeds: Sequence[int], spread: float
+    game: Game, middle: NDArray[np.float64], seeds: Sequence[int | tuple[int, ...]], spread: float
 ) -> NDArray[np.float64]:
     """Profiles strictly inside, one a seed, shape (seeds, m).
 

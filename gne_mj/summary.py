@@ -16,6 +16,13 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
         f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
     }
+    if report["positions"] is not None:
+        seen = report["positions"]
+        rows["positions"] = (
+            f"outside at {seen['outside']} of {seen['observed']} observations; least margin -g ="
+            f" {seen['least_margin']:.6g}, constraint '{seen['constraint']}' at"
+            f" {seen['time']:.4g} s"
+        )
     if gap is not None:
         rows["widest gap"] = (
             f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"

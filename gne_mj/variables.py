@@ -233,10 +233,20 @@ def equilibrium_of(system: System) -> NDArray[np.float64]:
 
 
 def _states(system: System) -> Iterator[Variable]:
-    """The agents' states but the output, each by its name."""
+    """The agents' states but the output, each by its name, and what follows from them."""
     kind = system.agents.kind
     states = (_state(index, *state) for index, state in enumerate(kind.STATES))
-    return (state for index, state in enumerate(states) if index != kind.OUTPUT)
+    yield from (state for index, state in enumerate(states) if index != kind.OUTPUT)
+    for name, unit, source in getattr(kind, "DERIVED", ()):
+        yield _derived(name, unit, source)
+
+
+def _derived(name: str, unit: str, source: Callable[[Array, Array, Array], Array]) -> Variable:
+    return Variable(
+        name, ("time", AXIS),
+        lambda rows: source(rows.system.agents.parameters, rows.samples.state, rows.time),
+        unit=unit, page="behind",
+    )  # fmt: skip
 
 
 def _state(index: int, name: str, unit: str) -> Variable:

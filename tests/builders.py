@@ -9,7 +9,7 @@ import reference
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
-from gne_mj.plants import flexible_robot, integrator, pi_cascade
+from gne_mj.plants import flexible_robot, integrator, pi_cascade, position_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.system import Clock, System
 
@@ -40,6 +40,27 @@ def robots(numbers, limit=np.inf):
 
 def reference_robots(numbers):
     return reference.FlexibleRobot(*[numbers[name] for name in flexible_robot.PARAMETERS])
+
+
+def with_damping(numbers, tau, share=1.2):
+    """Numbers of robots (lists) with a look-ahead in s, and this share of the least damping."""
+    big, small, gamma = (np.array(numbers[n]) for n in ("main_mass", "appendage_mass", "damping"))
+    least = (big + small) / tau + small**2 / (4 * tau**2 * gamma)
+    return np.full(len(big), tau), share * least
+
+
+def position_robots(numbers, tau=0.7, share=1.2, v_0=3.0):
+    """Robots whose outputs are positions, beside a reference that moves at v_0 in m/s."""
+    columns = [numbers[name] for name in flexible_robot.PARAMETERS]
+    lookahead, damping = with_damping(numbers, tau, share)
+    table = np.column_stack([*columns, lookahead, damping, np.full(len(damping), v_0)])
+    return Agents(position_robot, table, np.full(len(table), np.inf))
+
+
+def reference_position_robots(numbers, tau=0.7, share=1.2):
+    columns = [numbers[name] for name in flexible_robot.PARAMETERS]
+    lookahead, damping = with_damping(numbers, tau, share)
+    return reference.PositionRobot(*columns, lookahead=lookahead, local_damping=damping)
 
 
 def integrators(count):

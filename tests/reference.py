@@ -580,6 +580,80 @@ class FlexibleRobot:
         return total
 
 
+class PositionRobot(FlexibleRobot):
+    """The same robot with y = q + tau v as output and a damping of its own; state [s, y, w, q].
+
+    s: extension, m; w: the appendage's velocity, m/s; q: the main mass' position, m; all relative
+    to a reference that moves at a constant velocity. The main mass' own velocity v is (y - q)/tau,
+    and the force on it is u - d v.
+
+    lookahead tau, s, and local_damping d, N s/m: (N,) each; the others as of FlexibleRobot.
+    """
+
+    n = 4
+
+    def __init__(self, *numbers, lookahead, local_damping):
+        super().__init__(*numbers)
+        self.tau = np.array(lookahead, dtype=float)
+        self.d = np.array(local_damping, dtype=float)
+
+    def velocities(self, x):
+        """v: (N,). x: (N, 4)."""
+        return np.array([(row[1] - row[3]) / tau for row, tau in zip(x, self.tau, strict=True)])
+
+    def states(self, s, v, w, q):
+        """x of extensions, velocities and positions: (N, 4)."""
+        v, q = np.asarray(v, dtype=float), np.asarray(q, dtype=float)
+        return np.column_stack([np.broadcast_to(s, v.shape), q + self.tau * v, w, q])
+
+    def rate(self, x, u):
+        """x': (N, 4). x: (N, 4). u: (N,), N."""
+        v = self.velocities(x)
+        as_robot = np.column_stack([[row[0] for row in x], v, [row[2] for row in x]])
+        moved = super().rate(as_robot, np.asarray(u) - self.d * v)
+        return np.column_stack([moved[:, 0], v + self.tau * moved[:, 1], moved[:, 2], v])
+
+    def equilibrium(self, y_star):
+        """(0, y*, 0, y*): (N, 4). y_star: (N,)."""
+        return np.array([[0.0, value, 0.0, value] for value in y_star])
+
+    def stored(self, x):
+        """V(x), of each robot: (N,). x: (N, 4)."""
+        x, v = np.asarray(x, dtype=float), self.velocities(x)
+        w, q = x[:, 2], x[:, 3]
+        kinetic = 0.5 * self.main_mass * v**2 + 0.5 * self.appendage_mass * w**2
+        momentum = self.main_mass * v + self.appendage_mass * w
+        energy = kinetic + self.spring_energy(x[:, 0])
+        return self.tau * energy + q * momentum + 0.5 * self.d * q**2
+
+    def stored_gradient(self, x):
+        """dV/d(s, v, w, q), of each robot: (N, 4). x: (N, 4)."""
+        x, v = np.asarray(x, dtype=float), self.velocities(x)
+        w, q, big, small = x[:, 2], x[:, 3], self.main_mass, self.appendage_mass
+        parts = (
+            self.tau * self.psi(x[:, 0]), big * (self.tau * v + q), small * (self.tau * w + q),
+            big * v + small * w + self.d * q,
+        )  # fmt: skip
+        return np.column_stack(parts)
+
+    def storage(self, x, x_star):
+        """V^{x*}(x), the Bregman divergence, a scalar sum over robots. x, x_star: (N, 4)."""
+        x, x_star = np.asarray(x, dtype=float), np.asarray(x_star, dtype=float)
+        away = np.column_stack([
+            x[:, 0] - x_star[:, 0], self.velocities(x) - self.velocities(x_star),
+            x[:, 2] - x_star[:, 2], x[:, 3] - x_star[:, 3],
+        ])  # fmt: skip
+        linear = np.sum(self.stored_gradient(x_star) * away, axis=1)
+        return np.sum(self.stored(x) - self.stored(x_star) - linear)
+
+    def euler(self, x, u, h):
+        """MuJoCo's Euler step: velocities first, then extension and position with them: (N, 4)."""
+        rates, v = self.rate(x, u), self.velocities(x)
+        v = v + h * (rates[:, 1] - rates[:, 3]) / self.tau
+        w, q = x[:, 2] + h * rates[:, 2], x[:, 3] + h * v
+        return self.states(x[:, 0] + h * (v - w), v, w, q)
+
+
 # -------------------------------------------------------------------------------- closed loops
 
 

@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from builders import UNEQUAL, integrators, pi_cascades, reference_pi, reference_robots, robots
+from builders import (
+    UNEQUAL,
+    integrators,
+    pi_cascades,
+    position_robots,
+    reference_pi,
+    reference_position_robots,
+    reference_robots,
+    robots,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,6 +24,7 @@ from gne_mj.plants import (
     mixed,
     mjcf_robot,
     pi_cascade,
+    position_robot,
 )
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
@@ -24,6 +34,7 @@ KINDS = {
     "integrator": (integrators(5), reference.Integrator(), 1),
     "pi cascade": (pi_cascades(5, 1.3, 0.6), reference_pi(5, 1.3, 0.6), 2),
     "robot": (robots(UNEQUAL), reference_robots(UNEQUAL), 3),
+    "position robot": (position_robots(UNEQUAL), reference_position_robots(UNEQUAL), 4),
 }
 
 
@@ -139,11 +150,13 @@ def test_plants_step_by_the_same_rates(kind):
     assert np.array_equal(plant.output, plant.state[:, agents.kind.OUTPUT])
 
 
-@pytest.mark.parametrize("kind", [flexible_robot, mjcf_robot, integrator, pi_cascade, mixed])
+@pytest.mark.parametrize(
+    "kind", [flexible_robot, position_robot, mjcf_robot, integrator, pi_cascade, mixed]
+)
 def test_a_type_with_bodies_names_the_module_of_its_fleets(kind):
     module = agent_type.fleet_module(kind)
     assert (module is not None) == agent_type.in_mujoco(kind)
-    assert agent_type.in_mujoco(kind) == (kind in (flexible_robot, mjcf_robot))
+    assert agent_type.in_mujoco(kind) == (kind in (flexible_robot, position_robot, mjcf_robot))
     if module is None:
         agents = Agents(kind, np.zeros((2, len(kind.PARAMETERS))), np.full(2, np.inf))
         with pytest.raises(InvalidInput, match=rf"^agents: got '{kind.NAME}'.*no model in MuJoCo"):

@@ -32,7 +32,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.loops import monitor as watch
-from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade
+from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade, position_robot
 from gne_mj.system import System
 from gne_mj.theory import Slopes, Theorem, certify, report_text, search_epsilon
 from gne_mj.theory.constants import profiles
@@ -419,11 +419,12 @@ def test_certified_runs_stay_inside_and_v_never_rises(seed, tau):
 def channels(draw):
     """An agent type, one channel's parameters, and two states and an input."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    kind = draw(st.sampled_from([integrator, pi_cascade, flexible_robot]))
+    kind = draw(st.sampled_from([integrator, pi_cascade, flexible_robot, position_robot]))
     numbers = {
         integrator: lambda: np.zeros(0),
         pi_cascade: lambda: np.sort(rng.uniform(0.1, 3, 2))[::-1],
         flexible_robot: lambda: rng.uniform(0.1, 3, 5),
+        position_robot: lambda: rng.uniform(0.3, 3, 8),
     }[kind]()
     return kind, numbers, rng.normal(size=len(kind.STATES)), rng.normal(size=2)
 
@@ -444,7 +445,7 @@ def test_energy_balances_against_the_kernels(drawn):
     assert storage_rate == pytest.approx(balance, rel=1e-6, abs=1e-6)
     bound = 0.5 * e @ storage @ e
     assert kind.storage(q, x, rest) <= bound * (1 + 1e-12)
-    if kind is not flexible_robot:
+    if kind not in (flexible_robot, position_robot):
         assert kind.storage(q, x, rest) == pytest.approx(bound, rel=1e-9, abs=1e-12)
 
 

@@ -143,11 +143,15 @@ class Runner:
         structure = self._structure(prepared)
         shared = structure.parameter_block(system, setup)
         initial = combination.scenario.systems[system.name].initial
-        for start, y in zip(starts, plan.profiles(combination, starts), strict=True):
+        profiles, positions = (
+            plan.profiles(combination, starts),
+            plan.positions(combination, starts),
+        )
+        for start, y, position in zip(starts, profiles, positions, strict=True):
             seed = int(plan.seeds[start])
             state, memory = system.state, system.memory
             if plan.starts:
-                state, memory = _start(combination, y)
+                state, memory = _start(combination, y, position)
             if initial.estimate is not None or initial.filtered is not None:
                 try:
                     replace(system, state=state, memory=memory)
@@ -191,14 +195,21 @@ def _seeded(setup: Setup, seed: int) -> Setup:
 
 
 def _start(
-    combination: Combination, y: NDArray[np.float64]
+    combination: Combination, y: NDArray[np.float64], position: NDArray[np.float64] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States (m, states) and the law's memory at y(0) = y, as the scenario's tables have them."""
+    """States (m, states) and the law's memory at y(0) = y, as the scenario's tables have them.
+
+    Args:
+        combination: with a system.
+        y: (m,) outputs.
+        position: (m,) positions that follow them; None where there are none.
+    """
     system = combination.system
     assert system is not None
-    initial = combination.scenario.systems[system.name].initial
     sizes = system.game.sizes
-    state = initial.model_copy(update={"action": None}).build(system.agents, sizes, lambda: y)
+    table = combination.scenario.systems[system.name].starting_at(y, sizes, position)
+    initial = table.initial
+    state = initial.build(system.agents, sizes, lambda: y)
     filtered = initial.filtered
     memory = system.law.initial_memory(
         y,

@@ -247,6 +247,20 @@ class Plan:
         middle = system.centre
         return random_starts(system.game, middle, self.seeds[list(starts)].tolist(), self.spread)
 
+    def positions(
+        self, combination: Combination, starts: Sequence[int]
+    ) -> list[NDArray[np.float64] | None]:
+        """q(0) (m,) of these random starts, where positions follow outputs; else None.
+
+        Drawn as outputs are, in directions and at shares of their own.
+        """
+        system = combination.system
+        assert system is not None
+        if not self.starts or system.start_positions is None:
+            return [None] * len(starts)
+        seeds = [(int(seed), 1) for seed in self.seeds[list(starts)]]
+        return list(random_starts(system.game, system.centre, seeds, self.spread))
+
     def alone(self, run: int) -> Scenario:
         """The scenario of one run, with its start and seed written out.
 
@@ -262,7 +276,9 @@ class Plan:
             return scenario
         y = self.profiles(combination, [start])[0]
         assert combination.system is not None
-        table = scenario.systems[self.name].starting_at(y, combination.system.game.sizes)
+        position = self.positions(combination, [start])[0]
+        sizes = combination.system.game.sizes
+        table = scenario.systems[self.name].starting_at(y, sizes, position)
         simulation = scenario.simulation.model_copy(update={"seed": int(self.seeds[start])})
         return scenario.model_copy(update={"systems": {self.name: table}, "simulation": simulation})
 

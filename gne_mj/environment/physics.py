@@ -240,7 +240,7 @@ def _joints(plant: FleetPlant) -> list[list[slice]]:
     if not isinstance(plant, MjcfPlant):
         return []
     parts, at = [], np.zeros(3, dtype=int)
-    for robot in plant.agents.robots:
+    for robot in plant.agents.files:
         alone = mjcf_file.alone(robot.path)
         ends = at + np.array([alone.nq, alone.nv, alone.na])
         parts.append([slice(int(a), int(b)) for a, b in zip(at, ends, strict=True)])

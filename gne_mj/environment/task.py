@@ -18,6 +18,7 @@ from gne_mj.environment.physics import FleetPhysics
 from gne_mj.errors import GneError, InvalidInput, UserCodeError
 from gne_mj.game_model import Game
 from gne_mj.loops.feedback import LARGEST_INPUT
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.system import System
 
 Observation = OrderedDict[str, NDArray[np.float64]]
@@ -103,9 +104,10 @@ class FleetTask(control.Task):
         if y.shape != (agents.channels,) or not np.all(np.isfinite(y)):
             raise InvalidInput("start", y.tolist(), f"it must be {agents.channels} finite numbers")
         state = agents.equilibrium(y)
-        names = [name for name, _ in agents.kind.STATES]
-        place = names.index("position")
-        state[:, place] = self.system.state[:, place]
+        if followed_position(agents.kind) < 0:  # else positions are where outputs rest
+            names = [name for name, _ in agents.kind.STATES]
+            place = names.index("position")
+            state[:, place] = self.system.state[:, place]
         return state
 
     def before_step(self, action: ArrayLike, physics: FleetPhysics) -> None:

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from gne_mj.files import written
 from gne_mj.interface.tables import made
-from gne_mj.plants.flexible_robot import PlanarRobotAgents, RobotAgents
 from gne_mj.plants.integrator import IntegratorAgents
 from gne_mj.plants.mixed import MixedAgents
 from gne_mj.plants.mjcf_robot import MjcfAgents
 from gne_mj.plants.pi_cascade import PiCascadeAgents
+from gne_mj.plants.robot_tables import PlanarRobotAgents, RobotAgents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.toml_table import Table
 from gne_mj.user_files import CustomAgents
@@ -33,9 +33,13 @@ def flexible_robots(
     stiffness: ArrayLike = 1.0,
     atan_coefficient: ArrayLike = 1.0,
     damping: ArrayLike = 1.0,
+    output: str = "velocity",
+    lookahead: float | None = None,
+    local_damping: ArrayLike | None = None,
+    reference_velocity: ArrayLike | None = None,
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
-    """Robots on a lane: two masses, a spring and a damper [eq:MobileRobot]; y is the velocity.
+    """Robots on a lane: two masses, a spring and a damper [eq:MobileRobot].
 
     Args:
         count: N.
@@ -44,6 +48,11 @@ def flexible_robots(
         stiffness: linear part of psi in N/m.
         atan_coefficient: atan part of psi in N.
         damping: gamma in N s/m.
+        output: "velocity", or "position" for y = q + tau v.
+        lookahead: tau in s of such outputs, one for all.
+        local_damping: d in N s/m, the force being u - d v; 1.2 times the least that is proven
+            (docs/positions.md) if left out.
+        reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
         input_limit: in N.
     """
     return made(RobotAgents, type="flexible-robot", **locals())
@@ -57,6 +66,10 @@ def planar_robots(
     stiffness: ArrayLike = 1.0,
     atan_coefficient: ArrayLike = 1.0,
     damping: ArrayLike = 1.0,
+    output: str = "velocity",
+    lookahead: float | None = None,
+    local_damping: ArrayLike | None = None,
+    reference_velocity: ArrayLike | None = None,
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
     """The same robots in the plane, for games with ``dimension=2``.
@@ -68,6 +81,12 @@ def planar_robots(
         stiffness: linear part of psi in N/m.
         atan_coefficient: atan part of psi in N.
         damping: gamma in N s/m.
+        output: "velocity", or "position" for y = q + tau v.
+        lookahead: tau in s of such outputs, one for all.
+        local_damping: d in N s/m, the force being u - d v; 1.2 times the least that is proven
+            (docs/positions.md) if left out.
+        reference_velocity: v_0 in m/s, to which q and v are relative, two numbers or one for
+            both; 0 if left out.
         input_limit: in N.
     """
     return made(PlanarRobotAgents, type="planar-flexible-robot", **locals())
@@ -105,8 +124,11 @@ def mjcf_robots(
     count: int,
     file: str | Path | Sequence[str | Path],
     *,
-    output: str | Sequence[str],
-    input: str | Sequence[str],
+    output: str | Sequence[str] | Sequence[Sequence[str]],
+    input: str | Sequence[str] | Sequence[Sequence[str]],
+    lookahead: float | None = None,
+    local_damping: ArrayLike | None = None,
+    reference_velocity: ArrayLike | None = None,
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
     """Robots of your own, which MuJoCo moves.
@@ -114,8 +136,11 @@ def mjcf_robots(
     Args:
         count: N.
         file: an MJCF file, or its text, which begins with ``<``; one for all or one each.
-        output: the joint or velocity sensor that is y_i, likewise.
+        output: the joint or velocity sensor that is y_i, likewise; of vectors a list of names.
         input: the actuator that u_i drives, likewise.
+        lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
+        local_damping: d in N s/m, then: the force is u - d v.
+        reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
         input_limit: in N or N m.
     """
     each = [file] if isinstance(file, str | Path) else list(file)
@@ -127,6 +152,9 @@ def mjcf_robots(
         file=paths[0] if isinstance(file, str | Path) else paths,
         output=output,
         input=input,
+        lookahead=lookahead,
+        local_damping=local_damping,
+        reference_velocity=reference_velocity,
         input_limit=input_limit,
     )
 

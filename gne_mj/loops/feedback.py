@@ -89,6 +89,7 @@ class StepScratch(NamedTuple):
 
     now: Now
     g: Annotated[np.ndarray, "p"]  # constraint values at the last evaluation
+    at_positions: Annotated[np.ndarray, "p"]  # and at positions that follow outputs
     weights: Annotated[np.ndarray, "p"]  # rho / (-g - t)
     commanded: Annotated[np.ndarray, "m"]  # what the law asks for
     profile: Annotated[np.ndarray, "m"]  # an agent's own profile

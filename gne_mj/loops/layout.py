@@ -19,6 +19,7 @@ from gne_mj.loops.monitor import Monitor, MonitorNumbers
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers
 from gne_mj.parameter_block import ParameterBlock, floats
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import compiled_functions
 from gne_mj.plants.ode import Channels
@@ -42,6 +43,7 @@ class Steps(NamedTuple):
     solver: int
     method: int
     output: int  # which of a channel's states is its output
+    position: int  # and which a position that follows it; -1 without
 
 
 class Run(NamedTuple):
@@ -112,10 +114,11 @@ def parameter_arrays(
         setup.solver,
         clock.method,
         agents.kind.OUTPUT,
+        followed_position(agents.kind),
     )
     channels = Channels(
         np.ascontiguousarray(agents.parameters), np.ascontiguousarray(setup.equilibrium_state),
-        compiled_functions(agents.kind), steps.output,
+        compiled_functions(agents.kind), steps.output, steps.position,
     )  # fmt: skip
     run = Run(problem, channels, np.array(steps, dtype=np.int64), np.array([clock.h]))
     return [*plant, *arrays(run)]
@@ -158,7 +161,7 @@ def clock_in(parameter_block):
 def channels_in(parameter_block):
     """The agents' channels, from a run's parameter block."""
     steps = steps_in(parameter_block)
-    return _channels(parameter_block, steps.actions, steps.output)
+    return _channels(parameter_block, steps.actions, steps.output, steps.position)
 
 
 class Progress(Numbers):

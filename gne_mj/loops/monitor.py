@@ -46,6 +46,12 @@ class MonitorNumbers(Numbers):
     # Mode continuous, see gne_mj.loops.division
     divided: float  # steps that were divided
     smallest_step: float  # length in s of the shortest piece of one; 0 if none was divided
+    # Positions that follow outputs, see gne_mj.loops.positions
+    positions: float  # observations of them
+    positions_outside: float  # of these, those with a constraint that is violated there
+    positions_worst: float  # the greatest value of a constraint at them
+    positions_worst_time: float
+    positions_constraint: float  # which one
 
 
 class Monitor(NamedTuple):

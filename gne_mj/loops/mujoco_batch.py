@@ -4,6 +4,7 @@ Threads of our own rather than ``mujoco.batch.Batch``, whose rows cannot divide 
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from queue import SimpleQueue
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -99,6 +100,7 @@ class _Fleet:
                 getattr(plant.model, name)[at] = values[0]
             mujoco.mj_setConst(plant.model, plant.data)
             self._parameters = case.parameters
+            plant.agents = replace(plant.agents, parameters=case.parameters)  # which say a start
         plant.reset(case.state)
         sizes = steps_of(parameter_block)
         put_start(plant.data, parameter_block, sizes.mode, case.memory)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gne_mj.loops import division, faultless, functions
+from gne_mj.loops import division, faultless, functions, positions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
@@ -86,8 +86,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
         divided.known = division.OUTPUTS
         return True
     if instant and known != division.LAW:
-        # where a control period has passed
-        if clock.mode != CONTINUOUS and work.now.memory_step < at.step:
+        if clock.mode != CONTINUOUS and work.now.memory_step < at.step:  # a period has passed
             functions.propagate(problem, work.held, memory, work.scratch)
             work.now.memory_step = at.step
         faults.begin(parts, at, state, memory)
@@ -108,6 +107,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
     if at.stage == 0:
         before = work.u if clock.mode == CONTINUOUS else parts.u
         storage += functions.storage(problem, memory)
+        positions.observe(problem, parts.channels, work, monitor, at.time, state)
         watch.observe(monitor, parts.figures, at.time, work, before, work.u, storage)
         copy(work.u, parts.u)
     return True

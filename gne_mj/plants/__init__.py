@@ -1,5 +1,21 @@
 """Agents, and the engines that move them; nothing here knows a controller."""
 
-from gne_mj.plants import flexible_robot, integrator, mixed, mjcf_robot, pi_cascade
+from gne_mj.plants import (
+    flexible_robot,
+    integrator,
+    mixed,
+    mjcf_robot,
+    pi_cascade,
+    position_robot,
+    robot_tables,
+)
 
-__all__ = ["flexible_robot", "integrator", "mixed", "mjcf_robot", "pi_cascade"]
+__all__ = [
+    "flexible_robot",
+    "integrator",
+    "mixed",
+    "mjcf_robot",
+    "pi_cascade",
+    "position_robot",
+    "robot_tables",
+]

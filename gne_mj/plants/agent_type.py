@@ -3,6 +3,7 @@
 See :mod:`gne_mj.plants.integrator` for what each name means.
 """
 
+from collections.abc import Mapping
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -75,6 +76,43 @@ def placed_state(kind: ModuleType) -> str | None:
     return getattr(kind, "PLACED", None)
 
 
+def followed_position(kind: ModuleType) -> int:
+    """Which state is a position that follows the output, q' = (y - q)/tau; -1 without."""
+    return int(getattr(kind, "POSITION", -1))
+
+
+def start_keys(kind: ModuleType) -> set[str]:
+    """What may be given of a start: the output as ``action``, other states, what follows."""
+    names = [name for index, (name, _) in enumerate(kind.STATES) if index != kind.OUTPUT]
+    return {"action", *names, *(name for name, *_ in getattr(kind, "DERIVED", ()))}
+
+
+def start_of(
+    kind: ModuleType,
+    parameters: NDArray[np.float64],
+    rest: NDArray[np.float64],
+    given: Mapping[str, NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """(m, states) at the start.
+
+    Args:
+        kind, parameters: of the channels.
+        rest: (m, states) at rest at the outputs that are given, or else the default ones.
+        given: what is given of :func:`start_keys`, each (m,).
+
+    Raises:
+        InvalidInput: what is given does not go together.
+    """
+    if hasattr(kind, "start"):
+        found: NDArray[np.float64] = kind.start(parameters, rest, given)
+        return found
+    names, state = [name for name, _ in kind.STATES], rest.copy()
+    for key, values in given.items():
+        if key != "action":
+            state[:, names.index(key)] = values
+    return state
+
+
 def by_type(
     kind: ModuleType, parameters: NDArray[np.float64]
 ) -> list[tuple[ModuleType, NDArray[np.float64]]]:
@@ -91,6 +129,11 @@ def knows_storage(kind: ModuleType) -> bool:
 def is_passive(kind: ModuleType, parameters: NDArray[np.float64]) -> bool:
     """Whether it says that channels with these numbers meet [asmp:nonlinearPlant]."""
     return bool(getattr(kind, "is_passive", lambda _: False)(parameters))
+
+
+def why_not_passive(kind: ModuleType, parameters: NDArray[np.float64]) -> str:
+    """What is missing for that, in words; empty where the type tells no more."""
+    return str(getattr(kind, "why_not_passive", lambda _: "")(parameters))
 
 
 def energy_balance(

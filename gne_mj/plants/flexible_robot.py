@@ -12,19 +12,10 @@ opposite sign, which would not be monotone. V is the energy, int psi + M/2 x2^2 
 Channel parameters q = [M, m, stiffness, atan_coefficient, gamma].
 """
 
-import sys
-from typing import ClassVar, Literal
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
-from gne_mj.plants.agents import Agents
-from gne_mj.plants.table import AgentsTable, check_sizes
-from gne_mj.registry import AGENTS
-from gne_mj.toml_table import PerAgent, Sizes
 
 NAME = "flexible robot"
 PARAMETERS = ("main_mass", "appendage_mass", "stiffness", "atan_coefficient", "damping")
@@ -148,39 +139,3 @@ def storage_given(q, x, equilibrium_state, arctangent):
     )
     main, appendage = x[1] - equilibrium_state[1], x[2] - equilibrium_state[2]
     return spring + 0.5 * q[0] * main * main + 0.5 * q[1] * appendage * appendage
-
-
-class _RobotTable(AgentsTable):
-    """[eq:MobileRobot]"""
-
-    axes: ClassVar[int]
-    main_mass: PerAgent = Field(1.0, description="M in kg, positive")
-    appendage_mass: PerAgent = Field(1.0, description="m in kg, positive")
-    stiffness: PerAgent = Field(1.0, description="linear part of psi in N/m")
-    atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
-    damping: PerAgent = Field(1.0, description="gamma in N s/m")
-
-    def build(self, sizes: Sizes) -> Agents:
-        """The agents, for actions of so many entries each."""
-        check_sizes(self.type, self.axes, sizes)  # type: ignore[attr-defined]
-        names = PARAMETERS
-        table = self.rows(sizes, *names, positive=("main_mass", "appendage_mass"))
-        if np.any(table[:, 4] < 0):
-            raise InvalidInput("damping", self.damping, "no entry may be negative")
-        return Agents(sys.modules[__name__], table, self.limits(sizes), self.axes)
-
-
-@AGENTS.register
-class RobotAgents(_RobotTable):
-    """Robots on a lane."""
-
-    axes: ClassVar[int] = 1
-    type: Literal["flexible-robot"]
-
-
-@AGENTS.register
-class PlanarRobotAgents(_RobotTable):
-    """Robots in the plane, with the same masses, spring and damper along both axes."""
-
-    axes: ClassVar[int] = 2
-    type: Literal["planar-flexible-robot"]

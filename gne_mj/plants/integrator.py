@@ -6,8 +6,12 @@ and units; an empty unit stands for the action's), OUTPUT (which of them is y; t
 recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
 given parameters meet the theory's assumption), and the kernels below; x' is affine in u. It may
 define ``energy_balance``, from which the theory's rates follow, FLEET (the module of its fleets in
-MuJoCo, which has a ``PLANT``: :mod:`gne_mj.plants.fleet_plant`) and PLACED (the state that is a
-place, at which agents start apart).
+MuJoCo, which has a ``PLANT``: :mod:`gne_mj.plants.fleet_plant`), PLACED (the state that is a
+place, at which agents start apart), POSITION (the state that is a position which follows the
+output, :mod:`gne_mj.plants.lookahead`), DERIVED (what follows from its states, as triples of name,
+unit and function), POSITIONS (which states an Euler step moves by the new values of the others)
+with ``physical`` where that is so in other coordinates, ``start`` (the states at the start, of what
+is given) and ``why_not_passive`` (in words).
 """
 
 import sys

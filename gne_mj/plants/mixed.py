@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gne_mj.errors import part_of
+from gne_mj.errors import InvalidInput, part_of
 from gne_mj.native import kernel
 from gne_mj.plants import flexible_robot, integrator, pi_cascade
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.robot_tables import PlanarRobotAgents, RobotAgents
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import Sizes, Table, dimension_of
 
@@ -165,8 +166,8 @@ class MixedAgents(Table):
     type: Literal["mixed"]
     groups: list[
         Annotated[
-            flexible_robot.RobotAgents
-            | flexible_robot.PlanarRobotAgents
+            RobotAgents
+            | PlanarRobotAgents
             | integrator.IntegratorAgents
             | pi_cascade.PiCascadeAgents,
             Field(discriminator="type"),
@@ -183,6 +184,10 @@ class MixedAgents(Table):
         first, built = 0, []
         for index, group in enumerate(self.groups):
             with part_of(f"groups.{index}"):
+                if group.positions:
+                    raise InvalidInput(
+                        "output", "position", "in a mixed fleet robots' outputs are velocities"
+                    )
                 built.append(group.build(sizes[first : first + group.count]))
             first += group.count
         return join(built, dimension_of(sizes))

@@ -69,12 +69,14 @@ def check_apart(
     data: mujoco.MjData,
     owners: list[set[int]],
     robots: Sequence[RobotFile],
+    advice: str,
 ) -> None:
     """Refuse robots that overlap each other, or what only another one's file brings along.
 
     Args:
         data: with contacts.
-        model, owners, robots: of the fleet.
+        model, owners, robots: of the fleet, one an agent.
+        advice: how the refusal ends: what to do.
 
     Raises:
         InvalidInput: names the geoms and the agents.
@@ -88,6 +90,6 @@ def check_apart(
         raise InvalidInput(
             "robots",
             str(robots[i].path),
-            f"at the start '{names[0]}' of agent {i + 1} overlaps '{names[1]}' of agent {j + 1},"
-            " 2 m beside it: make its file narrower, or its floor a plane, which all share",
+            f"at the start '{names[0]}' of agent {i + 1} overlaps '{names[1]}' of agent {j + 1}"
+            f"{advice}",
         )

@@ -1,6 +1,7 @@
 """Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
 
 import sys
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, nearest
-from gne_mj.native import kernel
+from gne_mj.native import callback, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
@@ -22,17 +23,23 @@ from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
     Prediction,
     actuator_of,
+    damp,
     gather,
     refresh,
 )
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
+    CALLBACK,
     KNOWN_STATE,
     PLANT_MARK,
     USERDATA_HEADER,
+    Offsets,
+    address_of,
     callbacks,
     check_warnings,
+    offsets,
+    parameter_block_of,
     quiet,
     step_address,
 )
@@ -41,6 +48,9 @@ from gne_mj.records import by_name
 __all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
+# What to do where they do
+BESIDE = f", {SPACING:g} m beside it: make its file narrower, or its floor a plane, which all share"
+TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
 SENSOR = mujoco.mjtSensor
 VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
 
@@ -53,10 +63,26 @@ def stored(channels, state, userdata):
     return 0.0
 
 
+@cache
+def passive_callback(at: Offsets) -> Any:
+    """The C callback of the damping of robots whose outputs are positions."""
+    source = source_key()
+
+    def passive(model, data):
+        _ = source
+        struct = address_of(data)
+        parameter_block = abs(parameter_block_of(at, address_of(model), struct))
+        if parameter_block != 0:
+            damp(at, struct, parameter_block)
+
+    return callback(CALLBACK, passive)
+
+
 class MjcfPlant(FleetPlant):
     """A fleet of the user's own robots in MuJoCo.
 
-    Each file's bodies are attached to one world, side by side; all must have the same options
+    Each file's bodies are attached to one world, side by side, or at one place where their
+    positions are what they decide; all must have the same options
     (gravity, density, flags and so on); contacts are between a robot's own geoms and whatever its
     file brings along, a floor that several bring being one. A fleet starts from the models'
     reference pose at the given outputs. An input is the force of its actuator, gain and gear
@@ -79,7 +105,6 @@ class MjcfPlant(FleetPlant):
             that is no force, or that would clamp inputs that the agents' limit allows.
     """
 
-    passive = None
     agents: MjcfRobots
 
     def __init__(
@@ -94,8 +119,10 @@ class MjcfPlant(FleetPlant):
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
+        numbers = self._lookahead(agents)
+        self.passive = passive_callback(offsets()) if len(numbers) else None
         with named(path="agents.path"):
-            world, sizes_of_robots, memory_asked = _world(agents.robots)
+            world, sizes_of_robots, memory_asked = _world(agents)
         with named(world="agents.path"):
             self.model = compile_model(
                 world, timestep=timestep, integrator=INTEGRATORS[integrator],
@@ -123,17 +150,23 @@ class MjcfPlant(FleetPlant):
             *(step_address(name) for name in SENSOR_FUNCTIONS),
         )  # fmt: skip
         sizes = np.array([*self.sizes, *prediction], dtype=np.int64)
-        self.parameter_arrays = [flat, np.zeros(0), sizes]
+        self.parameter_arrays = [flat, numbers, sizes]
         self._parameter_block = ParameterBlock(self.parameter_arrays)
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
-        """The table's arrays; such robots have no numbers but those in their files."""
-        return self.parameter_arrays
+        """The table's arrays for agents with numbers of their own besides those in their files."""
+        places, _, sizes = self.parameter_arrays
+        return [places, self._lookahead(agents), sizes]
+
+    @staticmethod
+    def _lookahead(agents: Agents) -> NDArray[np.float64]:
+        """tau, d and v_0 of each channel; nothing where outputs are velocities."""
+        return np.ascontiguousarray(agents.parameters).ravel()
 
     def model_fields(
         self, parameters: NDArray[np.float64]
     ) -> list[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
-        """No numbers, no fields."""
+        """None: what files say is not changed."""
         return []
 
     @property
@@ -147,7 +180,7 @@ class MjcfPlant(FleetPlant):
         return bool(np.all(self.places.output >= 0))
 
     def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
-        model, prefix = self.model, f"robot_{i + 1}/"
+        model, prefix = self.model, f"robot_{i // self.agents.dimension + 1}/"
         joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + robot.output)
         sensor = _named(model, mujoco.mjtObj.mjOBJ_SENSOR, prefix + robot.output)
         actuator = _named(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input)
@@ -161,6 +194,10 @@ class MjcfPlant(FleetPlant):
         self._check_limit(i, robot, least)
         ctrl = int(model.actuator_ctrladr[actuator])
         if kind is not None:
+            if kind != SENSOR.mjSENS_JOINTVEL and self.passive is not None:
+                raise InvalidInput(
+                    "agents.output", robot.output, "with a lookahead it must be a joint"
+                )
             if kind != SENSOR.mjSENS_JOINTVEL:
                 return -1 - int(model.sensor_adr[sensor]), -1, ctrl
             joint = int(model.sensor_objid[sensor])
@@ -184,7 +221,8 @@ class MjcfPlant(FleetPlant):
             raise InvalidInput(
                 "agents.input_limit",
                 float(self.agents.input_limit[i]),
-                f"actuator '{robot.input}' of agent {i + 1} clamps its force: give a limit of at"
+                f"actuator '{robot.input}' of agent"
+                f" {i // self.agents.dimension + 1} clamps its force: give a limit of at"
                 f" most {least:g}",
             )
 
@@ -212,7 +250,12 @@ class MjcfPlant(FleetPlant):
         at, sensor = self.places.output, self.data.sensordata
         output = [self.data.qvel[a] if a >= 0 else sensor[-1 - a] for a in at]
         position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places.position]
-        return np.column_stack([output, position])
+        found = np.column_stack([output, position])
+        if self.passive is not None:
+            tau, _, reference = self.agents.parameters.T
+            found[:, 1] -= reference * self.data.time
+            found[:, 0] = found[:, 1] + tau * (found[:, 0] - reference)
+        return found
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class; of all joint velocities with these outputs the smallest are taken."""
@@ -222,15 +265,17 @@ class MjcfPlant(FleetPlant):
             if at >= 0:
                 self.data.qpos[at] = position
         slopes = np.empty((len(state), self.model.nv))
+        still = self.state[:, 0]
         for column in range(self.model.nv):
             self.data.qvel[:] = 0.0
             self.data.qvel[column] = 1.0
-            slopes[:, column] = self.state[:, 0]
-        self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0], rcond=None)[0]
+            slopes[:, column] = self.state[:, 0] - still
+        self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
+        advice = TOGETHER if self.agents.together else BESIDE
         with named(robots="agents.path"):
-            check_apart(self.model, self.data, self._owners, self.agents.robots)
+            check_apart(self.model, self.data, self._owners, self.agents.files, advice)
         missed = np.abs(self.state[:, 0] - state[:, 0])
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
@@ -243,7 +288,7 @@ class MjcfPlant(FleetPlant):
         """See the base class."""
         self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
         self.data.ctrl[self.places.actuator] = u
-        with callbacks():
+        with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)
 
@@ -251,10 +296,11 @@ class MjcfPlant(FleetPlant):
 PLANT = MjcfPlant
 
 
-def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], int]:
+def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
     """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
-    floor, across = world.geom("floor"), 0.5 * SPACING * (len(robots) - 1)
+    robots, spacing = agents.files, 0.0 if agents.together else SPACING
+    floor, across = world.geom("floor"), 0.5 * spacing * (len(robots) - 1)
     floor.pos[1], floor.size[1] = across, floor.size[1] + across
     for path in dict.fromkeys(robot.path for robot in robots):
         mjcf_file.alone(path)  # which finds what is wrong with it
@@ -266,7 +312,7 @@ def _world(robots: tuple[RobotFile, ...]) -> tuple[Any, list[tuple[int, int]], i
         mjcf_file.check_options(world, spec, robot.path)
         sizes.append(sizes_of(spec))
         memory += max(spec.memory, 0)
-        place = (0.0, SPACING * i, 0.0)
+        place = (0.0, spacing * i, 0.0)
         mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
     return world, sizes, memory
 

@@ -1,17 +1,25 @@
 """A fleet of the user's own robots as compiled code sees it, and its map over a control period.
 
 Nothing but MuJoCo knows how such robots move. The outputs at the end of a control period are
-therefore found by stepping a second mjData from the same state; it bears no mark, so that no
-callback of a loop acts on it.
+therefore found by stepping a second mjData from the same state. It bears no loop's mark, so that
+no law acts on it; the agents' own damping does.
 """
 
 from typing import NamedTuple
 
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers_in
-from gne_mj.parameter_block import integers
+from gne_mj.parameter_block import floats, integers
 from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
-from gne_mj.plants.native_mujoco import call, call_state, field, timed_step
+from gne_mj.plants.native_mujoco import (
+    PLANT_MARK,
+    USERDATA_HEADER,
+    call,
+    call_state,
+    field,
+    number,
+    timed_step,
+)
 from gne_mj.records import in_numbers
 
 
@@ -43,6 +51,9 @@ class ChannelPlace(Numbers):
 
 
 PLACE = len(names_of(ChannelPlace))
+# Between the places and the sizes: tau, d and v_0 of each channel; nothing where outputs are
+# velocities
+LOOKAHEAD = 1
 prediction_in = in_numbers(Prediction, SIZES, len(Sizes._fields))
 _place_in = numbers_in(ChannelPlace)
 
@@ -59,12 +70,35 @@ def gather(at, data, parameter_block, state):
     sizes = sizes_in(parameter_block)
     qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
     sensordata = field(data, at.sensordata, prediction_in(parameter_block).nsensordata)
-    places = integers(parameter_block, PLACES)
+    places, numbers = integers(parameter_block, PLACES), floats(parameter_block, LOOKAHEAD)
     for r in range(len(places) // PLACE):
         place = place_of(places, r)
         source, position = place.output, place.position
         state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
         state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
+        if len(numbers) > 0:
+            tau, reference = numbers[3 * r], numbers[3 * r + 2]
+            state[2 * r + 1] -= reference * number(data, at.time)
+            state[2 * r] = state[2 * r + 1] + tau * (state[2 * r] - reference)
+
+
+@kernel
+def mark_twin(at, parameter_block, twin):
+    """Let the agents' own damping act where a prediction is made."""
+    userdata = field(twin, at.userdata, USERDATA_HEADER)
+    userdata[0], userdata[1] = PLANT_MARK, float(parameter_block)
+
+
+@kernel
+def damp(at, data, parameter_block):
+    """Add every agent's own damping to mjData's passive forces."""
+    sizes, places = sizes_in(parameter_block), integers(parameter_block, PLACES)
+    qvel = field(data, at.qvel, sizes.nv)
+    force = field(data, at.qfrc_passive, sizes.nv)
+    numbers = floats(parameter_block, LOOKAHEAD)
+    for r in range(len(numbers) // 3):
+        joint = place_of(places, r).output
+        force[joint] -= numbers[3 * r + 1] * (qvel[joint] - numbers[3 * r + 2])
 
 
 @kernel
@@ -99,6 +133,7 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     prediction, places = prediction_in(parameter_block), integers(parameter_block, PLACES)
     twin = prediction.twin
     call_state(prediction.copy, model, data, twin, prediction.known)
+    mark_twin(at, parameter_block, twin)
     ctrl = field(twin, at.ctrl, sizes_in(parameter_block).nu)
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]

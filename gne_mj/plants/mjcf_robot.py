@@ -1,4 +1,4 @@
-"""A robot that is known by its MJCF alone: one measured velocity, one input.
+"""A robot that is known by its MJCF alone: for each of its axes a measured velocity and an input.
 
 Such agents run in MuJoCo only. Nothing is known of their storage function, so nothing is claimed
 of it; :mod:`gne_mj.passivity` examines them by experiment. Channel parameters: none.
@@ -15,10 +15,12 @@ from pydantic import Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
+from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.lookahead import LookaheadKeys
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
-from gne_mj.toml_table import Fills, Sizes
+from gne_mj.toml_table import Fills, Sizes, dimension_of
 
 NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
@@ -31,7 +33,7 @@ FLEET = "gne_mj.plants.mjcf_fleet"
 
 @dataclass(frozen=True)
 class RobotFile:
-    """One robot of a fleet.
+    """One robot of a fleet, along one of its axes.
 
     Args:
         path: its MJCF file.
@@ -51,18 +53,27 @@ class MjcfRobots(Agents):
     """A fleet of a user's own robots, which may differ from each other.
 
     Args:
-        robots: one an agent.
+        robots: one a channel; those of an agent name the same file.
+        together: whether all are put at one place, since their positions are what they decide;
+            else beside each other.
     """
 
     robots: tuple[RobotFile, ...] = ()
+    together: bool = False
+
+    @property
+    def files(self) -> tuple[RobotFile, ...]:
+        """One an agent."""
+        return self.robots[:: self.dimension]
 
     def repeated(self, copies: int) -> Self:
-        """See the base class."""
-        return replace(super().repeated(copies), robots=self.robots * copies)
+        """See the base class; several copies are put beside each other."""
+        apart = self.together and copies == 1
+        return replace(super().repeated(copies), robots=self.robots * copies, together=apart)
 
 
 def mjcf_robots(robots: tuple[RobotFile, ...], input_limit: np.ndarray) -> MjcfRobots:
-    """The fleet, with the greatest |u| (N,) that the actuators deliver, infinite for no limit."""
+    """The fleet of one axis each, with the greatest |u| (N,), infinite for no limit."""
     module = sys.modules[__name__]
     return MjcfRobots(module, np.zeros((len(robots), 0)), input_limit, robots=robots)
 
@@ -86,26 +97,54 @@ def storage(q, x, equilibrium_state):
 
 
 @AGENTS.register
-class MjcfAgents(AgentsTable):
-    """Robots of the user's own."""
+class MjcfAgents(AgentsTable, LookaheadKeys):
+    """Robots of the user's own; with a lookahead their outputs are positions."""
 
     engine: ClassVar[str] = "mujoco"
     type: Literal["mjcf-robot"]
     file: Annotated[str | list[str], Fills("path")] = Field(
         description="MJCF file, one for all or one each"
     )
-    output: str | list[str] = Field(description="joint or velocity sensor that is y_i")
-    input: str | list[str] = Field(description="actuator that u_i drives")
+    output: str | list[str] | list[list[str]] = Field(
+        description="joint or velocity sensor that is y_i; the joint of y = q + tau v; of vectors"
+        " a list of names, for all agents or each"
+    )
+    input: str | list[str] | list[list[str]] = Field(description="actuator that u_i drives")
+
+    @property
+    def positions(self) -> bool:
+        """See the base class."""
+        return self.lookahead is not None
 
     def build(self, sizes: Sizes) -> Agents:
-        """The agents, for actions of one entry each."""
-        check_sizes(self.type, 1, sizes)
-        columns = []
-        for key in ("file", "output", "input"):
-            given = getattr(self, key)
-            each = [given] * self.count if isinstance(given, str) else given
-            if len(each) != self.count:
-                raise InvalidInput(key, given, f"it must be one name or a list of {self.count}")
-            columns.append(each)
-        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*columns, strict=True))
-        return mjcf_robots(robots, self.limits(sizes))
+        """The agents, for actions of so many entries each."""
+        axes = dimension_of(sizes)
+        check_sizes(self.type, axes, sizes)
+        files = [self.file] * self.count if isinstance(self.file, str) else self.file
+        if len(files) != self.count:
+            raise InvalidInput("file", self.file, f"it must be one name or a list of {self.count}")
+        names = (np.repeat(files, axes), self._names("output", axes), self._names("input", axes))
+        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*names, strict=True))
+        kind, numbers = sys.modules[__name__], np.zeros((len(robots), 0))
+        if self.positions:
+            tau = np.full(len(robots), self.lookahead)
+            parts = tau, self.damping_rows(sizes, None), self.reference_rows(sizes)
+            kind, numbers = mjcf_position, np.column_stack(parts)
+        else:
+            self.check_unused("it is for robots with a lookahead, whose outputs are positions")
+        return MjcfRobots(kind, numbers, self.limits(sizes), axes, robots, self.positions)
+
+    def _names(self, key: str, axes: int) -> list[str]:
+        """Of every channel, from one name for all agents or one each; of vectors lists of names."""
+        given, rows = getattr(self, key), []
+        if isinstance(given, str):
+            rows = [[given]] * self.count
+        elif axes > 1 and all(isinstance(entry, str) for entry in given):
+            rows = [given] * self.count
+        else:
+            rows = [[entry] if isinstance(entry, str) else entry for entry in given]
+        if [len(row) for row in rows] != [axes] * self.count:
+            one = "one name" if axes == 1 else f"a list of {axes} names"
+            many = "" if axes == 1 else " such lists"
+            raise InvalidInput(key, given, f"it must be {one} or a list of {self.count}{many}")
+        return [name for row in rows for name in row]

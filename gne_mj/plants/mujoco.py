@@ -185,14 +185,17 @@ class MujocoPlant(FleetPlant):
         memory: int = 0,
         decorated: bool = True,
     ) -> None:
-        if agents.kind is not AGENT:
-            raise InvalidInput("agents", agents.kind.NAME, "this fleet is of flexible robots")
+        kernels: Any = sys.modules[type(self).__module__]
+        if agents.kind is not kernels.AGENT:
+            raise InvalidInput(
+                "agents", agents.kind.NAME, f"this fleet is of {kernels.AGENT.NAME}s"
+            )
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
-        self.kernels = sys.modules[__name__]
-        self.passive = passive_callback(offsets())
+        self.kernels = kernels
+        self.passive = kernels.passive_callback(offsets())
         with part_of("agents"), named(world="agents"):
             self.model = compile_model(
-                compose(agents.parameters, dimension=agents.dimension, decorated=decorated),
+                compose(agents.parameters[:, :5], dimension=agents.dimension, decorated=decorated),
                 timestep=timestep,
                 integrator=INTEGRATORS[integrator],
                 userdata=ARCTANGENTS + agents.channels + userdata,
@@ -220,21 +223,22 @@ class MujocoPlant(FleetPlant):
         model = self.model
         workspace = ARCTANGENTS + self.agents.channels
         self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
-        return [
-            flat,
-            np.ascontiguousarray(self.agents.parameters[:, 3]),
-            np.array(self.sizes, dtype=np.int64),
-        ]
+        return [flat, self._forces(self.agents), np.array(self.sizes, dtype=np.int64)]
+
+    @staticmethod
+    def _forces(agents: Agents) -> NDArray[np.float64]:
+        """What the passive callback needs of the agents: ATAN."""
+        return np.ascontiguousarray(agents.parameters[:, 3])
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
         """The table's arrays for agents with numbers of their own, as in a batch of runs."""
         places, _, sizes = self.parameter_arrays
-        return [places, np.ascontiguousarray(agents.parameters[:, 3]), sizes]
+        return [places, self._forces(agents), sizes]
 
     def model_fields(
         self, parameters: NDArray[np.float64]
     ) -> list[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
-        """What robots' numbers (runs, m, 5) are in mjModel: field, its entries, values (runs, k).
+        """What robots' numbers (runs, m, ...) are in mjModel: field, its entries, values (runs, k).
 
         What MuJoCo derives from them (``mj_setConst``) is not among them, nor is the atan term.
         """

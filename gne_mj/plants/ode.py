@@ -21,6 +21,7 @@ class Channels(NamedTuple):
     ]  # (m, states) equilibrium, from which V is measured
     functions: Annotated[np.ndarray, "n", int]  # addresses, see gne_mj.plants.functions
     output: int  # which of a channel's states is its output
+    position: int = -1  # and which a position that follows it; -1 without
 
 
 class OdePlant(Plant):

@@ -30,6 +30,11 @@ class AgentsTable(Table):
         None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
 
+    @property
+    def positions(self) -> bool:
+        """Whether outputs are positions with a look-ahead, see gne_mj.plants.lookahead."""
+        return False
+
     def limits(self, sizes: Sizes) -> NDArray[np.float64]:
         """(m,) limits, infinite where none is given."""
         if self.input_limit is None:

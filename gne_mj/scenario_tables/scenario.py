@@ -23,7 +23,7 @@ from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
-from gne_mj.plants.agent_type import placed_state
+from gne_mj.plants.agent_type import placed_state, start_keys, start_of
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, MODES, load_plugins
@@ -49,13 +49,22 @@ class PlantTable(Table):
     )
 
 
+# Keys of a start that are agents' own: their outputs, other states, and what follows from them
+STARTS = ("action", "extension", "appendage_velocity", "position", "velocity", "integral")
+
+
 class InitialTable(Table):
     """The start; what is left out rests, relaxed, at the default actions."""
 
     action: Annotated[PerAction | None, Fills("state")] = Field(None, description="y(0)")
     extension: PerAction | None = Field(None, description="robots: x1(0) in m")
     appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
-    position: PerAction | None = Field(None, description="robots: d(0) in m")
+    position: PerAction | None = Field(
+        None, description="robots: d(0), or q(0) of outputs that are positions, in m"
+    )
+    velocity: PerAction | None = Field(
+        None, description="v(0) in m/s of robots whose outputs are positions, relative to v_0"
+    )
     integral: PerAction | None = Field(None, description="PI cascade: s(0)")
     estimate: Annotated[float | list[float] | list[list[float]] | None, Fills("memory")] = Field(
         None, description="one number, a profile that all agents hold, or one profile each; y(0)"
@@ -72,14 +81,15 @@ class InitialTable(Table):
         placed = placed_state(agents.kind)
         if placed is not None:
             state[:, names.index(placed)] = _places(sizes)
-        for key in ("extension", "appendage_velocity", "position", "integral"):
-            given = getattr(self, key)
-            if given is None:
+        given = {}
+        for key in STARTS:
+            value = getattr(self, key)
+            if value is None:
                 continue
-            if key not in names:
-                raise InvalidInput(key, given, f"{agents.kind.NAME}s have no {key}")
-            state[:, names.index(key)] = per_action(key, given, sizes)
-        return state
+            if key not in start_keys(agents.kind):
+                raise InvalidInput(key, value, f"{agents.kind.NAME}s have no {key}")
+            given[key] = per_action(key, value, sizes)
+        return start_of(agents.kind, agents.parameters, state, given)
 
 
 class SystemTable(Table):
@@ -230,12 +240,19 @@ class SystemTable(Table):
         system = table.model_copy(update={"initial": initial}).build(name, simulation)
         return system, {"why": why, "action": profile.tolist()}
 
-    def starting_at(self, y: NDArray[np.float64], sizes: Sizes) -> "SystemTable":
-        """The same system with y(0) = y, shape (m,)."""
-        blocks = np.split(y, np.cumsum(sizes)[:-1])
-        action = [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
-        initial = self.initial.model_copy(update={"action": action})
-        return self.model_copy(update={"initial": initial})
+    def starting_at(
+        self, y: NDArray[np.float64], sizes: Sizes, position: NDArray[np.float64] | None = None
+    ) -> "SystemTable":
+        """The same system with y(0) = y, shape (m,).
+
+        Where positions follow outputs q(0) is ``position`` (m,) or, if left out, y: at rest, and
+        inside as y is.
+        """
+        update: dict[str, Any] = {"action": _by_agent(y, sizes)}
+        if getattr(self.agents, "positions", False):
+            at = None if position is None else _by_agent(position, sizes)
+            update |= {"position": at, "velocity": None}
+        return self.model_copy(update={"initial": self.initial.model_copy(update=update)})
 
     def _parts(self, simulation: "SimulationTable") -> tuple[Game, Agents]:
         """The game, with its margin, and the agents."""
@@ -416,6 +433,12 @@ class Scenario(Table):
 def _kind(table: Table) -> str:
     """Which of the tables that may stand there it is."""
     return str(getattr(table, "type", None) or getattr(table, "information", ""))
+
+
+def _by_agent(y: NDArray[np.float64], sizes: Sizes) -> Any:
+    """Numbers (m,) as a table has them: a list, of lists where actions are vectors."""
+    blocks = np.split(y, np.cumsum(sizes)[:-1])
+    return [block.tolist() for block in blocks] if max(sizes) > 1 else y.tolist()
 
 
 def _places(sizes: Sizes) -> NDArray[np.float64]:

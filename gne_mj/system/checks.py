@@ -107,6 +107,12 @@ def check_start(system: SystemData) -> None:
         tight = system.game.constraints(system.start) + system.game.margins
     if not value < 0.0:
         raise InfeasibleStart(key, what, system.game.constraint_names[worst], value)
+    positions = system.start_positions
+    if positions is not None:  # which stay inside with the outputs if they begin there
+        what_of = f"initial positions {np.round(positions[:6], 4).tolist()}"
+        at, far = system.game.tightest(positions)
+        if not far < 0.0:
+            raise InfeasibleStart(key, what_of, system.game.constraint_names[at], far)
     worst = int(np.argmax(tight))
     if not tight[worst] < 0.0:
         name = (

@@ -16,6 +16,7 @@ from gne_mj.game_model import Game
 from gne_mj.loops import faultless
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.plants.agents import Agents
 
 
@@ -44,6 +45,12 @@ class SystemData:
     def start(self) -> NDArray[np.float64]:
         """y(0), shape (m,)."""
         return self.state[:, self.agents.kind.OUTPUT]
+
+    @property
+    def start_positions(self) -> NDArray[np.float64] | None:
+        """q(0), shape (m,), of agents whose positions follow their outputs; None of others."""
+        at = followed_position(self.agents.kind)
+        return None if at < 0 else self.state[:, at]
 
     @property
     def equilibrium(self) -> Equilibrium:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gne_mj.margins import is_affine
-from gne_mj.plants.agent_type import by_type, energy_balance, is_passive
+from gne_mj.plants.agent_type import by_type, energy_balance, is_passive, why_not_passive
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
@@ -87,6 +87,9 @@ def plants(system: System) -> Assumption:
     names = ", ".join(f"{kind.NAME}s" for kind, _ in kinds)
     if all(is_passive(kind, rows) for kind, rows in kinds):
         return Assumption(label, MET, f"{names} with these parameters are passive")
+    missing = [why_not_passive(kind, rows) for kind, rows in kinds]
+    if any(missing):
+        return Assumption(label, FAILS, "; ".join(filter(None, missing)))
     if all(energy_balance(kind, rows) is not None for kind, rows in kinds):
         return Assumption(label, FAILS, f"{names} with these parameters need not be passive")
     return Assumption(label, UNKNOWN, f"nothing is known of the storage function of {names}")

@@ -17,6 +17,7 @@ from gne_mj.theory.constants import SAMPLED, told
 from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
+from gne_mj.theory.positions import positions_of
 from gne_mj.theory.theorem import HELD, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
@@ -45,6 +46,7 @@ class Guarantees:
     periods: dict[str, Any]
     division: dict[str, Any] | None
     held: dict[str, Any] | None
+    positions: dict[str, Any] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
     measured: list[str]
@@ -80,6 +82,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     theorem = Theorem(system)
     held = ZeroOrderHold(system, clock) if mode_of(system).promises else None
     law, pieces = system.law, forecast(system, clock)
+    positions = positions_of(system, clock)
     known = system.known_equilibrium
     return Guarantees(
         system=_system(system),
@@ -114,10 +117,17 @@ def certify(system: System, clock: Clock) -> Guarantees:
         held=None
         if held is None
         else {**held.report(), "period_search": None, "push_search": None},
+        positions=None if positions is None else positions.report(),
         lyapunov_claimed=theorem.lyapunov,
-        guaranteed=verdict.guaranteed(theorem, held),
+        guaranteed=[
+            *verdict.guaranteed(theorem, held),
+            *([] if positions is None else positions.guaranteed(theorem, held)),
+        ],
         measured=verdict.measured(theorem, pieces),
-        not_certified=verdict.not_certified(theorem, held, pieces),
+        not_certified=[
+            *verdict.not_certified(theorem, held, pieces),
+            *([] if positions is None else positions.not_certified(held)),
+        ],
     )
 
 

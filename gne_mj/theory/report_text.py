@@ -1,5 +1,6 @@
 """Guarantees in words."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -57,12 +58,25 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "steps", _division(g["division"])
     if g["held"] is not None:
         yield from _held(g["held"])
+    if g["positions"] is not None:
+        yield "positions", _positions(g["positions"])
     for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
     for n, sentence in enumerate(g["measured"]):
         yield "only measured" if n == 0 else "", sentence
     for n, sentence in enumerate(g["not_certified"]):
         yield "not certified" if n == 0 else "", sentence
+
+
+def _positions(positions: dict[str, Any]) -> str:
+    conditions = [f"[{c['label']}] {c['status']}: {c['why']}" for c in positions["conditions"]]
+    damping, least = positions["local_damping"], positions["least_damping"]
+    if least is None:
+        known = "the least local damping is not known"
+    else:
+        over = [math.inf if b is None else a / b for a, b in zip(damping, least, strict=True)]
+        known = f"local damping from {min(over):.4g} times the least that is proven on"
+    return "; ".join([*conditions, known])
 
 
 def _constants(g: dict[str, Any]) -> Iterator[tuple[str, str]]:

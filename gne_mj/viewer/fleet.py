@@ -59,7 +59,7 @@ class Fleet:
                 )
             return recorded
         state, at = values["state"], self.plant.places
-        extension, position = state[:, :, 0], state[:, :, 3]
+        extension, position = state[:, :, 0], values.get("place", state[:, :, 3])
         found = np.zeros((len(state), self.plant.model.nq))
         found[:, at.main_q] = position
         found[:, at.appendage_q] = position - extension
@@ -92,7 +92,7 @@ class Fleet:
         plant, model, count = self.plant, self.plant.model, self.agents
         if isinstance(plant, MujocoPlant):
             return [int(model.body(f"robot_{i + 1}/main").id) for i in range(count)]
-        joints = plant.output_joints
+        joints = plant.output_joints[:: plant.agents.dimension]
         return [
             int(model.dof_bodyid[joint]) if joint >= 0 else _first_body(model, f"robot_{i + 1}/")
             for i, joint in enumerate(joints)
