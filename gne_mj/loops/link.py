@@ -51,7 +51,7 @@ def link(
     game: ModuleType,
     *,
     memory: bool,
-    held: bool = False,
+    held: bool,
     others: Mapping[int, Any] = NO_OTHERS,
 ) -> NDArray[np.int64]:
     """The addresses for ``problem.functions``: those that a run calls, the others 0.
