@@ -69,7 +69,7 @@ NETWORKS = [
 def problem_of(game, law, limit=np.inf):
     bounds = np.full(game.actions, limit)
     settings, y = law.settings(RHO), np.zeros(game.actions)
-    addresses = link(law.kernels, game.kernels, memory=law.graph is not None)
+    addresses = link(law.kernels, game.kernels, memory=law.graph is not None, held=False)
     return Problem(
         game.data, law.graph_data, settings, bounds, y, no_propagator(), functions=addresses
     )

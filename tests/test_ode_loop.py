@@ -135,7 +135,7 @@ def test_sampled_memory_is_propagated_exactly(graph, substeps):
         np.full(10, np.inf),
         np.zeros(10),
         law.propagator(period),
-        functions=link(law.kernels, game.kernels, memory=True),
+        functions=link(law.kernels, game.kernels, memory=True, held=True),
     )
     loop_clock = LoopClock(period / substeps, substeps, SAMPLED, RK4)
     setup = Setup(problem, np.zeros((10, 1)), loop_clock)

@@ -52,6 +52,7 @@ def link(
     game: ModuleType,
     *,
     memory: bool,
+    held: bool,
     others: Mapping[int, Any] = NO_OTHERS,
 ) -> NDArray[np.int64]:
     """The addresses for ``problem.functions``: those that a run calls, the others 0.
@@ -59,13 +60,14 @@ def link(
     Args:
         law, game: modules of kernels.
         memory: whether the law has one.
+        held: whether its inputs are, so that the memory moves once a control period.
         others: C functions besides the law's own, by their entry: of the mode, of the schedule.
     """
     addresses = np.zeros(functions.COUNT, dtype=np.int64)
     addresses[functions.ACTION] = action(law, game).address
     owners: dict[int, Any] = {}
     if memory:
-        owners |= of_memory(law)
+        owners |= of_memory(law, held)
     for entry, owner in {**owners, **others}.items():
         addresses[entry] = owner.address
     return addresses
@@ -94,7 +96,7 @@ def _action(game: ModuleType, law: ModuleType) -> list[Any]:
 
 
 @cache
-def of_memory(law: ModuleType) -> dict[int, Any]:
+def of_memory(law: ModuleType, held: bool) -> dict[int, Any]:
     """What moves a law's memory, and its storage."""
     source = source_key(law)
 
@@ -121,11 +123,12 @@ def of_memory(law: ModuleType) -> dict[int, Any]:
         _ = source
         return law.storage(problem_in(block), floats_at(memory, steps_in(block).memory))
 
-    return {
-        functions.RATE: callback(_whole(*[_whole] * 4), rate),
-        functions.PROPAGATE: callback(_whole(*[_whole] * 5), propagate),
-        functions.STORAGE: callback(_real(_whole, _whole), storage),
-    }
+    found = {functions.STORAGE: callback(_real(_whole, _whole), storage)}
+    if held:
+        found[functions.PROPAGATE] = callback(_whole(*[_whole] * 5), propagate)
+    else:
+        found[functions.RATE] = callback(_whole(*[_whole] * 4), rate)
+    return found
 
 
 @cache

@@ -93,7 +93,7 @@ class Assembly(SystemData):
         """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
         return link(
             self.law.kernels, self.game.kernels,
-            memory=bool(len(self.loop_memory)), others=self._others,
+            memory=bool(len(self.loop_memory)), held=mode_of(self).held, others=self._others,
         )  # fmt: skip
 
     def law_settings(self, rho: float) -> NDArray[np.float64]:

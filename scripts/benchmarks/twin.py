@@ -55,7 +55,7 @@ class Twin:
         self.problem = Problem(
             self.game.data, self.graph.data, self.law.settings(RHO), np.full(N, np.inf),
             np.zeros(N), no_propagator(),
-            functions=link(self.law.kernels, self.game.kernels, memory=True),
+            functions=link(self.law.kernels, self.game.kernels, memory=True, held=False),
         )  # fmt: skip
         self.memory = self.law.initial_memory(np.full(N, START))
         flat = np.concatenate([self.start.ravel(), self.memory])
