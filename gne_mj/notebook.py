@@ -30,13 +30,11 @@ def notebook_html(trajectory: Trajectory) -> str:
 
 def _figures(trajectory: Trajectory) -> str:
     from gne_mj import plots
-    from gne_mj.plots.style import pyplot
 
     found = ""
     for name, figure in plots.draw(trajectory).items():
         stream = BytesIO()
         figure.savefig(stream, format="png", dpi=DPI)
-        pyplot().close(figure)
         data = b64encode(stream.getvalue()).decode("ascii")
         found += f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
     return found

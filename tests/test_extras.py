@@ -71,11 +71,11 @@ def test_a_part_says_so_when_it_is_imported(monkeypatch, missing, module, packag
 
 
 def test_figures_say_so_when_they_are_drawn(missing):
-    from gne_mj.plots.style import pyplot
+    from gne_mj.plots.style import styled
 
     missing("matplotlib")
-    with pytest.raises(MissingExtra, match="drawing figures needs matplotlib"):
-        pyplot()
+    with pytest.raises(MissingExtra, match="drawing figures needs matplotlib"), styled():
+        pass
 
 
 def test_the_extras_are_those_of_the_package():

@@ -434,3 +434,18 @@ def test_the_ten_lines_run(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
     for words in ("Trajectory of players", "certified", "variational GNE"):
         assert words in printed
+
+
+def test_figures_leave_pyplot_and_its_backend_alone():
+    code = (
+        "import sys, matplotlib; matplotlib.use('svg');"
+        "import gne_mj as gm; from gne_mj.expressions import game;"
+        "one = game(2, lambda i, y, p: y[i]**2, lambda y, p: iter([y.sum() <= 1.0]));"
+        "run = gm.run(one, start=0.1, duration=0.01); figures = run.plot(); figures._repr_html_();"
+        "print(matplotlib.get_backend(), 'matplotlib.pyplot' in sys.modules, len(figures) > 1)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**environment(), "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.split() == ["svg", "False", "True"], done.stderr

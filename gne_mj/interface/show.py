@@ -80,12 +80,9 @@ def plot(
         InvalidInput: the folder cannot be written to.
     """
     from gne_mj import plots
-    from gne_mj.plots.style import pyplot
 
     trajectory = _trajectory(shown)
     figures = Figures(plots.draw(trajectory))
-    for figure in figures.values():  # pyplot need not remember them
-        pyplot().close(figure)
     if folder is not None:
         with storing("folder", Path(folder)):
             Path(folder).mkdir(parents=True, exist_ok=True)

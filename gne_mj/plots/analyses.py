@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from gne_mj.exit_map import Cell
-from gne_mj.plots.style import STYLE, line_style, pyplot
+from gne_mj.plots.style import line_style, styled, subplots
 from gne_mj.solutions import Solution, bounds_of
 
 
 def save_path(solution: Solution, file: Path) -> None:
     """Draw how a path of equilibria nears the variational GNE as rho falls, in log scales."""
-    plt = pyplot()
     rho = np.array([point.equilibrium.rho for point in solution.path])
     lines = {
         "distance to the vGNE": [point.distance for point in solution.path],
@@ -22,8 +21,8 @@ def save_path(solution: Solution, file: Path) -> None:
             bounds_of(solution.game, point)["bound"] or np.nan for point in solution.path
         ],
     }
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=(4.6, 2.9), layout="constrained")
+    with styled():
+        figure, ((axes,),) = subplots(1, 1, 4.6, 2.9)
         for index, (label, values) in enumerate(lines.items()):
             nowhere = not np.any(np.asarray(values) > 0.0)  # log scales have no place for zero
             label += " (zero)" if nowhere else ""
@@ -31,7 +30,6 @@ def save_path(solution: Solution, file: Path) -> None:
         axes.set_xlabel("penalty parameter $\\rho$")
         axes.legend()
         figure.savefig(file, dpi=200)
-    plt.close(figure)
 
 
 def save_map(cells: Sequence[Cell], file: Path) -> None:
@@ -41,15 +39,14 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
     at a control instant, a ring those that were left between instants only, a bar those that were
     refused.
     """
-    plt = pyplot()
     modes = list(dict.fromkeys(cell.mode for cell in cells))
     pushes = sorted({cell.push for cell in cells})
     periods = sorted({cell.period for cell in cells})
     margins = sorted({cell.margin for cell in cells})
-    with plt.rc_context({**STYLE, "axes.grid": False}):
-        figure, grid = plt.subplots(
-            len(modes), len(pushes), figsize=(1.4 + 2.3 * len(pushes), 0.9 + 1.9 * len(modes)),
-            layout="constrained", sharex=True, sharey=True, squeeze=False,
+    with styled(**{"axes.grid": False}):
+        figure, grid = subplots(
+            len(modes), len(pushes), 1.4 + 2.3 * len(pushes), 0.9 + 1.9 * len(modes),
+            sharex=True, sharey=True,
         )  # fmt: skip
         for axes, (mode, push) in zip(grid.flat, product(modes, pushes), strict=True):
             share = np.full((len(margins), len(periods)), np.nan)
@@ -86,4 +83,3 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
             axes.set_ylabel("margin of the start")
         figure.colorbar(image, ax=grid, label="share that left the set", shrink=0.8)
         figure.savefig(file, dpi=180)
-    plt.close(figure)

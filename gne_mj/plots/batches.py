@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.batch_variables import figures
-from gne_mj.plots.style import STYLE, line_style, pyplot
+from gne_mj.plots.style import line_style, styled, subplots
 from gne_mj.run_metrics import SUCCESSES
 from gne_mj.variables import Panel
 
@@ -33,17 +33,13 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
         file: to write.
         kind: of file: png, pdf or svg.
     """
-    plt = pyplot()
     key = _horizontal(runs)
     lines = _groups(runs, key)
     early = ~np.isin(runs["status"].to_numpy(), SUCCESSES)
     shown = [(each.name, each.panel) for each in figures() if each.panel and each.name in runs]
     panels = len(shown) + bool(early.any())
-    with plt.rc_context(STYLE):
-        figure, grid = plt.subplots(
-            1, panels, figsize=(2.9 * panels, 2.9), layout="constrained", squeeze=False,
-            sharex=key is not None,
-        )  # fmt: skip
+    with styled():
+        figure, grid = subplots(1, panels, 2.9 * panels, 2.9, sharex=key is not None)
         for axes, (name, panel) in zip(grid[0], shown, strict=False):
             unit, values = runs[name].attrs.get("units", ""), runs[name].to_numpy()
             label = f"{panel.title} ({unit})" if unit else panel.title
@@ -72,7 +68,6 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
         if planned > runs.sizes["run"]:
             figure.suptitle(f"partial: {runs.sizes['run']:,} of {planned:,} runs", fontsize=8.5)
         figure.savefig(file, dpi=200, format=kind)
-    plt.close(figure)
 
 
 def _others(runs: "xarray.Dataset", key: str | None) -> list[str]:

@@ -1,5 +1,7 @@
 """What all figures share: readable in grey, in the paper's style."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from gne_mj.extras import need
@@ -27,19 +29,27 @@ STYLE: Any = {
 }
 
 
-def pyplot() -> Any:
-    """``matplotlib.pyplot``, slow to import, for files alone.
+@contextmanager
+def styled(**settings: Any) -> Iterator[None]:
+    """Draw in this style, with these settings besides.
 
     Raises:
         MissingExtra: matplotlib is not installed.
     """
     need("plots", "drawing figures")
-    import matplotlib
+    from matplotlib import rc_context
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    both: Any = dict(STYLE, **settings)
+    with rc_context(both):
+        yield
 
-    return plt
+
+def subplots(rows: int, columns: int, width: float, height: float, **how: Any) -> Any:
+    """A figure of a size in inches and its (rows, columns) axes; pyplot knows nothing of it."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 
 def axis_label(words: str, symbol: str, unit: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.files import refuse_existing, written
-from gne_mj.plots.style import LEGEND, STYLE, axis_label, line_style, pyplot
+from gne_mj.plots.style import LEGEND, axis_label, line_style, styled, subplots
 from gne_mj.progress import Tell, nothing
 from gne_mj.run_metrics import SUCCESSES
 from gne_mj.trajectory import Trajectory
@@ -30,7 +30,7 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     ``robots-gaps`` or, where it is one number, ``channels-total-power``.
     """
     figures = {}
-    with pyplot().rc_context(STYLE):
+    with styled():
         for name in trajectory.tree.children:
             data = trajectory[name]
             titles = {"action": data["action"].attrs["long_name"]}
@@ -67,18 +67,14 @@ def save(
     paths = {name: [Path(folder) / f"{name}.{kind}" for kind in formats] for name in figures}
     files, done = len(figures) * len(formats), 0
     progress(done, files, f"{files} figures")
-    try:
-        if not replace:
-            refuse_existing("folder", [path for each in paths.values() for path in each])
-        for name, figure in figures.items():
-            for path in paths[name]:
-                with written("folder", path, replace=replace) as new:
-                    figure.savefig(new, dpi=200)
-                done += 1
-                progress(done, files, f"{done} of {files} figures")
-    finally:
-        for figure in figures.values():
-            pyplot().close(figure)
+    if not replace:
+        refuse_existing("folder", [path for each in paths.values() for path in each])
+    for name, figure in figures.items():
+        for path in paths[name]:
+            with written("folder", path, replace=replace) as new:
+                figure.savefig(new, dpi=200)
+            done += 1
+            progress(done, files, f"{done} of {files} figures")
     return [path for each in paths.values() for path in each]
 
 
@@ -89,10 +85,7 @@ def _plural(noun: str) -> str:
 
 def _figure(data: "xarray.Dataset", panels: int, width: float) -> tuple["Figure", list["Axes"]]:
     """Empty panels above each other, over time."""
-    figure, grid = pyplot().subplots(
-        panels, 1, figsize=(width, 1.0 + 1.9 * panels), layout="constrained", sharex=True,
-        squeeze=False,
-    )  # fmt: skip
+    figure, grid = subplots(panels, 1, width, 1.0 + 1.9 * panels, sharex=True)
     time = data["time"].to_numpy()
     axes: list[Axes] = list(grid[:, 0])
     axes[-1].set_xlabel("time (s)")
