@@ -173,7 +173,7 @@ class EquilibriumSolver:
     def __init__(self, game: Game) -> None:
         m, p = game.actions, game.constraints_count
         self._data = game.data
-        self._game, self._name = proxy(game), game.name  # which may be forgotten before this is
+        self._game, self._name = proxy(game), game.called  # which may be forgotten before this is
         self._holes = game.constraint_class is None
         self._native = method.build()
         self._lock = Lock()
@@ -183,7 +183,7 @@ class EquilibriumSolver:
             raise InvalidInput(
                 "game.agents",
                 game.agents,
-                f"the {game.name} game couples up to {self._half_band} actions with each other,"
+                f"the {game.called} couples up to {self._half_band} actions with each other,"
                 " which is too much work for its equilibria",
             )
         agents, constraints = np.arange(game.agents), np.arange(p)
@@ -356,9 +356,9 @@ class EquilibriumSolver:
             )
         self._game.check_numbers(self._point.y)
         reason = {
-            method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name} game",
-            method.NO_WAY_ON: f"Newton's method found no way on in the {self._name} game",
-            method.TOO_MANY: f"the equilibrium of the {self._name} game was not found",
+            method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name}",
+            method.NO_WAY_ON: f"Newton's method found no way on in the {self._name}",
+            method.TOO_MANY: f"the equilibrium of the {self._name} was not found",
         }[ended]
         iterations, error = int(self._report[method.ITERATIONS]), float(self._report[method.ERROR])
         raise SolverError(reason, error, iterations)

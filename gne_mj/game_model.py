@@ -331,6 +331,11 @@ class Game:
                 for agents in self.in_constraint]  # fmt: skip
         return _compress(rows)
 
+    @property
+    def called(self) -> str:
+        """What sentences call it: its name and the word game, once."""
+        return self.name if self.name.endswith("game") else f"{self.name} game"
+
     @cached_property
     def own_constraints(self) -> NDArray[np.int64]:
         """p_i, the number of constraints of each agent that contain y_i, shape (N,)."""
@@ -420,7 +425,7 @@ class Game:
 
     def _matrix(self, rows: int) -> NDArray[np.float64]:
         size = rows * self.actions
-        check_room("agents", self.agents, size, f"a matrix of the {self.name} game")
+        check_room("agents", self.agents, size, f"a matrix of the {self.called}")
         return np.zeros((rows, self.actions))
 
     def _profile(self, y: ArrayLike) -> NDArray[np.float64]:

@@ -75,7 +75,7 @@ class PythonGame(GameTable):
         """The game."""
         game = kept(self.object, Game)
         if game.agents != count:
-            raise InvalidInput("count", count, f"the {game.name} has {game.agents} agents")
+            raise InvalidInput("count", count, f"the {game.called} has {game.agents} agents")
         return game
 
 

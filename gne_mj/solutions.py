@@ -283,7 +283,7 @@ def summary(solution: Solution) -> list[str]:
     game, variational, found = solution.game, solution.variational, solution.optimality
     unit = f" {game.action_unit}" if game.action_unit else ""
     kind = "GNE" if game.private else "variational GNE"
-    lines = [f"{solution.name}: {game.name} game, {game.agents} agents"]
+    lines = [f"{solution.name}: {game.called}, {game.agents} agents"]
     for point in solution.penalised:
         numbers = _compared(game, point)
         epsilon = numbers["epsilon"]

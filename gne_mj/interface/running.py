@@ -96,7 +96,7 @@ def part_changes(source: Source, given: Mapping[str, Any]) -> dict[str, Any]:
     found = {KEYS.get(name, name): value for name, value in given.items()}
     agents, law = given.get("agents"), given.get("law")
     if isinstance(source, Game) and agents is not None and agents.count != source.agents:
-        raise InvalidInput("agents", agents, f"the {source.name} has {source.agents} agents")
+        raise InvalidInput("agents", agents, f"the {source.called} has {source.agents} agents")
     if callable(law) and not isinstance(law, Table | Law):
         found["controller"] = own_law(law)
     return found

@@ -38,7 +38,7 @@ def check_parts(system: SystemData) -> None:
         raise InvalidInput(
             "agents.count",
             system.agents.channels,
-            f"the {system.game.name} game has {m} actions",
+            f"the {system.game.called} has {m} actions",
         )
     if system.state.shape != (m, system.agents.states):
         raise InvalidInput(
