@@ -352,7 +352,7 @@ class EquilibriumSolver:
             g += self._data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(
-                self._name, "start", self._game.constraint_names[worst], float(g[worst])
+                self._game.name, "start", self._game.constraint_names[worst], float(g[worst])
             )
         self._game.check_numbers(self._point.y)
         reason = {
