@@ -66,6 +66,21 @@ class RandomGame:
             "matrix": rng.normal(size=(n, n)),
         }  # fmt: skip
         self.y = rng.uniform(-1.0, 1.0, n)
+        self.numbers = {name: self.numbers[name] for name in sorted(self._read())}
+
+    def _read(self):
+        """The names of the numbers that are read."""
+        given, found = self.plain(), set()
+
+        class Recorder:
+            def __getattr__(self, name):
+                found.add(name)
+                return getattr(given, name)
+
+        for i in range(self.count):
+            self.cost(i, self.y, Recorder())
+        list(self.constraints(self.y, Recorder()))
+        return found & set(self.numbers)
 
     def cost(self, i, y, p):
         return 0.3 * y[i] ** 2 + value(self.trees[i % 2], i, y, p)

@@ -356,3 +356,15 @@ def test_little_is_lost_close_to_a_bound():
     y = np.array([1000.1 - 1e-11, 1000.0])
     gap = y[0] - y[1]  # exact
     assert made.kernels.constraint(made.parameters, 0, y) == (gap - 0.1) * (gap + 0.1)
+
+
+def test_a_number_that_nothing_reads_is_refused():
+    def cost(i, y, p):
+        return p.price * y[i] ** 2
+
+    def constraints(y, p):
+        yield y.sum() <= 1.0
+
+    with pytest.raises(InvalidInput, match="prise: got 3.0, but no formula reads it; did you mean"):
+        game(2, cost, constraints, price=1.0, prise=3.0)
+    assert game(2, cost, constraints, price=1.0, edges=fixed([(0, 1)])).agents == 2

@@ -59,12 +59,14 @@ class Parameters:
         self.__dict__["_known"] = {
             key: _parameter(tape, key, value) for key, value in given.items()
         }
+        self.__dict__["_read"] = set()
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
         if name not in self._known:
             raise AttributeError(f"there is no parameter '{name}'; {nearest(name, self._known)}")
+        self._read.add(name)
         return self._known[name]
 
     __getitem__ = __getattr__
@@ -96,7 +98,8 @@ def trace(
 
     Raises:
         UserCodeError: a function raises, or does what cannot be traced; names its file and line.
-        InvalidInput: a parameter is not finite, or there is no constraint.
+        InvalidInput: a parameter is not finite, or a number that nothing reads, or there is no
+            constraint.
     """
     tape = Tape(sum(sizes))
     y, p = _profile(tape, sizes), Parameters(tape, parameters)
@@ -106,12 +109,21 @@ def trace(
     if constraints is not None:
         bounds = _called(constraints, "", _bounds, tape, constraints, y, p)
     boxed = _boxed(tape, limits, names)
+    _check_read(p, parameters)
     for name, times in Counter(bound.name for bound in [*bounds, *boxed]).items():
         if times > 1:
             raise InvalidInput("constraints", name, "each needs a name of its own")
     if not bounds and not boxed:
         raise InvalidInput("constraints", "none", "a game has at least one constraint")
     return Trace(tape, sizes, costs, bounds, boxed)
+
+
+def _check_read(p: Parameters, given: Mapping[str, Any]) -> None:
+    """Refuse numbers that nothing reads: a name is misspelt, and changing it would do nothing."""
+    for key, value in given.items():
+        if key not in p._read and numbers(value) is not None:
+            hint = f"; {nearest(key, sorted(p._read))}" if p._read else ""
+            raise InvalidInput(key, value, f"no formula reads it{hint}")
 
 
 def _boxed(tape: Tape, limits: Limits, names: Sequence[str]) -> list[Bound]:

@@ -32,10 +32,10 @@ def cost_of(text: str, known: Mapping[str, Any]) -> Callable[..., Any]:
         InvalidInput: the text is no formula.
     """
     _check_names(known)
-    code, _ = _compiled("cost", text, known)
+    code, used = _compiled("cost", text, known)
 
     def cost(i: int, y: Any, p: Any) -> Any:
-        return eval(code, *_names(known, i, y, p))
+        return eval(code, *_names(known, used, i, y, p))
 
     return cost
 
@@ -52,12 +52,12 @@ def constraints_of(texts: Mapping[str, str], known: Mapping[str, Any]) -> Callab
     codes = {name: _compiled(f"constraints.{name}", text, known) for name, text in texts.items()}
 
     def constraints(y: Any, p: Any) -> Iterator[tuple[str, Any]]:
-        for name, (code, each) in codes.items():
-            if not each:
-                yield name, eval(code, *_names(known, 0, y, p))
+        for name, (code, used) in codes.items():
+            if "i" not in used:
+                yield name, eval(code, *_names(known, used, 0, y, p))
                 continue
             for i in range(len(y)):
-                relation = eval(code, *_names(known, i, y, p))
+                relation = eval(code, *_names(known, used, i, y, p))
                 if relation is not None:
                     yield f"{name} {i + 1}", relation
 
@@ -70,13 +70,15 @@ def _check_names(known: Mapping[str, Any]) -> None:
             raise InvalidInput("parameters", name, "that name means something else in formulas")
 
 
-def _names(known: Mapping[str, Any], i: int, y: Any, p: Any) -> tuple[dict[str, Any], None]:
-    numbers = {name: getattr(p, name) for name in known}
+def _names(
+    known: Mapping[str, Any], used: set[str], i: int, y: Any, p: Any
+) -> tuple[dict[str, Any], None]:
+    numbers = {name: getattr(p, name) for name in known if name in used}
     return {"__builtins__": {}, **_WORDS, **numbers, "i": i, "y": y, "p": p, "N": len(y)}, None
 
 
-def _compiled(key: str, text: str, known: Mapping[str, Any]) -> tuple[Any, bool]:
-    """The text's code, if it has nothing but formulas in it, and whether it has the agent's i."""
+def _compiled(key: str, text: str, known: Mapping[str, Any]) -> tuple[Any, set[str]]:
+    """The text's code, if it has nothing but formulas in it, and the names that it reads."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
         names = [node for node in ast.walk(tree) if isinstance(node, ast.Name)]
@@ -87,7 +89,7 @@ def _compiled(key: str, text: str, known: Mapping[str, Any]) -> tuple[Any, bool]
     except (SyntaxError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", None) or type(error).__name__
         raise InvalidInput(key, text, f"it must be a formula: {why}") from None
-    return code, "i" in {node.id for node in names} - own
+    return code, {node.id for node in names} - own
 
 
 def _check(key: str, text: str, node: ast.AST, names: set[str]) -> None:
