@@ -365,6 +365,8 @@ def test_a_number_that_nothing_reads_is_refused():
     def constraints(y, p):
         yield y.sum() <= 1.0
 
-    with pytest.raises(InvalidInput, match="prise: got 3.0, but no formula reads it; did you mean"):
+    with pytest.raises(
+        InvalidInput, match=r"prise: got 3\.0, but no formula reads it; did you mean"
+    ):
         game(2, cost, constraints, price=1.0, prise=3.0)
     assert game(2, cost, constraints, price=1.0, edges=fixed([(0, 1)])).agents == 2
