@@ -22,8 +22,8 @@ from builders import (
 import reference
 from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.loops import monitor as watch
-from gne_mj.plants.mujoco import MujocoPlant, passive_callback
-from gne_mj.plants.native_mujoco import callbacks, offsets
+from gne_mj.plants.mujoco import MujocoPlant
+from gne_mj.plants.native_mujoco import callbacks
 
 DELTA = np.full(5, 3.0)
 
@@ -188,7 +188,7 @@ def test_other_simulations_are_left_alone_by_installed_callbacks():
         model = mujoco.MjModel.from_xml_string(text.format(size))
         data = mujoco.MjData(model)
         data.userdata[:] = content
-        with callbacks(control=loop._control, passive=passive_callback(offsets())):
+        with callbacks(control=loop._control, passive=loop.plant.passive):
             mujoco.mj_step(model, data, 10)
         assert data.time == pytest.approx(10 * model.opt.timestep)
         assert np.array_equal(data.userdata, np.full(size, content or 0.0), equal_nan=True)

@@ -1,7 +1,6 @@
 """Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
 
 import sys
-from functools import cache
 from typing import Any
 
 import mujoco
@@ -9,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, nearest
-from gne_mj.native import callback, kernel, source_key
+from gne_mj.native import kernel
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
@@ -23,29 +22,26 @@ from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
     Prediction,
     actuator_of,
-    damp,
+    add_forces,
     gather,
     refresh,
 )
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
-    CALLBACK,
     KNOWN_STATE,
     PLANT_MARK,
     USERDATA_HEADER,
-    Offsets,
-    address_of,
     callbacks,
     check_warnings,
     offsets,
-    parameter_block_of,
+    passive_callback,
     quiet,
     step_address,
 )
 from gne_mj.records import by_name
 
-__all__ = ["AGENT", "MjcfPlant", "actuator_of", "gather", "refresh", "stored"]
+__all__ = ["AGENT", "MjcfPlant", "actuator_of", "add_forces", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
 # What to do where they do
@@ -61,21 +57,6 @@ AGENT = mjcf_robot
 def stored(channels, state, userdata):
     """Not known."""
     return 0.0
-
-
-@cache
-def passive_callback(at: Offsets) -> Any:
-    """The C callback of the damping of robots whose outputs are positions."""
-    source = source_key()
-
-    def passive(model, data):
-        _ = source
-        struct = address_of(data)
-        parameter_block = abs(parameter_block_of(at, address_of(model), struct))
-        if parameter_block != 0:
-            damp(at, struct, parameter_block)
-
-    return callback(CALLBACK, passive)
 
 
 class MjcfPlant(FleetPlant):
@@ -120,7 +101,7 @@ class MjcfPlant(FleetPlant):
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
         numbers = self._lookahead(agents)
-        self.passive = passive_callback(offsets()) if len(numbers) else None
+        self.passive = passive_callback(offsets(), self.kernels) if len(numbers) else None
         with named(path="agents.path"):
             world, sizes_of_robots, memory_asked = _world(agents)
         with named(world="agents.path"):

@@ -90,7 +90,7 @@ def mark_twin(at, parameter_block, twin):
 
 
 @kernel
-def damp(at, data, parameter_block):
+def add_forces(at, data, parameter_block):
     """Add every agent's own damping to mjData's passive forces."""
     sizes, places = sizes_in(parameter_block), integers(parameter_block, PLACES)
     qvel = field(data, at.qvel, sizes.nv)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, part_of
-from gne_mj.native import callback, compiled, kernel, source_key
+from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
 from gne_mj.parameter_block import ParameterBlock, floats, integers
 from gne_mj.plants import flexible_robot
@@ -17,15 +17,12 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.fleet import compile_model, compose, element_names
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.native_mujoco import (
-    CALLBACK,
     PLANT_MARK,
     USERDATA_HEADER,
-    Offsets,
-    address_of,
     callbacks,
     field,
     offsets,
-    parameter_block_of,
+    passive_callback,
     step_address,
     timed_step,
 )
@@ -105,41 +102,42 @@ def actuator_of(places, r):
 @kernel
 def stored(channels, state, userdata):
     """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
+    return stored_of(flexible_robot, channels, state, userdata)
+
+
+@kernel
+def stored_of(kind, channels, state, userdata):
+    """The same, of robots of a type with these springs, ``kind`` being its module."""
     total = 0.0
     for r in range(len(channels.equilibrium_state)):
         x = state[4 * r : 4 * r + 4]
-        total += flexible_robot.storage_given(
+        total += kind.storage_given(
             channels.parameters[r], x, channels.equilibrium_state[r], userdata[ARCTANGENTS + r]
         )
     return total
 
 
-@cache
-def passive_callback(at: Offsets) -> Any:
-    """The C callback that adds the atan term of every spring."""
-    source = source_key()
+@kernel
+def add_forces(at, data, parameter_block):
+    """Add the atan term of every spring to mjData's passive forces."""
+    add_atan_forces(at, data, parameter_block, len(floats(parameter_block, ATAN)))
 
-    def passive(model, data):
-        _ = source
-        struct = address_of(data)
-        parameter_block = abs(parameter_block_of(at, address_of(model), struct))
-        if parameter_block == 0:
-            return
-        sizes = sizes_in(parameter_block)
-        qpos = field(struct, at.qpos, sizes.nq)
-        force = field(struct, at.qfrc_passive, sizes.nv)
-        places, coefficient = integers(parameter_block, PLACES), floats(parameter_block, ATAN)
-        kept = field(struct, at.userdata, ARCTANGENTS + len(coefficient))
-        for r in range(len(coefficient)):
-            place = place_of(places, r)
-            extension = qpos[place.main_q] - qpos[place.appendage_q]
-            arctangent = np.arctan(extension)
-            kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
-            spring_force = coefficient[r] * arctangent
-            force[place.main_v] -= spring_force
-            force[place.appendage_v] += spring_force
 
-    return callback(CALLBACK, passive)
+@kernel
+def add_atan_forces(at, data, parameter_block, m):
+    """The same, of m springs whose coefficients are the first m numbers in ATAN."""
+    sizes = sizes_in(parameter_block)
+    qpos = field(data, at.qpos, sizes.nq)
+    force = field(data, at.qfrc_passive, sizes.nv)
+    places, coefficient = integers(parameter_block, PLACES), floats(parameter_block, ATAN)
+    kept = field(data, at.userdata, ARCTANGENTS + m)
+    for r in range(m):
+        place = place_of(places, r)
+        arctangent = np.arctan(qpos[place.main_q] - qpos[place.appendage_q])
+        kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
+        spring_force = coefficient[r] * arctangent
+        force[place.main_v] -= spring_force
+        force[place.appendage_v] += spring_force
 
 
 @cache
@@ -192,7 +190,7 @@ class MujocoPlant(FleetPlant):
             )
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = kernels
-        self.passive = kernels.passive_callback(offsets())
+        self.passive = passive_callback(offsets(), kernels)
         with part_of("agents"), named(world="agents"):
             self.model = compile_model(
                 compose(agents.parameters[:, :5], dimension=agents.dimension, decorated=decorated),
@@ -227,7 +225,7 @@ class MujocoPlant(FleetPlant):
 
     @staticmethod
     def _forces(agents: Agents) -> NDArray[np.float64]:
-        """What the passive callback needs of the agents: ATAN."""
+        """What ``add_forces`` needs of the agents, flat: ATAN."""
         return np.ascontiguousarray(agents.parameters[:, 3])
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import mujoco
@@ -23,7 +24,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from gne_mj.errors import EngineError
-from gne_mj.native import array_at, callback, compiled, kernel, load_word
+from gne_mj.native import array_at, callback, compiled, kernel, load_word, source_key
 from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.plants.c_layout import arrays, block_of, unknown_layout, word_of
 
@@ -303,6 +304,27 @@ def parameter_block_of(at, model, data):
     if header.mark == PLANT_MARK:
         return -np.int64(header.parameter_block)
     return np.int64(0)
+
+
+@cache
+def passive_callback(at: Offsets, fleet: ModuleType) -> Any:
+    """The C callback of a fleet's passive forces; simulations that are not ours are left alone.
+
+    Args:
+        at: MuJoCo's own offsets.
+        fleet: the module that has the kernel ``add_forces(at, data, parameter_block)``, which adds
+            to mjData's qfrc_passive (N, N m), given the addresses of mjData and parameter block.
+    """
+    source = source_key()
+
+    def passive(model, data):
+        _ = source
+        struct = address_of(data)
+        parameter_block = abs(parameter_block_of(at, address_of(model), struct))
+        if parameter_block != 0:
+            fleet.add_forces(at, struct, parameter_block)
+
+    return callback(CALLBACK, passive)
 
 
 @cache

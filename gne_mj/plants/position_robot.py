@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 NAME = "position robot"
 PARAMETERS = (*flexible_robot.PARAMETERS, "lookahead", "local_damping", "reference_velocity")
+LOOKAHEAD, LOCAL_DAMPING, REFERENCE_VELOCITY = 5, 6, 7  # columns of the last three
 STATES = (
     ("extension", "m"),
     ("output", "m"),
