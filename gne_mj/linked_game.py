@@ -24,8 +24,8 @@ from numba.extending import intrinsic
 
 from gne_mj.native import INTERPRETED
 
-# What the functions are given, arrays by their address: q, y and out are arrays, scale a number,
-# all others whole
+# What a game's functions are called and take: q, y and out are arrays, in LLVM code their address,
+# scale is a number, all others whole
 FUNCTIONS = {
     "cost": ("q", "i", "y"),
     "cost_gradient": ("q", "i", "a", "y"),

@@ -27,19 +27,12 @@ from numba.core import cgutils
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, UserCodeError
+from gne_mj.linked_game import FUNCTIONS
 from gne_mj.native import intrinsic_or, is_kernel, kernel
 
 Array = NDArray[np.float64]
 
-# What a game's functions are called and take; the two second derivatives may be left out
-FUNCTIONS = {
-    "cost": ("q", "i", "y"),
-    "cost_gradient": ("q", "i", "a", "y"),
-    "add_cost_hessian": ("q", "i", "a", "y", "scale", "out"),
-    "constraint": ("q", "l", "y"),
-    "constraint_gradient": ("q", "l", "a", "y"),
-    "constraint_hessian": ("q", "l", "a", "b", "y"),
-}
+# The second derivatives may be left out
 _OPTIONAL = ("add_cost_hessian", "constraint_hessian")
 _DIFFERENCE = 6e-6  # step of differences, relative to the entry's size
 _SHORTEST = 1e-13  # beyond which it is not shortened
