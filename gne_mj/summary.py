@@ -24,10 +24,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {seen['time']:.4g} s"
         )
     if gap is not None:
-        rows["widest gap"] = (
-            f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}, {gap['name']} at"
-            f" {gap['time']:.4g} s"
-        )
+        size = f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}".rstrip()
+        rows["widest gap"] = f"{size}, {gap['name']} at {gap['time']:.4g} s"
     if division is not None and division["divided_steps"]:
         rows["divided steps"] = (
             f"{division['divided_steps']}, near the boundary, down to"

@@ -370,3 +370,37 @@ def test_a_number_that_nothing_reads_is_refused():
     ):
         game(2, cost, constraints, price=1.0, prise=3.0)
     assert game(2, cost, constraints, price=1.0, edges=fixed([(0, 1)])).agents == 2
+
+
+@pytest.mark.parametrize("bound", [-1.0, 0.0])
+def test_a_bound_without_an_inside_is_refused(bound):
+    def constraints(y, p):
+        yield "energy", (y**2).sum() <= p.budget
+
+    with pytest.raises(InvalidInput, match=f"'energy', but it has no inside.* {bound:g}"):
+        game(2, lambda i, y, p: y[i] ** 2, constraints, budget=bound)
+
+
+def test_names_that_differ_in_numbers_are_one_figure_without_their_ends():
+    def constraints(y, p):
+        for i in range(len(y)):
+            yield f"gap {i}-{i + 1}", abs(y[i] - y[i - 1]) <= 1.0
+
+    (gaps,) = game(3, lambda i, y, p: y[i] ** 2, constraints).quantities
+    assert (gaps.name, gaps.long_name) == ("gap_value", "gap")
+
+
+@pytest.mark.parametrize(
+    ("cost", "words"),
+    [
+        ("y[i]**2 if y[i] > 0 else y[i]", "cost: .*a branch on the actions"),
+        ("wanted[i + 1] * y[i]**2", "cost: .*for agent 2: IndexError"),
+    ],
+)
+def test_what_a_text_does_is_told_by_its_key(cost, words):
+    table = ExpressionsTable(
+        type="expressions", cost=cost, constraints={"all": "y.sum() <= 1"},
+        parameters={"wanted": [1.0, 2.0]} if "wanted" in cost else {},
+    )  # fmt: skip
+    with pytest.raises(InvalidInput, match=words):
+        table.build(2)

@@ -237,7 +237,8 @@ def _quantities(traced: Trace, agents: int) -> tuple[Quantity, ...]:
     """What constraints bound, recorded and drawn: families of one name, numbers left out."""
     families: dict[str, list[Bound]] = {}
     for bound in traced.bounds:
-        families.setdefault(re.sub(r"[\d\s(,)]+", " ", bound.name).strip(), []).append(bound)
+        stem = re.sub(r"[\d\s(,)]+", " ", bound.name).strip(" -_.:/")
+        families.setdefault(stem, []).append(bound)
     found: list[Quantity] = []
     taken: set[str] = set()
     for stem, bounds in families.items():

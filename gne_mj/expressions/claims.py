@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.errors import InvalidInput
 from gne_mj.expressions.nodes import Node, evaluate
 from gne_mj.expressions.tracing import Bound
 from gne_mj.game_model import Box, ConstraintClass
@@ -138,7 +139,11 @@ class Claims:
         return found
 
     def gap_bound(self, bound: Bound) -> float | None:
-        """delta of a constraint |gap| <= delta whose gap is affine, of one or more entries."""
+        """delta of a constraint |gap| <= delta whose gap is affine, of one or more entries.
+
+        Raises:
+            InvalidInput: no sum of squares is below this bound.
+        """
         if bound.gap is not None and bound.limit is not None:
             limit = bound.limit.tape.value(bound.limit)
             return limit if self.degree[id(bound.gap)] == 1 else None
@@ -147,7 +152,11 @@ class Claims:
         squares = None if more.varies else self.squares(less)
         if squares is None or any(factor != 1.0 for factor, _ in squares):
             return None
-        return float(np.sqrt(more.tape.value(more)))
+        limit = more.tape.value(more)
+        if not limit > 0.0:
+            expected = f"it has no inside: squares do not add up to less than {limit:g}"
+            raise InvalidInput("constraints", bound.name, expected)
+        return float(np.sqrt(limit))
 
 
 def _scaled(curvature: int | None, factor: float) -> int | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import GneError, InvalidInput, raised
 from gne_mj.expressions.declared import band, private
 from gne_mj.expressions.nodes import FUNCTIONS
 
@@ -35,7 +35,7 @@ def cost_of(text: str, known: Mapping[str, Any]) -> Callable[..., Any]:
     code, used = _compiled("cost", text, known)
 
     def cost(i: int, y: Any, p: Any) -> Any:
-        return eval(code, *_names(known, used, i, y, p))
+        return _value("cost", text, code, i, _names(known, used, i, y, p))
 
     return cost
 
@@ -53,15 +53,33 @@ def constraints_of(texts: Mapping[str, str], known: Mapping[str, Any]) -> Callab
 
     def constraints(y: Any, p: Any) -> Iterator[tuple[str, Any]]:
         for name, (code, used) in codes.items():
+            key = f"constraints.{name}"
             if "i" not in used:
-                yield name, eval(code, *_names(known, used, 0, y, p))
+                yield name, _value(key, texts[name], code, None, _names(known, used, 0, y, p))
                 continue
             for i in range(len(y)):
-                relation = eval(code, *_names(known, used, i, y, p))
+                relation = _value(key, texts[name], code, i, _names(known, used, i, y, p))
                 if relation is not None:
                     yield f"{name} {i + 1}", relation
 
     return constraints
+
+
+def _value(
+    key: str, text: str, code: Any, i: int | None, names: tuple[dict[str, Any], None]
+) -> Any:
+    """What a formula is, for agent i if it has such.
+
+    Raises:
+        InvalidInput: it branches on actions, or reads beyond an array.
+    """
+    try:
+        return eval(code, *names)
+    except (KeyboardInterrupt, GneError):
+        raise
+    except Exception as error:
+        whose = "" if i is None else f" for agent {i + 1}"
+        raise InvalidInput(key, text, f"it must be a formula{whose}: {raised(error)}") from error
 
 
 def _check_names(known: Mapping[str, Any]) -> None:
