@@ -1,7 +1,6 @@
 """Who hears whom: undirected communication graphs (paper, section II-C)."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
@@ -66,15 +65,6 @@ class Graph:
     def __repr__(self) -> str:
         connectivity = f", lambda_2 = {self.algebraic_connectivity:.4g}" * (self.agents <= _DENSE)
         return f"<Graph of {self.agents} agents, {len(self.edges)} edges{connectivity}>"
-
-    @property
-    def name(self) -> str | None:
-        """What scenario files call it; None if it is none of those that have names."""
-        for name, made in NAMED.items():
-            with suppress(InvalidInput):  # not of so many agents
-                if made(self.agents).edges == self.edges:
-                    return name
-        return None
 
     @cached_property
     def adjacency(self) -> csr_array:

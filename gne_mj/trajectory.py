@@ -24,6 +24,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.files import written
 from gne_mj.loops.base import Samples
 from gne_mj.run_metrics import SUCCESSES
+from gne_mj.summary import summary
 from gne_mj.system import System
 from gne_mj.variables import Labelled, coordinates_of, declared, variables_of
 
@@ -168,6 +169,18 @@ class Trajectory:
     def __repr__(self) -> str:
         words = ", ".join(f"{name}: {report['status']}" for name, report in self.reports.items())
         return f"<Trajectory of {words}>"
+
+    def __str__(self) -> str:
+        """What commands print of it: each system's figures, and what was done while it ran."""
+        lines = []
+        for name, report in self.reports.items():
+            lines += ["", name, *(f"  {key:20} {value}" for key, value in summary(report).items())]
+        if self.interventions:
+            lines += ["", "while it ran"]
+            for done in self.interventions:
+                when = f"at {done['time']:.4g} s"
+                lines.append(f"  {when:20} {done['what']}")
+        return "\n".join(lines[1:])
 
     @property
     def status(self) -> str:

@@ -102,7 +102,7 @@ def test_objects_are_the_tables_that_a_file_has():
     assert isinstance(scenario, Scenario)
     system = scenario.systems["players"]
     (built,) = scenario.system_objects()
-    assert system.controller.graph == "ring"
+    assert system.controller.network(6).edges == gm.ring(6).edges
     assert (built.law.coupling, built.mode, built.rho, built.seed) == (2.0, "sampled", 0.02, 3)
     assert built.agents.parameters[:, 0].tolist() == [2.0] * 6
     assert [type(fault).__name__ for fault in built.faults] == ["Noise", "MessageLoss"]
@@ -114,12 +114,8 @@ def test_objects_are_the_tables_that_a_file_has():
     assert rebuilt.pseudo_gradient(y).tolist() == GAME.pseudo_gradient(y).tolist()
 
 
-def test_graphs_are_named_where_they_have_a_name():
-    assert [graph.name for graph in (gm.ring(5), gm.line(5), gm.star(5), gm.complete(5))] == [
-        "ring", "line", "star", "complete",
-    ]  # fmt: skip
+def test_a_graph_is_its_edges_in_a_table():
     own = gm.Graph(4, ((0, 1), (1, 2), (1, 3)))
-    assert own.name is None
     assert gm.partial_information(own).graph == [(1, 2), (2, 3), (2, 4)]
     degrees = np.diag(gm.star(5).laplacian)
     assert degrees.tolist() == [4, 1, 1, 1, 1]
@@ -377,16 +373,22 @@ def test_reprs_are_short_and_say_what_it_is():
     assert "guaranteed" in str(guarantees)
 
 
+def printed(code):
+    """What a program of its own prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**environment(), "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_the_top_level_is_as_light_as_before():
-    code = (
+    heavy = printed(
         "import sys, gne_mj as gm; dir(gm); gm.__all__;"
         "print(sorted({'numba', 'scipy', 'pydantic', 'sympy'} & set(sys.modules)))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**environment(), "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert done.stdout == "[]\n"
+    assert heavy == "[]\n"
 
 
 SNIPPET = """
@@ -432,20 +434,30 @@ def test_the_ten_lines_run(tmp_path, monkeypatch, capsys):
     assert found["run"].status == "completed"
     assert (tmp_path / "results/energy/players-energy-value.png").stat().st_size > 5000
     printed = capsys.readouterr().out
-    for words in ("Trajectory of players", "certified", "variational GNE"):
+    for words in ("players\n  status", "certified", "variational GNE"):
         assert words in printed
 
 
 def test_figures_leave_pyplot_and_its_backend_alone():
-    code = (
+    told = printed(
         "import sys, matplotlib; matplotlib.use('svg');"
         "import gne_mj as gm; from gne_mj.expressions import game;"
         "one = game(2, lambda i, y, p: y[i]**2, lambda y, p: iter([y.sum() <= 1.0]));"
         "run = gm.run(one, start=0.1, duration=0.01); figures = run.plot(); figures._repr_html_();"
         "print(matplotlib.get_backend(), 'matplotlib.pyplot' in sys.modules, len(figures) > 1)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**environment(), "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.stdout.split() == ["svg", "False", "True"], done.stderr
+    assert told.split() == ["svg", "False", "True"]
+
+
+@pytest.mark.parametrize("count", [5, 7])
+def test_a_graph_of_another_size_is_refused(count):
+    with pytest.raises(InvalidInput, match="graph"):
+        gm.setup(GAME, law=gm.partial_information(gm.ring(count))).system_objects()
+
+
+def test_a_run_is_printed_as_commands_print_it():
+    run = gm.run(GAME, **SHORT)
+    lines = str(run).splitlines()
+    assert lines[0] == "players"
+    assert lines[1].split()[:2] == ["status", f"{run.status}:"]
+    assert any(line.startswith("  least margin ") for line in lines)

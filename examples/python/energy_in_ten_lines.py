@@ -19,4 +19,4 @@ wanted = [1.0, 1.4, 1.8, 2.2, 2.6, 3.0]
 game = gm.game(6, cost, constraints, weight=1.0, wanted=wanted, price=0.2, budget=12.0, gap=2.0)
 law = gm.partial_information(gm.ring(6))
 run = gm.run(game, agents=gm.flexible_robots(6), law=law, rho=0.02, duration=60.0)
-print(run, run.plot("results/energy"), gm.certify(run.system), gm.solve(game, rho=0.02), sep="\n\n")
+print(run, run.plot("results/energy"), gm.certify(run.system), gm.solve(run), sep="\n\n")

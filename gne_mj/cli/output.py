@@ -173,21 +173,12 @@ def folder_for(out: Path | None, own: Path) -> Path:
 
 def tell(trajectory: "Trajectory", as_json: bool, out: Path | None) -> None:
     """Print a run's summary and where it is kept, or its report as JSON."""
-    from gne_mj.summary import summary
-
     if as_json:
         emit(json.dumps(trajectory.report(), indent=2))
         return
+    print(f"\n{trajectory}")
     for name, report in trajectory.reports.items():
-        print(f"\n{name}")
-        for key, value in summary(report).items():
-            print(f"  {key:20} {value}")
         _warn(name, report)
-    if trajectory.interventions:
-        print("\nwhile it ran")
-        for done in trajectory.interventions:
-            when = f"at {done['time']:.4g} s"
-            print(f"  {when:20} {done['what']}")
     if out is not None:
         print(f"\ntrajectory  {out / 'trajectory.zarr'}\nreport      {out / 'report.json'}")
 

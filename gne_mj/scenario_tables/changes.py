@@ -120,7 +120,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Law):
         return {"information": "python", "object": keep(value, type(value).__name__)}
     if isinstance(value, Graph):
-        return value.name or [[i + 1, j + 1] for i, j in value.edges]
+        return [[i + 1, j + 1] for i, j in value.edges]  # a name would fit any number of agents
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
