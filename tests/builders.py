@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from reference_agents import FlexibleRobot, PiCascade, PositionRobot
 
 import reference
 from gne_mj import graph as graphs
@@ -39,7 +40,7 @@ def robots(numbers, limit=np.inf):
 
 
 def reference_robots(numbers):
-    return reference.FlexibleRobot(*[numbers[name] for name in flexible_robot.PARAMETERS])
+    return FlexibleRobot(*[numbers[name] for name in flexible_robot.PARAMETERS])
 
 
 def with_damping(numbers, tau, share=1.2):
@@ -60,7 +61,7 @@ def position_robots(numbers, tau=0.7, share=1.2, v_0=3.0):
 def reference_position_robots(numbers, tau=0.7, share=1.2):
     columns = [numbers[name] for name in flexible_robot.PARAMETERS]
     lookahead, damping = with_damping(numbers, tau, share)
-    return reference.PositionRobot(*columns, lookahead=lookahead, local_damping=damping)
+    return PositionRobot(*columns, lookahead=lookahead, local_damping=damping)
 
 
 def integrators(count):
@@ -73,7 +74,7 @@ def pi_cascades(count, v=1.0, k=0.5):
 
 
 def reference_pi(count, v=1.0, k=0.5):
-    return reference.PiCascade(np.full(count, v), np.full(count, k))
+    return PiCascade(np.full(count, v), np.full(count, k))
 
 
 def reference_osnr(parameters=None):

@@ -14,6 +14,7 @@ from builders import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
+from reference_agents import Integrator
 
 import reference
 from gne_mj.errors import InvalidInput
@@ -31,7 +32,7 @@ from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.ode import OdePlant
 
 KINDS = {
-    "integrator": (integrators(5), reference.Integrator(), 1),
+    "integrator": (integrators(5), Integrator(), 1),
     "pi cascade": (pi_cascades(5, 1.3, 0.6), reference_pi(5, 1.3, 0.6), 2),
     "robot": (robots(UNEQUAL), reference_robots(UNEQUAL), 3),
     "position robot": (position_robots(UNEQUAL), reference_position_robots(UNEQUAL), 4),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_agents import FlexibleRobot, Integrator, PiCascade
 
 import reference
 
@@ -47,11 +48,11 @@ def slow_agents(kind, rng, m):
     """m agents of reference.py, and the channels of the campaigns' oracle."""
     numbers = rng.uniform(0.5, 2.0, (5, m))
     if kind == "robot":
-        return reference.FlexibleRobot(*numbers), [("robot", row.tolist()) for row in numbers.T]
+        return FlexibleRobot(*numbers), [("robot", row.tolist()) for row in numbers.T]
     if kind == "integrator":
-        return reference.Integrator(), [("integrator", [])] * m
+        return Integrator(), [("integrator", [])] * m
     v, k = numbers[0], numbers[0] * rng.uniform(0.1, 0.9, m)
-    return reference.PiCascade(v, k), [("cascade", list(pair)) for pair in zip(v, k, strict=True)]
+    return PiCascade(v, k), [("cascade", list(pair)) for pair in zip(v, k, strict=True)]
 
 
 GAMES = [kinds.lane, kinds.space, kinds.channels, kinds.firms]

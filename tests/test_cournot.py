@@ -7,6 +7,7 @@ import pytest
 from builders import integrators, run_loop
 from hypothesis import given
 from hypothesis import strategies as st
+from reference_agents import Integrator
 from scipy.optimize import brentq
 
 import reference
@@ -131,7 +132,7 @@ def test_the_closed_loop_equals_an_independent_one():
     )
     states, *_, loop = run_loop(system, 0.001, 200)
     assert loop.monitor.divided == 0
-    rate = reference.closed_loop_rate(reference.Integrator(), "full_information", oracle, 0.1)
+    rate = reference.closed_loop_rate(Integrator(), "full_information", oracle, 0.1)
     assert np.allclose(
         states[:, :, 0], reference.rk4_fixed(rate, y, 0.001, 200), rtol=1e-12, atol=1e-11
     )

@@ -20,6 +20,7 @@ from builders import (
     robots,
     run_loop,
 )
+from reference_agents import Integrator
 from scipy.linalg import expm
 
 import reference
@@ -70,7 +71,7 @@ class Case:
             self.state = random_robot_state(rng, 0.4 * delta, spread=0.5)
             y = self.state[:, 1]
         elif self.plant.startswith("integrators"):
-            self.agents, self.agent = integrators(self.count), reference.Integrator()
+            self.agents, self.agent = integrators(self.count), Integrator()
             self.state = y[:, None].copy()
         else:
             self.agents, self.agent = pi_cascades(self.count), reference_pi(self.count)

@@ -20,6 +20,7 @@ from builders import (
     robot_system,
     run_loop,
 )
+from reference_agents import Integrator
 from scipy.linalg import expm
 
 import reference
@@ -56,9 +57,9 @@ def full_information_cases():
     pi = osnr_system(pi_cascades(10), FullInformation(), powers())
     return {
         "robots": (robot_system(robots, UNEQUAL), reference_robots(UNEQUAL), velocity),
-        "integrators in a line": (line, reference.Integrator(), velocity),
+        "integrators in a line": (line, Integrator(), velocity),
         "integrators as channels": (
-            osnr_system(integrators(10), FullInformation(), powers()), reference.Integrator(), osnr,
+            osnr_system(integrators(10), FullInformation(), powers()), Integrator(), osnr,
         ),
         "PI cascades": (pi, reference_pi(10), osnr),
     }  # fmt: skip
@@ -92,7 +93,7 @@ def test_full_information_equals_a_plain_rk4(name):
 )
 def test_fully_distributed_equals_a_plain_rk4(name, graph):
     agents, agent = {
-        "integrators": (integrators(10), reference.Integrator()),
+        "integrators": (integrators(10), Integrator()),
         "PI cascades": (pi_cascades(10), reference_pi(10)),
     }[name]
     law = distributed(graph, epsilon=0.1, gain=0.1)

@@ -15,6 +15,7 @@ from builders import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_agents import FlexibleRobot
 
 import reference
 from gne_mj import plots
@@ -80,7 +81,7 @@ def system(state, engine, **options):
 
 
 def expected_rate():
-    robot = reference.FlexibleRobot(*numbers().T)
+    robot = FlexibleRobot(*numbers().T)
     return reference.closed_loop_rate(robot, "full_information", oracle(), RHO)
 
 

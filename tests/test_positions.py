@@ -10,6 +10,7 @@ from builders import (
     run_loop,
     with_damping,
 )
+from reference_agents import PositionRobot
 
 import reference
 from gne_mj import graph as graphs
@@ -82,9 +83,7 @@ def test_passivity_of_differences_at_the_least_damping_and_not_below():
     worst = {}
     for share in (1.0, 0.9):
         lookahead, damping = with_damping(numbers, tau, share)
-        robot = reference.PositionRobot(
-            *numbers.values(), lookahead=lookahead, local_damping=damping
-        )
+        robot = PositionRobot(*numbers.values(), lookahead=lookahead, local_damping=damping)
         worst[share] = np.max(differences(robot, np.random.default_rng(1), many))
     assert worst[1.0] <= 1e-12
     assert worst[0.9] > 1e-3

@@ -20,6 +20,7 @@ from builders import (
     robot_system,
     run_loop,
 )
+from reference_agents import Integrator
 from scipy.integrate import solve_ivp
 
 import reference
@@ -177,7 +178,7 @@ def expected(system, agent, game, times, epsilon, gain):
 @pytest.mark.parametrize("kind", [pytest.param("integrator", marks=pytest.mark.slow), "pi_cascade"])
 def test_channels_agree_with_scipy(kind, epsilon):
     agents, oracle = {
-        "integrator": (integrators(3), reference.Integrator()),
+        "integrator": (integrators(3), Integrator()),
         "pi_cascade": (pi_cascades(3), reference_pi(3)),
     }[kind]
     system = channels(agents, epsilon)
