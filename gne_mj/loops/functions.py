@@ -12,7 +12,8 @@ ACTION, RATE, PROPAGATE, STORAGE = range(4)
 PREPARE, BARRIER_FREE_TERMS, ADD_BARRIER_FREE_SLOPE, OWN_PROFILE, MEMORY_OUTPUTS, SOLVE, ACT = (
     range(4, 11)
 )
-PENALTY, COUNT = 11, 12  # the first for penalties that change in time
+# For penalties that change in time, and for agents whose positions follow their outputs
+PENALTY, POSITIONS, COUNT = 11, 12, 13
 
 
 @kernel
@@ -33,6 +34,19 @@ def penalty(problem, time, rho):
     if problem.functions[PENALTY] == 0:
         return rho
     return call_number(problem.functions[PENALTY], (problem.parameter_block, time))
+
+
+@kernel
+def observe_positions(problem, work, monitor, time, state):
+    """Note the constraints' values at the positions of a flat state, if agents have such."""
+    if problem.functions[POSITIONS] != 0:
+        call_integer(
+            problem.functions[POSITIONS],
+            (
+                problem.parameter_block, address_in(work.profile), address_in(work.at_positions),
+                address_in(monitor), time, address_in(state),
+            ),
+        )  # fmt: skip
 
 
 @kernel

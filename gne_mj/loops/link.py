@@ -14,17 +14,20 @@ from gne_mj.barrier import scheduled
 from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
 from gne_mj.linked_game import compiled_for
 from gne_mj.loops import functions, implicit
+from gne_mj.loops import positions as followed
 from gne_mj.loops.layout import (
     Instant,
+    channels_in,
     loop_workspace_in,
     loop_workspace_length,
     parts_in,
     problem_in,
     steps_in,
 )
+from gne_mj.loops.monitor import MonitorNumbers
 from gne_mj.loops.newton import solver_in
 from gne_mj.native import callback, kernel, source_key
-from gne_mj.numbers import numbers_in
+from gne_mj.numbers import names_of, numbers_in
 from gne_mj.parameter_block import floats_at
 
 _whole, _real = types.int64, types.float64
@@ -39,6 +42,8 @@ class LawWork(NamedTuple):
 
 
 _now_in = numbers_in(Now)
+_monitor_in = numbers_in(MonitorNumbers)
+_LENGTH_OF_MONITOR = len(names_of(MonitorNumbers))
 
 
 @kernel
@@ -61,7 +66,8 @@ def link(
         law, game: modules of kernels.
         memory: whether the law has one.
         held: whether its inputs are, so that the memory moves once a control period.
-        others: C functions besides the law's own, by their entry: of the mode, of the schedule.
+        others: C functions besides the law's own, by their entry: of the mode, the schedule, the
+            positions.
     """
     addresses = np.zeros(functions.COUNT, dtype=np.int64)
     addresses[functions.ACTION] = action(law, game).address
@@ -132,7 +138,6 @@ def of_memory(law: ModuleType, held: bool) -> dict[int, Any]:
 
 
 @cache
-@cache
 def penalty(fall: Callable[[float, float], float]) -> Any:
     """The penalty at a time, by a schedule's kernel (:class:`gne_mj.barrier.Fall`)."""
     source = source_key(sys.modules[fall.__module__])
@@ -142,6 +147,25 @@ def penalty(fall: Callable[[float, float], float]) -> Any:
         return scheduled(fall, problem_in(block).schedule, time)
 
     return callback(_real(_whole, _real), penalty)
+
+
+@cache
+def positions() -> Any:
+    """What looks at positions that follow outputs, for all laws, games and agents."""
+    source = source_key()
+
+    def observe(block, profile, values, monitor, time, state):
+        _ = source
+        steps = steps_in(block)
+        followed.observe(
+            problem_in(block), channels_in(block), floats_at(profile, steps.actions),
+            floats_at(values, steps.constraints),
+            _monitor_in(floats_at(monitor, _LENGTH_OF_MONITOR), 0), time,
+            floats_at(state, steps.actions * steps.states),
+        )  # fmt: skip
+        return 0
+
+    return callback(_whole(*[_whole] * 4, _real, _whole), observe)
 
 
 @cache

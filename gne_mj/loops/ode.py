@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gne_mj.loops import division, faultless, functions, positions
+from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.feedback import explicit_law, inside
@@ -107,7 +107,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
     if at.stage == 0:
         before = work.u if clock.mode == CONTINUOUS else parts.u
         storage += functions.storage(problem, memory)
-        positions.observe(problem, parts.channels, work, monitor, at.time, state)
+        functions.observe_positions(problem, work, monitor, at.time, state)
         watch.observe(monitor, parts.figures, at.time, work, before, work.u, storage)
         copy(work.u, parts.u)
     return True

@@ -9,16 +9,23 @@ from gne_mj.native import kernel
 
 
 @kernel
-def observe(problem, channels, work, monitor, time, state):
-    """Note the constraints' values at the positions of a flat state, if agents have such.
+def observe(problem, channels, positions, g, monitor, time, state):
+    """Note the constraints' values at the positions of a flat state.
 
     Before :func:`gne_mj.loops.monitor.observe`: the same instant is not looked at twice, as where a
     piece of a step is taken again.
+
+    Args:
+        problem, channels: of the run.
+        positions: (m,), overwritten with them.
+        g: (p,), overwritten with the constraints' values there.
+        monitor: numbers, changed.
+        time: in s.
+        state: flat.
     """
-    data = problem.data
-    if channels.position < 0 or (monitor.positions > 0.0 and not time > monitor.time):
+    if monitor.positions > 0.0 and not time > monitor.time:
         return
-    positions, g = work.profile, work.at_positions
+    data = problem.data
     states = channels.equilibrium_state.shape[1]
     for r in range(len(positions)):
         positions[r] = state[r * states + channels.position]

@@ -17,7 +17,7 @@ from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
-from gne_mj.loops.link import link, penalty
+from gne_mj.loops.link import link, penalty, positions
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
@@ -83,10 +83,12 @@ class Assembly(SystemData):
 
     @property
     def _others(self) -> dict[int, Any]:
-        of_mode = mode_of(self).prediction(self)
-        if self.schedule is None:
-            return dict(of_mode)
-        return {**of_mode, functions.PENALTY: penalty(self.schedule.fall)}
+        found = dict(mode_of(self).prediction(self))
+        if self.schedule is not None:
+            found[functions.PENALTY] = penalty(self.schedule.fall)
+        if self.start_positions is not None:
+            found[functions.POSITIONS] = positions()
+        return found
 
     @property
     def functions(self) -> NDArray[np.int64]:
