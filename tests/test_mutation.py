@@ -1,6 +1,7 @@
 """The tool that puts faults into the code: which ones, where, and what they leave alone."""
 
 import importlib
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -127,3 +128,40 @@ def test_tests_that_execute_a_mutant_come_first(operators, monkeypatch):
     later = known["compiled"].without({"t.py", "process.py"})
     assert later.seconds == {"u.py::e": 1.0}
     assert later.executing == {"some.py": {"plain": []}}
+
+
+# Keys of loops, and what a translated kernel's cache adds to them
+OF_COPY = """
+from gne_mj import kernel_cache
+from gne_mj.controllers import full_information, partial_information
+from gne_mj.native import source_key
+
+def key(module):
+    return source_key(module)
+
+for module in (full_information, partial_information):
+    cache = kernel_cache.cache_for(module.action, ())
+    print(key(module), kernel_cache.mutant_in([cache._py_func.__code__.co_filename]) != "")
+"""
+
+
+def test_a_mutant_changes_the_keys_of_what_it_can_be_in(operators, tmp_path):
+    copies = importlib.import_module("copies")
+    tree = copies.Tree(FOLDER.parent.parent, tmp_path)
+    tree.copy_sources()
+    file = "controllers/partial_information.py"
+    found = operators.mutants(file, (tree.base / file).read_bytes())
+    tree.put(next(mutant for mutant in found if mutant.native), tmp_path / "work")
+    (full, _), (partial, _) = _keys(copies, tree.base)
+    assert _keys(copies, tmp_path / "work")[0] == (full, "False")
+    assert _keys(copies, tmp_path / "work")[1] != (partial, "False")
+    assert _keys(copies, tmp_path / "work")[1][1] == "True"
+
+
+def _keys(copies, folder):
+    (folder / "keys.py").write_text(OF_COPY)
+    told = subprocess.run(
+        [sys.executable, "keys.py"], cwd=folder, env=copies.environment(folder),
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    return [tuple(line.split()) for line in told.splitlines()]

@@ -1,9 +1,10 @@
 """Copies of the repository: one that stays as it is, and one for each mutant that is tried.
 
-Machine code is kept where it was made, in ``__pycache__``. The product's key of a loop changes with
-every file that can hold kernels; in a copy it changes with a mutant only where the mutant can be in
-that loop: in native code of a file which the loop's modules import, directly or through others. So
-the machine code of everything else is used again, and that of the mutant is made anew.
+Machine code is kept where it was made, in ``__pycache__``. The product's key of a loop or of a
+translated kernel changes with every file that can hold kernels; in a copy it changes with a mutant
+only where the mutant can be in it: in native code of a file which its modules import, directly or
+through others. So the machine code of everything else is used again, and that of the mutant is made
+anew.
 """
 
 import ast
@@ -20,29 +21,57 @@ from operators import Mutant
 FOLDERS = ("gne_mj", "controllers", "tests")
 NOTE = "mutant.json"  # in a copy: what its source_key needs to know
 
-# Added to a copy's gne_mj/native.py
-KEY = '''
+# Added to a copy's files: the product's keys, but that a mutant changes only those it can be in
+KEYS = {
+    "gne_mj/native.py": """
 
 def source_key(*modules):
-    """As the product's, but that a mutant changes the keys of the loops only that it can be in."""
-    import json
     import sys
+    from pathlib import Path
 
-    root = Path(__file__).resolve().parent.parent
-    note = json.loads((root / "mutant.json").read_text())
+    from gne_mj.kernel_cache import mutant_in, note
+
     frame = sys._getframe(1)
     given = [value for value in frame.f_locals.values() if isinstance(value, ModuleType)]
     files = [frame.f_globals["__file__"], *(module.__file__ for module in (*modules, *given))]
-    names = [str(Path(file).resolve()).removeprefix(f"{root}/") for file in files]
     digest = hashlib.sha256(note["digest"].encode())
     for module in modules:
-        name = str(Path(module.__file__).resolve()).removeprefix(f"{root}/")
+        name = str(Path(module.__file__).resolve()).removeprefix(f"{note['root']}/")
         text = note["original"] if name == note["file"] else inspect.getsource(module)
         digest.update(text.encode())
-    if note["native"] and any(n.startswith("/") or n in note["reached"] for n in names):
-        digest.update(note["native"].encode())
+    digest.update(mutant_in(files).encode())
     return digest.hexdigest()[:16]
-'''
+""",
+    "gne_mj/kernel_cache.py": """
+
+import json
+
+_root = Path(__file__).resolve().parent.parent
+note = {**json.loads((_root / "mutant.json").read_text()), "root": str(_root)}
+
+
+def package_digest():
+    return note["digest"]
+
+
+def mutant_in(files):
+    names = [str(Path(file).resolve()).removeprefix(f"{_root}/") for file in files]
+    reached = any(name.startswith("/") or name in note["reached"] for name in names)
+    return note["native"] if reached else ""
+
+
+_index_key = KernelCache._index_key
+
+
+def _index_key_in_copy(self, signature, codegen):
+    modules = [each.pymod.__file__ for each in signature if isinstance(each, types.Module)]
+    key = _index_key(self, signature, codegen)
+    return (*key, mutant_in([self._py_func.__code__.co_filename, *modules]))
+
+
+KernelCache._index_key = _index_key_in_copy
+""",
+}
 
 
 class Tree:
@@ -55,6 +84,14 @@ class Tree:
         """Copy what git knows or would add, with the machine code that is there."""
         if (self.base / NOTE).exists():
             return
+        self.copy_sources()
+        for cache in self.root.glob("**/__pycache__"):
+            own = self.base / cache.relative_to(self.root)
+            if cache.relative_to(self.root).parts[0] in FOLDERS and own.parent.exists():
+                shutil.copytree(cache, own, dirs_exist_ok=True)
+
+    def copy_sources(self) -> None:
+        """Copy what git knows or would add, and give it its own keys."""
         shutil.rmtree(self.base, ignore_errors=True)
         command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         listed = subprocess.run(command, cwd=self.root, capture_output=True, check=True).stdout
@@ -63,17 +100,14 @@ class Tree:
             if name and (source.exists() or source.is_symlink()):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target, follow_symlinks=False)
-        for cache in self.root.glob("**/__pycache__"):
-            own = self.base / cache.relative_to(self.root)
-            if cache.relative_to(self.root).parts[0] in FOLDERS and own.parent.exists():
-                shutil.copytree(cache, own, dirs_exist_ok=True)
-        code = "from gne_mj import native; print(native._package_digest())"
+        code = "from gne_mj.kernel_cache import package_digest; print(package_digest())"
         digest = subprocess.run(
             [sys.executable, "-c", code], cwd=self.base, env=environment(self.base),
             capture_output=True, text=True, check=True,
         ).stdout.strip()  # fmt: skip
-        with (self.base / "gne_mj/native.py").open("a", encoding="utf-8") as file:
-            file.write(KEY)
+        for name, text in KEYS.items():
+            with (self.base / name).open("a", encoding="utf-8") as file:
+                file.write(text)
         note = {"digest": digest, "file": "", "original": "", "native": "", "reached": []}
         (self.base / NOTE).write_text(json.dumps(note))
 

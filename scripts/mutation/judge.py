@@ -98,6 +98,8 @@ def baseline(tree: Tree, folder: Path) -> dict[str, Baseline]:
             report, _ = _pytest(tree.base, folder, new, limit, 7200.0, [], lines)
             passed = {test: seconds for test, outcome, seconds in report if outcome == "passed"}
             failed = [test for test, outcome, _ in report if outcome == "failed"]
+            if not passed:
+                raise SystemExit(f"no test passes without any mutant: see {folder / 'log.txt'}")
             known[name].add(Baseline(passed, executed(lines, tree.base, set(passed))))
             if name == "compiled" and failed:
                 print("left out, since they fail without any mutant:", *failed, sep="\n  ")
