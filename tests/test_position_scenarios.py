@@ -1,5 +1,8 @@
 """Position robots as scenarios have them: keys, starts, certificates, reports, batches, pages."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -270,3 +273,37 @@ def test_sweeps_of_an_agents_numbers_in_mujoco(tmp_path):
         found = rows.isel(run=run)
         assert float(found["position_margin"]) == alone["positions"]["least_margin"]
         assert float(found["peak_input"]) == alone["actuators"]["peak"]
+
+
+GOLDEN = Path(__file__).parent / "golden" / "positions.json"
+
+
+def figures(name):
+    """What a run of a shipped scenario is known by."""
+    run = gm.run(name)
+    report, data = run.reports["robots"], run["robots"]
+    least, most = (f(data["position"].values, axis=0).tolist() for f in (np.min, np.max))
+    return report, {
+        "margin": report["worst_constraint"]["margin"],
+        "each": report["worst_constraint"]["each"],
+        "positions": report["positions"]["least_margin"],
+        "least": least,
+        "most": most,
+        "peak": report["actuators"]["peak"],
+    }
+
+
+@pytest.mark.parametrize("name", ["platoon", "formation"])
+def test_shipped_scenarios(name):
+    report, found = figures(name)
+    golden = json.loads(GOLDEN.read_text())[name]
+    for key, value in golden.items():
+        assert found[key] == pytest.approx(value, abs=1e-8), key
+    assert report["status"] == "converged"
+    assert report["positions"]["outside"] == 0
+    assert report["lyapunov"]["monotone"]
+    assert report["lyapunov"]["claimed"]
+    scenario = load_scenario(name)
+    found = certify(scenario.system_objects()[0], scenario.clock())
+    assert found.status == "certified"
+    assert found.positions["follow"]

@@ -22,7 +22,8 @@ NUMBERS = (
     "True",
 )  # fmt: skip
 NAMES = (
-    "velocity-sync", "osnr", "paper", "cournot", "planar-sync", "disturbed", "nothing", "",
+    "velocity-sync", "osnr", "paper", "cournot", "planar-sync", "disturbed", "platoon",
+    "formation", "nothing", "",
     "nothing.toml", "/dev/zero", "/", ".toml", "x" * 5000, "é\udcff.toml", "a\nb", "-", "~",
     "PATH", "folder.toml", "pipe.toml", "zero.toml", "velocity-sync.toml", "OUT",
 )  # fmt: skip
