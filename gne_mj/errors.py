@@ -129,6 +129,9 @@ class UserCodeError(GneError, RuntimeError):
         function: the user's, or its code.
         error: what it raised, or a sentence about what it returned.
         at: for what it was called, e.g. "for agent 2 at y = [0.5, -0.1]".
+
+    Attributes:
+        where: the function, with its file and line where they are known.
     """
 
     status = "user_code_failed"
@@ -139,15 +142,15 @@ class UserCodeError(GneError, RuntimeError):
         inner = function.func if isinstance(function, partial) else function
         code = inner if isinstance(inner, CodeType) else getattr(inner, "__code__", None)
         name = getattr(inner, "__name__", repr(inner) if code is None else code.co_name)
-        where = f"{name}: "
+        self.where = name
         if code is not None:
             line = code.co_firstlineno
             if isinstance(error, BaseException):  # the deepest line of the user's own file
                 lines = traceback.extract_tb(error.__traceback__)
                 line = next((f.lineno for f in lines[::-1] if f.filename == code.co_filename), line)
-            where = f"{Path(code.co_filename).name}, line {line}, in {name}: "
+            self.where = f"{Path(code.co_filename).name}, line {line}, in {name}"
         what = raised(error) if isinstance(error, BaseException) else error
-        super().__init__(where + " ".join(f"{what} {at}".split()))
+        super().__init__(f"{self.where}: " + " ".join(f"{what} {at}".split()))
 
 
 def raised(error: BaseException) -> str:

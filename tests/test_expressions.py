@@ -10,10 +10,10 @@ import pytest
 from expression_games import PAIRS, energy
 from random_expressions import RandomGame, hyper_dual
 
-from gne_mj.errors import InvalidInput, UserCodeError
+from gne_mj.errors import GneError, InvalidInput, UserCodeError
 from gne_mj.expressions import fixed, game
 from gne_mj.expressions.llvm import llvm
-from gne_mj.expressions.nodes import FUNCTIONS
+from gne_mj.expressions.operators import FUNCTIONS
 from gne_mj.expressions.table import ExpressionsTable
 from gne_mj.scenario import load_scenario
 
@@ -394,13 +394,66 @@ def test_names_that_differ_in_numbers_are_one_figure_without_their_ends():
     ("cost", "words"),
     [
         ("y[i]**2 if y[i] > 0 else y[i]", "cost: .*a branch on the actions"),
-        ("wanted[i + 1] * y[i]**2", "cost: .*for agent 2: IndexError"),
+        ("y[i + 1]**2", "cost: .*for agent 2: NoEntry: an array of 2 has no entry \\[2\\]"),
     ],
 )
 def test_what_a_text_does_is_told_by_its_key(cost, words):
     table = ExpressionsTable(
-        type="expressions", cost=cost, constraints={"all": "y.sum() <= 1"},
-        parameters={"wanted": [1.0, 2.0]} if "wanted" in cost else {},
+        type="expressions", cost=cost, constraints={"all": "y.sum() <= 1"}
     )  # fmt: skip
     with pytest.raises(InvalidInput, match=words):
         table.build(2)
+
+
+LINKS = [(0, 1), (1, 2)]
+
+
+def _linked(y, p):
+    for k, (i, j) in enumerate(LINKS):
+        yield f"link {k}", y[i] + y[j] <= p.most[k]
+    if p.kind[0] > 0:  # read as well, though no formula has it
+        yield p.matrix @ y <= p.right
+
+
+def _lists(**changed):
+    given = {"weight": [1.0, 2.0, 3.0], "most": [1.0, 2.0], "matrix": np.ones((2, 3)),
+             "right": [1.0, 2.0], "kind": [1.0], **changed}  # fmt: skip
+    # the first agent has no use for its weight
+    return game(3, lambda i, y, p: (p.weight[i] if i else 1) * y[i] ** 2, _linked, **given)
+
+
+def test_lists_have_as_many_entries_as_formulas_read():
+    assert _lists().agents == 3  # for each agent, link, row, column and one
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"weight": [1.0] * 4}, r"weight: .*no formula reads its entries \[0\], \[3\] "),
+        ({"weight": [1.0] * 2}, r"weight: .*line \d+, in <lambda>, reads its entry \[2\] \(from 0\)"
+                                " for agent 3, and it has 2; with one for each agent it has 3"),
+        ({"most": [1.0] * 4}, r"most: .*entries \[2\], \[3\] .*it has 4 and must have 2$"),
+        ({"most": [1.0]}, r"most: got \[1.0\], but .* in _linked, reads its entry \[1\]"),
+        ({"kind": [1.0, 2.0]}, r"kind: .*reads its entry \[1\] .* must have 1$"),
+        ({"matrix": np.ones((2, 4))}, "@ of 'matrix' of 2x4 and an array of 3"),
+        ({"right": [1.0] * 4}, "an array of 2 and 'right' of 4 do not go together"),
+    ],
+)  # fmt: skip
+def test_lists_of_other_lengths_are_refused_by_name(changed, words):
+    with pytest.raises(GneError, match=words):
+        _lists(**changed)
+
+
+def test_columns_that_no_formula_reads_are_refused():
+    def cost(i, y, p):
+        return p.pairs[i][0] * y[i] ** 2
+
+    with pytest.raises(InvalidInput, match=r"entry \[:, 1\] .*it has 3x2 and must have 1 there"):
+        game(3, cost, upper=1.0, pairs=np.ones((3, 2)))
+
+
+def test_a_list_of_a_scenario_is_told_by_its_key():
+    file = Path(__file__).parents[1] / "examples" / "expressions" / "texts.toml"
+    scenario = load_scenario(file, {"game.parameters.wanted": [1.0, 2.0]})
+    with pytest.raises(InvalidInput, match=r"systems\.robots\.game\.parameters\.wanted: got"):
+        scenario.system_objects()

@@ -1,12 +1,12 @@
 """What can be proved of expressions: degree, convexity, smoothness, and bounds of actions."""
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.expressions.nodes import Node, evaluate
+from gne_mj.expressions.entries import ordered
+from gne_mj.expressions.nodes import Node
+from gne_mj.expressions.operators import evaluate
 from gne_mj.expressions.tracing import Bound
 from gne_mj.game_model import Box, ConstraintClass
 
@@ -14,22 +14,6 @@ _ABOVE = 3  # a degree that is not 0, 1 or 2
 _CONVEX = {"exp": 1, "expm1": 1, "log": -1, "log1p": -1, "sqrt": -1}  # or concave, if monotone
 _SWEEPS = 50  # of bounds of actions, each from the others'
 _SLACK = 1e-9  # by which bounds of actions are wider than rounding can tell
-
-
-def ordered(roots: Iterable[Node]) -> list[Node]:
-    """All nodes of expressions, each behind its arguments."""
-    found: dict[int, Node] = {}
-    waiting = list(roots)
-    while waiting:
-        node = waiting[-1]
-        args = () if node.op in "yqc" else node.args
-        missing = [arg for arg in args if id(arg) not in found]
-        if id(node) in found or not missing:
-            found.setdefault(id(node), node)
-            waiting.pop()
-        else:
-            waiting += missing
-    return list(found.values())
 
 
 class Claims:

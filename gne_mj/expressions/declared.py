@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gne_mj.expressions.nodes import Untraceable
+from gne_mj.expressions.operators import Untraceable
 
 
 class Private(NamedTuple):

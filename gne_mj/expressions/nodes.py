@@ -5,34 +5,30 @@ A :class:`Tape` makes each of them once, so that equal expressions are the same 
 often they are written: sums over all are formed once.
 """
 
-import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Elementary functions by NumPy's names; "abs" is Python's.
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "log1p": np.log1p, "expm1": np.expm1,
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "arcsin": np.arcsin, "arccos": np.arccos,
-    "arctan": np.arctan, "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh,
-    "arcsinh": np.arcsinh, "arccosh": np.arccosh, "arctanh": np.arctanh, "abs": abs,
-}  # fmt: skip
-OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
-    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
-    "**": operator.pow,
-}  # fmt: skip
-# What NumPy calls for a NumPy number or array with a node
-_UFUNCS = {
-    "add": "+", "subtract": "-", "multiply": "*", "divide": "/", "power": "**", "matmul": "@",
-    "float_power": "**", "less_equal": "<=", "less": "<=", "greater_equal": ">=", "greater": ">=",
-}  # fmt: skip
+from gne_mj.expressions.operators import FUNCTIONS, OPERATORS, UFUNCS, Untraceable, evaluate
+
 Numbers = NDArray[np.float64]
 
 
-class Untraceable(TypeError):
-    """What a traced function must not do; whoever traces names its file and line."""
+class NoEntry(IndexError):
+    """An index beyond the end of an array.
+
+    Attributes:
+        parameter: the list that it is of, or "".
+        given: its numbers, or what a part of it has.
+        shape, key: of the array, and what was asked of it.
+    """
+
+    def __init__(self, array: "Array", key: Any) -> None:
+        self.parameter, self.given = array.tape.parameter_of(array.nodes)
+        self.shape, self.key = array.shape, str(key).strip("()")
+        super().__init__(f"an array of {by_shape(self.shape)} has no entry [{self.key}]")
 
 
 class Tape:
@@ -46,6 +42,8 @@ class Tape:
         self.nodes: dict[tuple[Any, ...], Node] = {}
         self.arrays: dict[tuple[Any, ...], tuple[Any, ...]] = {}
         self.q: list[float] = []  # the parameters' numbers
+        self.places: dict[str, int] = {}  # where in q each parameter begins
+        self.decided: set[int] = set()  # places in q of numbers that functions asked for
         self.actions = [self.node("y", a) for a in range(actions)]
 
     def node(self, op: str, *args: Any) -> "Node":
@@ -67,9 +65,9 @@ class Tape:
         except (TypeError, ValueError):
             raise Untraceable(f"{type(value).__name__} {value!r:.40} is not a number") from None
 
-    def parameter(self, values: Numbers) -> Any:
+    def parameter(self, values: Numbers, name: str = "") -> Any:
         """A parameter's numbers: a node, or an array of them."""
-        first = len(self.q)
+        first = self.places[name] = len(self.q)
         self.q += values.ravel().tolist()
         nodes = [self.node("q", first + k) for k in range(values.size)]
         return nodes[0] if values.shape == () else Array(self, objects(nodes, values.shape))
@@ -108,10 +106,23 @@ class Tape:
             return nodes[0] if nodes else self.constant(0.0)
         return self.node("sum", *nodes)
 
+    def parameter_of(self, nodes: NDArray[Any]) -> tuple[str, Any]:
+        """The name of the parameter that an array is a part of, "" if of none, and its numbers."""
+        flat = nodes.ravel().tolist()
+        if not flat or not all(isinstance(node, Node) and node.op == "q" for node in flat):
+            return "", None
+        places = [node.args[0] for node in flat]
+        before = [name for name, at in self.places.items() if at <= places[0]]
+        name = max(before, key=self.places.__getitem__)
+        return name, np.reshape([self.q[place] for place in places], nodes.shape).tolist()
+
     def value(self, node: "Node") -> float:
         """The number that a node without actions is now."""
-        if node.op in "cq":
-            return float(node.args[0] if node.op == "c" else self.q[node.args[0]])
+        if node.op == "c":
+            return float(node.args[0])
+        if node.op == "q":
+            self.decided.add(node.args[0])
+            return self.q[node.args[0]]
         values = [self.value(arg) for arg in node.args]
         with np.errstate(all="ignore"):
             return float(evaluate(node.op, values))
@@ -302,7 +313,10 @@ class Array(Arithmetic):
             key = tuple(each.__index__() if isinstance(each, Node) else each for each in key)
 
         def make() -> Any:
-            found = self.nodes[key]
+            try:
+                found = self.nodes[key]
+            except IndexError as error:
+                raise NoEntry(self, key) from error
             return Array(self.tape, found) if isinstance(found, np.ndarray) else found
 
         return self._once(("[]", repr(key)), make)
@@ -340,17 +354,6 @@ def apply(tape: Tape, op: str, *inputs: Any) -> Any:
     if op in OPERATORS:
         return _shared(tape, op, inputs, lambda a, b: tape.binary(op, a, b), given)
     return _shared(tape, op, inputs, lambda a: tape.unary(op, a), given)
-
-
-def evaluate(op: str, values: list[Any]) -> Any:
-    """What an operator or function makes of numbers, or of arrays of them."""
-    if op == "sum":
-        return sum(values)
-    if op == "neg":
-        return -values[0]
-    if op in OPERATORS:
-        return OPERATORS[op](*map(np.float64, values))
-    return FUNCTIONS[op](values[0])
 
 
 def words(node: Node, deepest: int = 4) -> str:
@@ -404,7 +407,10 @@ def _each(tape: Tape, function: Callable[..., Any], *given: Any) -> Any:
     if all(isinstance(each, Node) or each.ndim == 0 for each in given):
         return function(*(each if isinstance(each, Node) else each[()] for each in given))
     arrays = [objects([each], ()) if isinstance(each, Node) else each for each in given]
-    grids = np.broadcast_arrays(*arrays)
+    try:
+        grids = np.broadcast_arrays(*arrays)
+    except ValueError:
+        raise Untraceable(f"{_shapes(tape, arrays)} do not go together") from None
     return Array(tape, objects([*map(function, *(g.ravel() for g in grids))], grids[0].shape))
 
 
@@ -427,6 +433,17 @@ def _once(tape: Tape, key: tuple[Any, ...], keep: tuple[Any, ...], make: Callabl
     return found[0]
 
 
+def by_shape(shape: tuple[int, ...]) -> str:
+    """A shape in words."""
+    return "x".join(map(str, shape)) or "one number"
+
+
+def _shapes(tape: Tape, arrays: Iterable[NDArray[Any]]) -> str:
+    """Arrays in words."""
+    found = [(tape.parameter_of(each)[0], by_shape(each.shape)) for each in arrays]
+    return " and ".join(f"'{n}' of {shape}" if n else f"an array of {shape}" for n, shape in found)
+
+
 def _along(tape: Tape, rows: NDArray[Any]) -> Array:
     flat = rows.reshape(-1, rows.shape[-1])
     return Array(tape, objects([tape.total(row) for row in flat], rows.shape[:-1]))
@@ -440,7 +457,7 @@ def _matmul(tape: Tape, left: Any, right: Any) -> Any:
         columns = b.T if b.ndim == 2 else b[None]
         rows = a if a.ndim == 2 else a[None]
         if rows.shape[1] != columns.shape[1]:
-            raise Untraceable(f"@ of shapes {a.shape} and {b.shape}")
+            raise Untraceable(f"@ of {_shapes(tape, (a, b))}")
         products = [
             tape.total(tape.binary("*", x, z) for x, z in zip(row, column, strict=True))
             for row in rows for column in columns
@@ -461,6 +478,6 @@ def _of_numpy(tape: Tape, ufunc: Any, method: str, inputs: Any, options: Any) ->
         return apply(tape, "**", inputs[0], 2)
     if name in ("equal", "not_equal"):
         return _equal(next(each for each in inputs if isinstance(each, Node | Array)), None)
-    if name in FUNCTIONS or name == "neg" or name in _UFUNCS:
-        return apply(tape, _UFUNCS.get(name, name), *inputs)
+    if name in FUNCTIONS or name == "neg" or name in UFUNCS:
+        return apply(tape, UFUNCS.get(name, name), *inputs)
     raise Untraceable(f"np.{ufunc.__name__} is not known here")

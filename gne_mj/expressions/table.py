@@ -36,8 +36,12 @@ class ExpressionsTable(GameTable):
         None, description="comparisons by name; one that has i is one for each agent"
     )
     object: str | None = Field(None, description=f"functions {OBJECT}")
-    parameters: dict[str, Any] = Field({}, description="numbers of the formulas, by name")
-    structure: dict[str, Any] = Field({}, description="what is no number to change: edges, lists")
+    parameters: Annotated[dict[str, Any], Fills("")] = Field(
+        {}, description="numbers of the formulas, by name"
+    )
+    structure: Annotated[dict[str, Any], Fills("")] = Field(
+        {}, description="what is no number to change: edges, lists"
+    )
     dimension: int | list[int] = Field(1, description="entries of an agent's action")
     lower: Limit | None = Field(
         None, description="least action: one, or one an agent or entry; 'none'"

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from gne_mj.errors import GneError, InvalidInput, UserCodeError, nearest
 from gne_mj.expressions.boxes import Limits
 from gne_mj.expressions.declared import Band, Private
-from gne_mj.expressions.nodes import Array, Node, Relation, Tape, Untraceable, objects, words
+from gne_mj.expressions.entries import check_entries, no_entry
+from gne_mj.expressions.nodes import Array, Node, NoEntry, Relation, Tape, objects, words
+from gne_mj.expressions.operators import Untraceable
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,15 @@ def trace(
     """
     tape = Tape(sum(sizes))
     y, p = _profile(tape, sizes), Parameters(tape, parameters)
-    costs = [_called(cost, f"for agent {i + 1}", _one, tape, cost, i, y, p)
-             for i in range(len(sizes))]  # fmt: skip
+    costs = [_called(cost, f"for agent {i + 1}", _one, tape, y, p, i) for i in range(len(sizes))]
     bounds = []
     if constraints is not None:
-        bounds = _called(constraints, "", _bounds, tape, constraints, y, p)
+        bounds = _called(constraints, "", _bounds, tape, y, p)
     boxed = _boxed(tape, limits, names)
     _check_read(p, parameters)
+    given = {key: numbers(value) for key, value in parameters.items()}
+    lists = {key: value for key, value in given.items() if value is not None}
+    check_entries(tape, [*costs, *(bound.g for bound in bounds)], lists, len(sizes))
     for name, times in Counter(bound.name for bound in [*bounds, *boxed]).items():
         if times > 1:
             raise InvalidInput("constraints", name, "each needs a name of its own")
@@ -167,18 +171,24 @@ def _parameter(tape: Tape, key: str, value: Any) -> Any:
         return value.value if isinstance(value, Fixed) else value
     if not np.all(np.isfinite(array)):
         raise InvalidInput(key, value, "every number must be finite")
-    return tape.parameter(array.astype(np.float64))
+    return tape.parameter(array.astype(np.float64), key)
 
 
-def _called(owner: Callable[..., Any], at: str, function: Callable[..., Any], *given: Any) -> Any:
+def _called(
+    owner: Callable[..., Any], at: str, call: Callable[..., Any],
+    tape: Tape, y: Any, p: Parameters, *agent: int,
+) -> Any:  # fmt: skip
     try:
-        return function(*given)
+        return call(tape, owner, *agent, y, p)
     except (KeyboardInterrupt, GneError):
         raise
     except RecursionError as error:
         raise UserCodeError(owner, "it calls itself too deeply", at) from error
     except BaseException as error:
-        raise UserCodeError(owner, error, at) from error
+        failed = UserCodeError(owner, error, at)
+        if isinstance(error, NoEntry) and error.parameter:
+            raise no_entry(error, len(y), f"{failed.where},", at) from error
+        raise failed from error
 
 
 def _one(tape: Tape, cost: Callable[..., Any], i: int, y: Any, p: Parameters) -> Node:

@@ -8,7 +8,9 @@ import numpy as np
 
 from gne_mj.errors import GneError, InvalidInput, raised
 from gne_mj.expressions.declared import band, private
-from gne_mj.expressions.nodes import FUNCTIONS
+from gne_mj.expressions.entries import no_entry
+from gne_mj.expressions.nodes import NoEntry
+from gne_mj.expressions.operators import FUNCTIONS
 
 _WORDS: dict[str, Any] = {
     "abs": abs, "sum": sum, "len": len, "range": range, "pi": np.pi,
@@ -79,6 +81,8 @@ def _value(
         raise
     except Exception as error:
         whose = "" if i is None else f" for agent {i + 1}"
+        if isinstance(error, NoEntry) and error.parameter:
+            raise no_entry(error, names[0]["N"], key, whose.strip()) from error
         raise InvalidInput(key, text, f"it must be a formula{whose}: {raised(error)}") from error
 
 
