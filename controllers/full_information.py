@@ -93,7 +93,7 @@ def storage(problem, memory):
 
 @LAWS.register
 class FullController(LawTable):
-    """[eq:nonlinFIfeedback]"""
+    """All actions are measured [eq:nonlinFIfeedback]"""
 
     information: Literal["full"]
 

@@ -10,7 +10,7 @@ The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`),
 import sys
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +38,7 @@ from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS
+from gne_mj.toml_table import Unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,10 +233,12 @@ def storage(problem, memory):
 
 @LAWS.register
 class DistributedController(NetworkTable):
-    """[eq:CenterFeedback]"""
+    """Neighbours' messages and nothing else [eq:CenterFeedback]"""
 
     information: Literal["distributed"]
-    epsilon: float = Field(gt=0, description="time constant of estimates and z in s")
+    epsilon: Annotated[float, Unit("s")] = Field(
+        gt=0, description="time constant of estimates and z"
+    )
     gain: float = Field(1.0, gt=0, description="k")
 
     def build(self, game: Game) -> Law:

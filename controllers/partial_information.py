@@ -13,7 +13,7 @@ The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`).
 import sys
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +41,7 @@ from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS
+from gne_mj.toml_table import Unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +177,13 @@ def storage(problem, memory):
 
 @LAWS.register
 class PartialController(NetworkTable):
-    """[eq:nonlinearPIFeedback]"""
+    """Costs at estimates that neighbours exchange [eq:nonlinearPIFeedback]"""
 
     information: Literal["partial"]
     coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
-    time_constant: float = Field(1.0, gt=0, description="tau of the estimates in s; the paper's 1")
+    time_constant: Annotated[float, Unit("s")] = Field(
+        1.0, gt=0, description="tau of the estimates; the paper has 1"
+    )
 
     def build(self, game: Game) -> Law:
         """The law."""

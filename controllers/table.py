@@ -15,7 +15,10 @@ from gne_mj.toml_table import Fills, Table
 class LawTable(Table):
     """A law and how it acts."""
 
-    mode: Annotated[str, MODES] = "continuous"
+    mode: Annotated[str, MODES] = Field(
+        "continuous",
+        description="when it acts: at every stage of the integrator, or once a period and held",
+    )
     decentralised: bool = Field(
         False, description="mode implicit: each agent keeps to its share of every bound's slack"
     )

@@ -20,7 +20,7 @@ from gne_mj.game_model import Game
 from gne_mj.native import kernel
 from gne_mj.ownership import own_curvature, own_slopes
 from gne_mj.registry import SCHEDULES
-from gne_mj.toml_table import Fills, Table
+from gne_mj.toml_table import Fills, Table, Unit
 
 # Entries of a schedule's numbers
 START, FLOOR, FALL = range(3)
@@ -84,13 +84,15 @@ class Schedule:
 
 
 class BarrierTable(Table):
-    """[eq:logbarrier]"""
+    """phi = -rho sum_l log(-g_l) [eq:logbarrier]"""
 
-    rho: float = Field(0.1, gt=0, description="at the start, if it has a schedule")
+    rho: float = Field(0.1, gt=0, description="the penalty; at the start, if it has a schedule")
     schedule: Annotated[Annotated[str, SCHEDULES] | None, Fills("kind")] = Field(
         None, description="how rho falls in time; constant if left out"
     )
-    time_constant: float | None = Field(None, gt=0, description="s, of the schedule; 1 if left out")
+    time_constant: Annotated[float | None, Unit("s")] = Field(
+        None, gt=0, description="T of the schedule; 1 if left out"
+    )
     floor: float | None = Field(
         None,
         gt=0,

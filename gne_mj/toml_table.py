@@ -36,6 +36,23 @@ class Fills:
     parameter: str
 
 
+# Units that game and agents say
+ACTION, INPUT = "the action's", "the input's"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a key's numbers are measured in, for the page of all keys.
+
+    Args:
+        name: the unit; empty for what has none, such as a weight or a count.
+        range: where they must be, if no constraint of the field says so.
+    """
+
+    name: str
+    range: str = ""
+
+
 class Table(BaseModel):
     """A TOML table: unknown keys and numbers that are not finite are errors.
 

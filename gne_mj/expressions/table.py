@@ -13,7 +13,7 @@ from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.python_objects import OBJECT, keep, kept
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import Fills
+from gne_mj.toml_table import ACTION, Fills, Unit
 from gne_mj.user_files import load_module
 
 # Bounds of actions; tables have finite numbers only
@@ -42,15 +42,19 @@ class ExpressionsTable(GameTable):
     structure: Annotated[dict[str, Any], Fills("")] = Field(
         {}, description="what is no number to change: edges, lists"
     )
-    dimension: int | list[int] = Field(1, description="entries of an agent's action")
-    lower: Limit | None = Field(
-        None, description="least action: one, or one an agent or entry; 'none'"
+    dimension: Annotated[int | list[int], Unit("", ">= 1")] = Field(
+        1, description="entries of an agent's action; one for all agents or one each"
     )
-    upper: Limit | None = Field(None, description="greatest action, likewise")
-    name: str = "own game"
-    action_name: str = "action"
-    action_unit: str = ""
-    agent_name: str = "agent"
+    lower: Annotated[Limit | None, Unit(ACTION)] = Field(
+        None, description="least action: one, or one an agent or entry; 'none' for no bound"
+    )
+    upper: Annotated[Limit | None, Unit(ACTION, "> lower")] = Field(
+        None, description="greatest action, likewise"
+    )
+    name: str = Field("own game", description="what the game is called")
+    action_name: str = Field("action", description="what an action is, for figures and files")
+    action_unit: str = Field("", description="its unit")
+    agent_name: str = Field("agent", description="what an agent is")
     axes: list[str] = Field([], description="names of an action's entries")
 
     def build(self, count: int) -> Game:

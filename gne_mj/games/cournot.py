@@ -13,7 +13,7 @@ Parameters q = [N, D, c (N), lower (N), upper (N)].
 
 import sys
 from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import PerAgent
+from gne_mj.toml_table import PerAgent, Unit
 
 
 def cournot_game(
@@ -136,10 +136,14 @@ class CournotTable(GameTable):
     """Firms of one product; what is left out has the published numbers for ``count`` firms."""
 
     type: Literal["cournot"]
-    unit_cost: list[float] | None = Field(None, description="c_i; N (1 + (i - 1) / 2)")
-    demand_intercept: float | None = Field(None, description="D, price of an empty market; 60 N")
+    unit_cost: list[float] | None = Field(None, description="c_i; N (1 + (i - 1) / 2) if left out")
+    demand_intercept: float | None = Field(
+        None, description="D, price of an empty market; 60 N if left out"
+    )
     lower_bound: PerAgent = Field(7.0, description="least quantity of each firm")
-    upper_bound: PerAgent = Field(100.0, description="greatest quantity of each firm")
+    upper_bound: Annotated[PerAgent, Unit("", "> lower_bound")] = Field(
+        100.0, description="greatest quantity of each firm"
+    )
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""

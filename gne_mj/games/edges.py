@@ -14,7 +14,7 @@ from gne_mj.errors import InvalidInput
 # Pairs of agents, numbered from 0
 Pairs = Sequence[tuple[int, int]]
 # As scenarios give them: a name, or pairs of agents numbered from 1
-Edges = Literal["line", "ring", "complete", "printed", "caption"] | list[tuple[int, int]]
+Edges = Literal["line", "ring", "star", "complete", "printed", "caption"] | list[tuple[int, int]]
 
 
 def pairs_of(given: Edges, count: int) -> list[tuple[int, int]]:

@@ -20,7 +20,7 @@ neighbours (rows j, w_ij, o_ij)].
 
 import sys
 from functools import partial
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,7 +35,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import PerAgent, per_agent
+from gne_mj.toml_table import PerAgent, Unit, per_agent
 
 Array = NDArray[np.float64]
 
@@ -305,25 +305,29 @@ class FormationTable(GameTable):
     """Positions in the plane; for agents whose output is a position on two axes."""
 
     type: Literal["formation"]
-    desired_place: list[_Point] | None = Field(
+    desired_place: Annotated[list[_Point] | None, Unit("m")] = Field(
         None,
-        description="r_i in m, [x, y] for each agent; if left out on a circle about 0, neighbours"
-        " 1 m apart",
+        description="r_i, [x, y] for each agent; if left out on a circle about 0, neighbours 1 m"
+        " apart",
     )
     edges: graph.Edges = Field(
         "ring", description="a name, or pairs of agents numbered from 1: who looks at whose place"
     )
-    edge_weight: PerAgent = Field(1.0, description="w_ij, positive; one or one for each edge")
-    desired_offset: list[_Point] | None = Field(
-        None, description="y_i - y_j in m, one for each edge; as the places are if left out"
+    edge_weight: Annotated[PerAgent, Unit("", "> 0")] = Field(
+        1.0, description="w_ij; one or one for each edge"
     )
-    place_weight: PerAgent | None = Field(
+    desired_offset: Annotated[list[_Point] | None, Unit("m")] = Field(
+        None, description="y_i - y_j, one for each edge; as the places are if left out"
+    )
+    place_weight: Annotated[PerAgent | None, Unit("", ">= 0")] = Field(
         None, description="v_i, positive for leaders and 0 for others; if left out agent 1 leads"
     )
     links: graph.Edges | None = Field(
         None, description="pairs that must stay within link_length; the edges if left out"
     )
-    link_length: PerAgent = Field(3.0, description="R in m, positive; one or one for each link")
+    link_length: Annotated[PerAgent, Unit("m", "> 0")] = Field(
+        3.0, description="R; one or one for each link"
+    )
     region: RegionTable = Field(
         RegionTable(box=[[-5.0, -5.0], [5.0, 5.0]]), description="where all must stay"
     )

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
+from gne_mj.toml_table import Unit
 
 
 def osnr_game(
@@ -210,15 +211,17 @@ def constraint_hessian(q, l, a, b, y):
 
 @GAMES.register
 class OsnrTable(GameTable):
-    """[eq:osnrGNE]; what is left out is taken from the ten-channel link."""
+    """Power control [eq:osnrGNE]; what is left out is taken from the ten-channel link."""
 
     type: Literal["osnr"]
-    total_power_limit: float | None = Field(None, gt=0, description="P_0 in mW")
-    price: list[float] | None = None
-    utility_weight: list[float] | None = None
-    gain: list[float] | None = None
-    noise_power: list[float] | None = None
-    system_matrix: list[list[float]] | None = None
+    total_power_limit: Annotated[float | None, Unit("mW")] = Field(None, gt=0, description="P_0")
+    price: Annotated[list[float] | None, Unit("1/mW", "> 0")] = Field(None, description="a_i")
+    utility_weight: Annotated[list[float] | None, Unit("", "> 0")] = Field(None, description="b_i")
+    gain: Annotated[list[float] | None, Unit("", "> 0")] = Field(None, description="c_i")
+    noise_power: Annotated[list[float] | None, Unit("mW", "> 0")] = Field(None, description="n0_i")
+    system_matrix: Annotated[list[list[float]] | None, Unit("", ">= 0")] = Field(
+        None, description="Gamma_ij, whose diagonal is not used"
+    )
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""

@@ -22,7 +22,7 @@ Parameters q = [lower (N), upper (N), d (N), w (N), r (N), v (N)]; d_1 is not us
 """
 
 import sys
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,7 +37,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import PerAgent
+from gne_mj.toml_table import PerAgent, Unit
 
 Array = NDArray[np.float64]
 
@@ -242,24 +242,26 @@ class PlatoonTable(GameTable):
     """Positions along a line; for agents whose output is a position."""
 
     type: Literal["platoon"]
-    least_spacing: PerAgent = Field(
-        DEFAULT_SPACING[0], description="in m, one or one for each pair of neighbours"
+    least_spacing: Annotated[PerAgent, Unit("m")] = Field(
+        DEFAULT_SPACING[0], description="one or one for each pair of neighbours"
     )
-    greatest_spacing: PerAgent = Field(DEFAULT_SPACING[1], description="in m, likewise")
-    desired_spacing: PerAgent | None = Field(
-        None, description="d_i in m, likewise; half way between the bounds if left out"
+    greatest_spacing: Annotated[PerAgent, Unit("m", "> least_spacing")] = Field(
+        DEFAULT_SPACING[1], description="likewise"
     )
-    spacing_weight: PerAgent = Field(1.0, description="w_i, not negative, likewise")
-    desired_place: PerAgent | None = Field(
+    desired_spacing: Annotated[PerAgent | None, Unit("m")] = Field(
+        None, description="d_i, likewise; half way between the bounds if left out"
+    )
+    spacing_weight: Annotated[PerAgent, Unit("", ">= 0")] = Field(1.0, description="w_i, likewise")
+    desired_place: Annotated[PerAgent | None, Unit("m")] = Field(
         None,
-        description="r_i in m; if left out 0 for the leader, the others behind it as spacings are"
+        description="r_i; if left out 0 for the leader, the others behind it as spacings are"
         " desired",
     )
-    place_weight: PerAgent | None = Field(
-        None, description="v_i, not negative; 1 for the leader and 0 for others if left out"
+    place_weight: Annotated[PerAgent | None, Unit("", ">= 0")] = Field(
+        None, description="v_i; 1 for the leader and 0 for others if left out"
     )
-    leader_range: tuple[float, float] = Field(
-        DEFAULT_RANGE, description="[least, greatest] place of the leader in m"
+    leader_range: Annotated[tuple[float, float], Unit("m", "rising")] = Field(
+        DEFAULT_RANGE, description="[least, greatest] place of the leader"
     )
 
     def build(self, count: int) -> Game:

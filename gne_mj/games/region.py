@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Box
-from gne_mj.toml_table import Table
+from gne_mj.toml_table import Table, Unit
 
 Array = NDArray[np.float64]
 
@@ -216,14 +216,16 @@ _Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 class RegionTable(Table):
     """Where agents in the plane must stay: a box, a convex polygon, a disc, or what all have."""
 
-    box: list[_Point] | None = Field(
-        None, description="[[least x, least y], [greatest x, greatest y]] in m"
+    box: Annotated[list[_Point] | None, Unit("m")] = Field(
+        None, description="[[least x, least y], [greatest x, greatest y]]"
     )
-    vertices: list[_Point] | None = Field(
-        None, description="in m, of a convex polygon in order round it"
+    vertices: Annotated[list[_Point] | None, Unit("m")] = Field(
+        None, description="of a convex polygon in order round it"
     )
-    center: _Point | None = Field(None, description="of a disc in m; [0, 0] if left out")
-    radius: float | None = Field(None, description="of the disc in m")
+    center: Annotated[_Point | None, Unit("m")] = Field(
+        None, description="of a disc; [0, 0] if left out"
+    )
+    radius: Annotated[float | None, Unit("m", "> 0")] = Field(None, description="of the disc")
 
     def build(self) -> Region:
         """The region."""

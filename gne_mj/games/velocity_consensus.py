@@ -14,7 +14,7 @@ where each agent's neighbours start (N + 1), neighbours].
 import sys
 from collections.abc import Sequence
 from functools import partial
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +29,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import PerAgent, per_agent
+from gne_mj.toml_table import PerAgent, Unit, per_agent
 
 HEADER = 3
 
@@ -248,18 +248,20 @@ class VelocityConsensusTable(GameTable):
     """Velocity vectors synchronised over any graph, some agents knowing the reference."""
 
     type: Literal["velocity-consensus"]
-    reference_velocity: list[float] = Field([1.0, 1.0], description="v_0 in m/s")
+    reference_velocity: Annotated[list[float], Unit("m/s")] = Field([1.0, 1.0], description="v_0")
     edges: graph.Edges = Field(
         "ring",
         description="a name, or pairs of agents numbered from 1; of the game, not of who hears"
         " whom",
     )
-    leader_weight: PerAgent | None = Field(
+    leader_weight: Annotated[PerAgent | None, Unit("", ">= 0")] = Field(
         None, description="w_i, positive for leaders and 0 for others; if left out agent 1 leads"
     )
-    gap_bound: PerAgent = Field(3.0, description="in m/s, positive; one or one for each edge")
-    leader_gap_bound: PerAgent = Field(
-        3.0, description="to v_0 in m/s, positive; one or one for each leader"
+    gap_bound: Annotated[PerAgent, Unit("m/s", "> 0")] = Field(
+        3.0, description="one or one for each edge"
+    )
+    leader_gap_bound: Annotated[PerAgent, Unit("m/s", "> 0")] = Field(
+        3.0, description="to v_0, one or one for each leader"
     )
 
     def build(self, count: int) -> Game:

@@ -9,7 +9,7 @@ Parameters q = [v_0, delta_1, ..., delta_N, v_1^d, ..., v_N^d, w_1, ..., w_N].
 """
 
 import sys
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.native import kernel
 from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
-from gne_mj.toml_table import PerAgent, per_agent
+from gne_mj.toml_table import PerAgent, Unit, per_agent
 
 
 def velocity_game(
@@ -161,15 +161,15 @@ DEFAULT_VELOCITIES = (1.0, 0.0, -1.0, 0.5, 2.0)
 
 @GAMES.register
 class VelocityTable(GameTable):
-    """[eq:sensorNetGNE]"""
+    """Velocities along a line, each following the one before [eq:sensorNetGNE]"""
 
     type: Literal["velocity-synchronization"]
-    reference_velocity: float = Field(3.0, description="v_0 in m/s")
-    gap_bound: PerAgent = Field(3.0, description="delta_i in m/s, positive")
-    desired_velocity: PerAgent | None = Field(
-        None, description="v_i^d in m/s; the reference velocity if left out"
+    reference_velocity: Annotated[float, Unit("m/s")] = Field(3.0, description="v_0")
+    gap_bound: Annotated[PerAgent, Unit("m/s", "> 0")] = Field(3.0, description="delta_i")
+    desired_velocity: Annotated[PerAgent | None, Unit("m/s")] = Field(
+        None, description="v_i^d; the reference velocity if left out"
     )
-    desired_weight: PerAgent = Field(0.0, description="w_i, not negative")
+    desired_weight: Annotated[PerAgent, Unit("", ">= 0")] = Field(0.0, description="w_i")
 
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""

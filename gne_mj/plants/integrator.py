@@ -98,7 +98,7 @@ def storage_given(q, x, equilibrium_state, known):
 
 @AGENTS.register
 class IntegratorAgents(AgentsTable):
-    """[eq:int]"""
+    """y' = u [eq:int]"""
 
     type: Literal["integrator"]
 

@@ -7,13 +7,14 @@ beside its input: the force at its joint is u - d v.
 """
 
 from collections.abc import Mapping
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput
-from gne_mj.toml_table import PerAgent, Sizes, Table, per_agent
+from gne_mj.toml_table import PerAgent, Sizes, Table, Unit, per_agent
 
 Array = NDArray[np.float64]
 
@@ -27,14 +28,15 @@ class LookaheadKeys(Table):
         lookahead: tau, the same for all, since sets that couple agents are kept only then.
     """
 
-    lookahead: float | None = Field(
-        None, gt=0, description="tau in s of y = q + tau v, one for all agents"
+    lookahead: Annotated[float | None, Unit("s")] = Field(
+        None, gt=0, description="tau of y = q + tau v, one for all agents"
     )
-    local_damping: PerAgent | None = Field(
-        None, description="d in N s/m: the force at an agent's joint is u - d v"
+    local_damping: Annotated[PerAgent | None, Unit("N s/m", ">= 0")] = Field(
+        None,
+        description="d: the force at an agent's joint is u - d v; for outputs that are positions",
     )
-    reference_velocity: float | list[float] | None = Field(
-        None, description="v_0 in m/s, to which q and v are relative; in the plane a vector"
+    reference_velocity: Annotated[float | list[float] | None, Unit("m/s")] = Field(
+        None, description="v_0, to which q and v are relative, likewise; in the plane a vector"
     )
 
     def check_unused(self, expected: str) -> None:

@@ -8,7 +8,7 @@ Channel parameters q = [v, k], both in 1/s.
 """
 
 import sys
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS
-from gne_mj.toml_table import PerAgent, Sizes, dimension_of
+from gne_mj.toml_table import PerAgent, Sizes, Unit, dimension_of
 
 NAME = "PI cascade"
 PARAMETERS = ("decay_rate", "integral_gain")
@@ -101,11 +101,11 @@ def storage_given(q, x, equilibrium_state, known):
 
 @AGENTS.register
 class PiCascadeAgents(AgentsTable):
-    """[eq:cascadePI]"""
+    """First-order systems behind a PI controller [eq:cascadePI]"""
 
     type: Literal["pi-cascade"]
-    decay_rate: PerAgent = Field(1.0, description="v in 1/s")
-    integral_gain: PerAgent = Field(0.5, description="k in 1/s, 0 < k < v")
+    decay_rate: Annotated[PerAgent, Unit("1/s", "> 0")] = Field(1.0, description="v")
+    integral_gain: Annotated[PerAgent, Unit("1/s", "0 < k < v")] = Field(0.5, description="k")
 
     def build(self, sizes: Sizes) -> Agents:
         """The agents, for actions of so many entries each."""

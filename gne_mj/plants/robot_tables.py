@@ -1,6 +1,6 @@
 """The tables of flexible robots, whose outputs are velocities or positions with a look-ahead."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,18 +11,18 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.lookahead import RESERVE, LookaheadKeys
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
-from gne_mj.toml_table import PerAgent, Sizes
+from gne_mj.toml_table import PerAgent, Sizes, Unit
 
 
 class _RobotTable(AgentsTable, LookaheadKeys):
-    """[eq:MobileRobot]"""
+    """Two masses, a spring and a damper [eq:MobileRobot]"""
 
     axes: ClassVar[int]
-    main_mass: PerAgent = Field(1.0, description="M in kg, positive")
-    appendage_mass: PerAgent = Field(1.0, description="m in kg, positive")
-    stiffness: PerAgent = Field(1.0, description="linear part of psi in N/m")
-    atan_coefficient: PerAgent = Field(1.0, description="atan part of psi in N")
-    damping: PerAgent = Field(1.0, description="gamma in N s/m")
+    main_mass: Annotated[PerAgent, Unit("kg", "> 0")] = Field(1.0, description="M")
+    appendage_mass: Annotated[PerAgent, Unit("kg", "> 0")] = Field(1.0, description="m")
+    stiffness: Annotated[PerAgent, Unit("N/m")] = Field(1.0, description="linear part of psi")
+    atan_coefficient: Annotated[PerAgent, Unit("N")] = Field(1.0, description="atan part of psi")
+    damping: Annotated[PerAgent, Unit("N s/m", ">= 0")] = Field(1.0, description="gamma")
     output: Literal["velocity", "position"] = Field(
         "velocity", description="y: the velocity v, or the position with a look-ahead, q + tau v"
     )

@@ -11,7 +11,7 @@ from pydantic import Field
 from gne_mj.bounds import MOST_AGENTS
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.agents import Agents
-from gne_mj.toml_table import Fills, PerAction, Sizes, Table, per_action, per_agent
+from gne_mj.toml_table import INPUT, Fills, PerAction, Sizes, Table, Unit, per_action, per_agent
 
 # Of N a game and a graph are told as well
 Count = Annotated[int, Fills("game.agents"), Fills("game.count"), Fills("controller.agents")]
@@ -25,8 +25,8 @@ class AgentsTable(Table):
     """
 
     engine: ClassVar[str] = "ode"
-    count: Count = Field(gt=0, le=MOST_AGENTS, description="N")
-    input_limit: PerAction | None = Field(
+    count: Count = Field(gt=0, le=MOST_AGENTS, description="N, how many agents")
+    input_limit: Annotated[PerAction | None, Unit(INPUT, "> 0")] = Field(
         None, description="greatest |u| that the actuators deliver; no limit if left out"
     )
 

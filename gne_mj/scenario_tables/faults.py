@@ -1,6 +1,6 @@
 """The tables ``[[systems.NAME.faults]]``, one a kind of fault, and ``[systems.NAME.margin]``."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -9,7 +9,7 @@ from gne_mj import faults
 from gne_mj.game_model import Game
 from gne_mj.margins import Disturbance
 from gne_mj.registry import FAULTS
-from gne_mj.toml_table import PerAgent, Table, per_agent
+from gne_mj.toml_table import ACTION, INPUT, PerAgent, Table, Unit, per_agent
 
 
 class FaultTable(Table):
@@ -33,8 +33,10 @@ class _SomeTable(FaultTable):
     agents: list[int] | None = Field(
         None, min_length=1, description="numbered from 1; all if left out"
     )
-    start: float = Field(0.0, ge=0, description="s")
-    end: float | None = Field(None, gt=0, description="s; the run's end if left out")
+    start: Annotated[float, Unit("s")] = Field(0.0, ge=0, description="from when")
+    end: Annotated[float | None, Unit("s", "> start")] = Field(
+        None, gt=0, description="until when; the run's end if left out"
+    )
 
 
 @FAULTS.register
@@ -43,12 +45,14 @@ class PushTable(_SomeTable):
 
     fault = faults.Push
     type: Literal["push"]
-    force: float = Field(description="in the input's unit")
+    force: Annotated[float, Unit(INPUT)] = Field(description="its size, with its sign")
     axis: int | None = Field(
         None, ge=1, description="which entry of the agents' actions; all if left out"
     )
-    profile: Literal["constant", "sine", "square", "random"] = "constant"
-    period: float = Field(1.0, gt=0, description="s, of 'sine' and 'square'")
+    profile: Literal["constant", "sine", "square", "random"] = Field(
+        "constant", description="over time; 'random' is anew at every step, uniform up to force"
+    )
+    period: Annotated[float, Unit("s")] = Field(1.0, gt=0, description="of 'sine' and 'square'")
 
 
 @FAULTS.register
@@ -57,7 +61,7 @@ class SaturationTable(_SomeTable):
 
     fault = faults.Saturation
     type: Literal["saturation"]
-    limit: float = Field(ge=0, description="greatest |u| meanwhile")
+    limit: Annotated[float, Unit(INPUT)] = Field(ge=0, description="greatest |u| meanwhile")
 
 
 @FAULTS.register
@@ -66,7 +70,7 @@ class NoiseTable(_SomeTable):
 
     fault = faults.Noise
     type: Literal["noise"]
-    amplitude: float = Field(ge=0, description="greatest error, uniform")
+    amplitude: Annotated[float, Unit(ACTION)] = Field(ge=0, description="greatest error, uniform")
 
 
 @FAULTS.register
@@ -75,7 +79,7 @@ class BiasTable(_SomeTable):
 
     fault = faults.Bias
     type: Literal["bias"]
-    offset: float = Field(description="what is read less what is")
+    offset: Annotated[float, Unit(ACTION)] = Field(description="what is read less what is")
 
 
 @FAULTS.register
@@ -84,7 +88,7 @@ class SensorDelayTable(FaultTable):
 
     fault = faults.SensorDelay
     type: Literal["sensor-delay"]
-    periods: int = Field(ge=0, description="control periods")
+    periods: Annotated[int, Unit("control periods")] = Field(ge=0, description="how late")
 
 
 class _LinksTable(_SomeTable):
@@ -99,7 +103,7 @@ class MessageLossTable(_LinksTable):
 
     fault = faults.MessageLoss
     type: Literal["message-loss"]
-    probability: float = Field(ge=0, le=1)
+    probability: float = Field(ge=0, le=1, description="that a message is lost")
 
 
 @FAULTS.register
@@ -108,7 +112,7 @@ class MessageDelayTable(_LinksTable):
 
     fault = faults.MessageDelay
     type: Literal["message-delay"]
-    periods: int = Field(ge=0, description="control periods")
+    periods: Annotated[int, Unit("control periods")] = Field(ge=0, description="how late")
 
 
 @FAULTS.register
@@ -128,16 +132,22 @@ class CorruptionTable(FaultTable):
     agents: list[int] | None = Field(
         None, min_length=1, description="numbered from 1; all if left out"
     )
-    start: float = Field(0.0, ge=0, description="s")
-    amplitude: float = Field(ge=0, description="greatest shift, uniform")
+    start: Annotated[float, Unit("s")] = Field(0.0, ge=0, description="when")
+    amplitude: Annotated[float, Unit(ACTION)] = Field(ge=0, description="greatest shift, uniform")
 
 
 class MarginTable(Table):
     """Bounds on what is not modelled, from which the barrier's tightening follows."""
 
-    push: PerAgent = Field(0.0, description="greatest force besides the input, in its unit")
-    noise: PerAgent = Field(0.0, description="greatest error of an output")
-    delay: int = Field(0, ge=0, le=1000, description="of the sensors, in control periods")
+    push: Annotated[PerAgent, Unit(INPUT, ">= 0")] = Field(
+        0.0, description="greatest force besides the input"
+    )
+    noise: Annotated[PerAgent, Unit(ACTION, ">= 0")] = Field(
+        0.0, description="greatest error of an output"
+    )
+    delay: Annotated[int, Unit("control periods")] = Field(
+        0, ge=0, le=1000, description="of the sensors"
+    )
 
     def disturbance(self, game: Game) -> Disturbance:
         """The bounds, for each channel."""

@@ -33,7 +33,7 @@ from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.checks import check_estimates
 from gne_mj.theory.periods import least_rho
-from gne_mj.toml_table import Fills, PerAction, Sizes, Table, per_action
+from gne_mj.toml_table import ACTION, Fills, PerAction, Sizes, Table, Unit, per_action
 
 load_plugins()  # the tables below hold any of those that are registered
 
@@ -45,7 +45,7 @@ class PlantTable(Table):
         None, description="'ode' if left out, but 'mujoco' for MJCF robots"
     )
     integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
-        None, description="in place of the simulation's"
+        None, description="in place of the simulation's; 'rosenbrock' for the distributed law"
     )
 
 
@@ -56,20 +56,34 @@ STARTS = ("action", "extension", "appendage_velocity", "position", "velocity", "
 class InitialTable(Table):
     """The start; what is left out rests, relaxed, at the default actions."""
 
-    action: Annotated[PerAction | None, Fills("state")] = Field(None, description="y(0)")
-    extension: PerAction | None = Field(None, description="robots: x1(0) in m")
-    appendage_velocity: PerAction | None = Field(None, description="robots: x3(0) in m/s")
-    position: PerAction | None = Field(
-        None, description="robots: d(0), or q(0) of outputs that are positions, in m"
+    action: Annotated[PerAction | None, Fills("state"), Unit(ACTION, "strictly inside")] = Field(
+        None, description="y(0); the game's own, or one that is looked for inside, if left out"
     )
-    velocity: PerAction | None = Field(
-        None, description="v(0) in m/s of robots whose outputs are positions, relative to v_0"
+    extension: Annotated[PerAction | None, Unit("m")] = Field(None, description="robots: x1(0)")
+    appendage_velocity: Annotated[PerAction | None, Unit("m/s")] = Field(
+        None, description="robots: x3(0)"
     )
-    integral: PerAction | None = Field(None, description="PI cascade: s(0)")
-    estimate: Annotated[float | list[float] | list[list[float]] | None, Fills("memory")] = Field(
-        None, description="one number, a profile that all agents hold, or one profile each; y(0)"
+    position: Annotated[PerAction | None, Unit("m")] = Field(
+        None, description="robots: d(0), or q(0) of outputs that are positions"
     )
-    filtered: PerAction | None = Field(None, description="distributed law: z(0); y(0) if left out")
+    velocity: Annotated[PerAction | None, Unit("m/s")] = Field(
+        None, description="v(0) of robots whose outputs are positions, relative to v_0"
+    )
+    integral: Annotated[PerAction | None, Unit(ACTION)] = Field(
+        None, description="PI cascade: s(0)"
+    )
+    estimate: Annotated[
+        float | list[float] | list[list[float]] | None,
+        Fills("memory"),
+        Unit(ACTION, "strictly inside for the distributed law"),
+    ] = Field(
+        None,
+        description="what agents take all actions to be: one number, a profile for all agents, or"
+        " one profile each; y(0) if left out",
+    )
+    filtered: Annotated[PerAction | None, Unit(ACTION, "strictly inside")] = Field(
+        None, description="distributed law: z(0); y(0) if left out"
+    )
 
     def build(
         self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
@@ -95,15 +109,19 @@ class InitialTable(Table):
 class SystemTable(Table):
     """One game with its agents."""
 
-    game: Annotated[GameTable, GAMES]
+    game: Annotated[GameTable, GAMES] = Field(description="what is played")
     # N is the game's too
-    agents: Annotated[AgentsTable, AGENTS, Fills("")]
-    barrier: Annotated[BarrierTable, Fills("")] = BarrierTable()
-    controller: Annotated[LawTable, LAWS, Fills("law"), Fills("")] = FullController(
-        information="full"
+    agents: Annotated[AgentsTable, AGENTS, Fills("")] = Field(description="who plays")
+    barrier: Annotated[BarrierTable, Fills("")] = Field(
+        BarrierTable(), description="what keeps them inside"
     )
-    plant: Annotated[PlantTable, Fills("")] = PlantTable()
-    initial: Annotated[InitialTable, Fills("")] = InitialTable()
+    controller: Annotated[LawTable, LAWS, Fills("law"), Fills("")] = Field(
+        FullController(information="full"), description="by which law"
+    )
+    plant: Annotated[PlantTable, Fills("")] = Field(
+        PlantTable(), description="what moves the agents"
+    )
+    initial: Annotated[InitialTable, Fills("")] = Field(InitialTable(), description="the start")
     margin: Annotated[MarginTable | None, Fills("disturbance")] = Field(
         None, description="the barrier is tightened so that these disturbances keep all inside"
     )
@@ -307,31 +325,41 @@ class SystemTable(Table):
 class SimulationTable(Table):
     """The clock that all systems share."""
 
-    duration: float = Field(30.0, gt=0, description="s")
-    timestep: float = Field(0.002, gt=0, description="s")
-    control_period: float | None = Field(
-        None, gt=0, description="s, for the held modes; the timestep if left out"
+    duration: Annotated[float, Unit("s")] = Field(30.0, gt=0, description="of the run")
+    timestep: Annotated[float, Unit("s")] = Field(0.002, gt=0, description="of the integration")
+    control_period: Annotated[float | None, Unit("s")] = Field(
+        None, gt=0, description="how long held modes hold inputs; the timestep if left out"
     )
-    integrator: Literal["rk4", "euler"] = "rk4"
-    tolerance: float = Field(1e-3, gt=0, description="on max |y - y*|, for status converged")
+    integrator: Literal["rk4", "euler"] = Field(
+        "rk4", description="Runge and Kutta's of order four, or MuJoCo's semi-implicit Euler"
+    )
+    tolerance: Annotated[float, Unit(ACTION)] = Field(
+        1e-3, gt=0, description="on max |y - y*|, for status converged"
+    )
     seed: int = Field(0, ge=0, le=2**53, description="of what is random in faults")
 
 
 class RecordingTable(Table):
     """What is kept."""
 
-    period: Annotated[float, Fills("sample_period")] = Field(
-        0.05, gt=0, description="s between samples"
+    period: Annotated[float, Fills("sample_period"), Unit("s")] = Field(
+        0.05, gt=0, description="between samples"
     )
 
 
 class Scenario(Table):
     """A whole run: systems on one clock."""
 
-    description: str = ""
-    simulation: Annotated[SimulationTable, Fills("clock")] = SimulationTable()
-    recording: Annotated[RecordingTable, Fills("clock")] = RecordingTable()
-    systems: dict[str, SystemTable] = Field(min_length=1)
+    description: str = Field("", description="in words, for lists of scenarios")
+    simulation: Annotated[SimulationTable, Fills("clock")] = Field(
+        SimulationTable(), description="the clock"
+    )
+    recording: Annotated[RecordingTable, Fills("clock")] = Field(
+        RecordingTable(), description="what is kept"
+    )
+    systems: dict[str, SystemTable] = Field(
+        min_length=1, description="by names of letters, digits, '-' and '_'"
+    )
 
     @model_validator(mode="after")
     def _names(self) -> "Scenario":

@@ -1,0 +1,146 @@
+"""The page docs/keys.md: every key that a scenario can have, as its tables declare it."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from gne_mj.registry import Names, Registry
+from gne_mj.scenario_tables import Scenario, SystemTable
+from gne_mj.toml_table import Table, Unit
+
+PAGE = Path(__file__).parents[2] / "docs" / "keys.md"
+HEAD = """# All keys of a scenario
+
+`scripts/keys` writes this page from the tables that read scenarios; what is changed here is lost.
+
+What is not said to be given may be left out. *One or a list*: one number for all agents, or a list
+with one for each; of actions with several entries also one list for all, or a list of lists. The
+action's unit is the game's; the input's is N or N m for robots, else the action's per second.
+`gne-mj run --set KEY=VALUE` changes any of these by its dotted name, in which `systems.NAME.` may
+be left out: `barrier.rho=0.02`.
+"""
+TITLES = {"game": "`[systems.NAME.game]`", "agents": "`[systems.NAME.agents]`",
+          "controller": "`[systems.NAME.controller]`: the law",
+          "faults": "`[[systems.NAME.faults]]`, as many as there are"}  # fmt: skip
+GRAPHS = """`graph` is `line`, `ring`, `star` or `complete` for any number of agents, `printed` or
+`caption` for ten (the paper's, as its figure is drawn and as its caption says), or a list of edges:
+`graph = [[1, 2], [2, 3]]`. A table without `information` is of full information.
+"""
+
+
+def page() -> str:
+    """The whole text."""
+    parts = [HEAD, "## The whole file\n", _rows(Scenario)]
+    for name in ("simulation", "recording"):
+        parts += [f"## `[{name}]`\n", _rows(_table_of(Scenario.model_fields[name]))]
+    parts += ["## `[systems.NAME]`\n", _rows(SystemTable)]
+    for name, field in SystemTable.model_fields.items():
+        parts += [f"## {TITLES.get(name, f'`[systems.NAME.{name}]`')}\n"]
+        registry = _registry(field)
+        if registry is None:
+            parts += [_rows(_table_of(field))]
+            continue
+        if name == "controller":
+            parts += [GRAPHS]
+        for tag, table in sorted(registry._tables.items()):
+            if table.__module__.startswith("gne_mj."):  # and of no plug-in
+                parts += [f'### `{registry.key} = "{tag}"`\n', _about(table), _rows(table)]
+                parts += [text for key, inner in _inner(table)
+                          for text in (f"`{key}` has\n", _rows(inner))]  # fmt: skip
+    return "\n".join(parts)
+
+
+def _about(table: type[Table]) -> str:
+    first = (table.__doc__ or "").split("\n\n")[0]
+    return " ".join(first.split()).rstrip(".").replace("``", "`") + ".\n"
+
+
+def _rows(table: type[Table]) -> str:
+    """The keys of a table, but the one that chooses it."""
+    lines = ["| key | type | unit | default | range | |", "|---|---|---|---|---|---|"]
+    for key, field in table.model_fields.items():
+        if key in ("type", "information"):
+            continue
+        unit = next((each for each in field.metadata if isinstance(each, Unit)), Unit(""))
+        cells = [f"`{key}`", _kind(field), unit.name, _default(field),
+                 unit.range or _range(field), field.description or ""]  # fmt: skip
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n" if len(lines) > 2 else "It has no keys of its own.\n"
+
+
+def _kind(field: FieldInfo) -> str:
+    names = next((each for each in field.metadata if isinstance(each, Names)), None)
+    return _choice(names) if names is not None else _words(field.annotation)
+
+
+def _words(kind: Any) -> str:
+    """A type, in the words of a scenario's author."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        names = next((each for each in inner[1:] if isinstance(each, Names)), None)
+        return _choice(names) if names is not None else _words(inner[0])
+    if origin is Literal:
+        return ", ".join(f"`{json.dumps(each)}`" for each in inner)
+    if origin in (Union, UnionType):
+        given = [each for each in inner if each is not NoneType]
+        lists = [each for each in given if get_origin(each) is list]
+        if float in given and lists:
+            return "number, one or a list" + (" (of lists)" if len(lists) > 1 else "")
+        return " or ".join(dict.fromkeys(_words(each) for each in given))
+    if origin in (list, tuple):
+        each = _words(inner[0])
+        first = each.split(" of ")[0]
+        return f"{'list' if origin is list else 'pair'} of {each.replace(first, f'{first}s', 1)}"
+    if origin is dict or (isinstance(kind, type) and issubclass(kind, Table)):
+        return "table"
+    known = {float: "number", int: "whole number", str: "text", bool: "`true`, `false`"}
+    return known.get(kind, "table")
+
+
+def _choice(names: Names[Any]) -> str:
+    return ", ".join(f"`{json.dumps(each.name)}`" for each in names)
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "must be given"
+    value = field.default
+    if value is None or isinstance(value, Table) or value in ({}, []):
+        return ""
+    return f"`{json.dumps(value)}`"
+
+
+def _range(field: FieldInfo) -> str:
+    words = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    found = [f"{sign} {getattr(each, name):.17g}" for each in field.metadata
+             for name, sign in words.items() if hasattr(each, name)]  # fmt: skip
+    least = [f"at least {each.min_length}" for each in field.metadata
+             if hasattr(each, "min_length")]  # fmt: skip
+    return ", ".join(found + least)
+
+
+def _registry(field: FieldInfo) -> Registry | None:
+    """Which tables may stand there, or in the list there."""
+    inner = get_args(field.annotation)
+    items = get_args(inner[0]) if inner else ()
+    return next((each for each in (*field.metadata, *items) if isinstance(each, Registry)), None)
+
+
+def _table_of(field: FieldInfo) -> type[Table]:
+    kinds = [field.annotation, *get_args(field.annotation)]
+    return next(each for each in kinds if isinstance(each, type) and issubclass(each, Table))
+
+
+def _inner(table: type[Table]) -> Iterator[tuple[str, type[Table]]]:
+    """Tables in a table, such as a region."""
+    for key, field in table.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Table):
+            yield key, field.annotation
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
