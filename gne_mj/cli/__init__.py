@@ -1,6 +1,6 @@
 """The command line. Heavy modules are imported where they are needed, so that --help is quick."""
 
-from gne_mj.cli import analyses, batches, new, runs, views
+from gne_mj.cli import analyses, batches, new, precompiling, runs, views
 from gne_mj.cli.application import app, main
 
-__all__ = ["analyses", "app", "batches", "main", "new", "runs", "views"]
+__all__ = ["analyses", "app", "batches", "main", "new", "precompiling", "runs", "views"]

@@ -1,0 +1,56 @@
+"""Compiling ahead what first runs would compile: loops, solvers and the shipped games and laws.
+
+Machine code is made where it is first needed and kept on disk (:mod:`gne_mj.machine_code`). Here
+one short run of each kind is made in processes beside each other, so that no later run of these
+kinds compiles anything, and one of a game, an agent or a law of one's own that only.
+"""
+
+import multiprocessing
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import Any
+
+from gne_mj.scenario import load_scenario, shipped
+
+STEPS = 3  # of each run
+_ODE, _RING = {"plant.engine": "ode"}, {"controller.graph": "ring"}
+_PARTIAL = {"controller.information": "partial", **_RING}
+_DISTRIBUTED = {"controller.information": "distributed", "controller.epsilon": 0.1, **_RING}
+_SAMPLED = {"controller.mode": "sampled"}
+_IMPLICIT = {"controller.mode": "implicit"}
+
+# Besides the shipped scenarios as they are: kinds of runs that none of them is
+OTHERS: tuple[dict[str, Any], ...] = (
+    _IMPLICIT,
+    {**_IMPLICIT, **_ODE},
+    {**_PARTIAL, **_IMPLICIT, "controller.decentralised": True},
+    _PARTIAL,
+    {**_PARTIAL, **_ODE},
+    _DISTRIBUTED,
+    _SAMPLED,
+)
+
+
+def runs() -> list[tuple[str, dict[str, Any]]]:
+    """What is run: scenarios, each with what is changed in it."""
+    return [*(("velocity-sync", each) for each in OTHERS), *((name, {}) for name in shipped())]
+
+
+def precompile(processes: int | None = None) -> Iterator[str]:
+    """Compile what :func:`runs` need, and yield each one's scenario when it is done.
+
+    Args:
+        processes: that compile beside each other; as many as there are processors if left out.
+    """
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes or os.cpu_count(), spawn) as pool:
+        for done in as_completed([pool.submit(_run, *each) for each in runs()]):
+            yield done.result()
+
+
+def _run(scenario: str, changes: dict[str, Any]) -> str:
+    simulation = load_scenario(scenario, changes).simulation_object()
+    simulation.advance(STEPS)
+    simulation.trajectory()
+    return scenario
