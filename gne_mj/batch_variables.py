@@ -156,6 +156,11 @@ def follow(system: System) -> bool:
     return followed_position(system.agents.kind) >= 0
 
 
+def collide(system: System) -> bool:
+    """Whether bodies of different agents collide."""
+    return system.agents.contacts
+
+
 def _of_monitor(name: str, entry: str, **about: Any) -> Variable:
     return Variable(name, ("run",), lambda runs: runs.seen(entry), **about)
 
@@ -256,6 +261,12 @@ JUDGED = (
         "position_margin", ("run",),
         lambda runs: _where(runs.observed, -runs.seen("positions_worst")), there=follow,
         long_name="least -g at positions that follow outputs",
+    ),
+    _of_monitor(
+        "contacts", "contacts", there=collide,
+        long_name="contacts between agents, at all steps together",
+        panel=Panel("contacts", log=False, worst="max"),
+        columns=(Column("contacts", "contacts", lambda each: int(each.sum())),),
     ),
 )  # fmt: skip
 

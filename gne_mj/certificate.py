@@ -45,6 +45,9 @@ class Certificate:
         actuators: peak, RMS and energy of the inputs, and where a limit was met.
         positions: of agents whose positions follow their outputs: how often these were observed
             and how often outside, and the least margin -g at them; None of others.
+        contacts: of agents whose bodies collide in MuJoCo: how many contacts between two agents
+            there were (each counted at every step that it lasted), at how many steps, the first
+            one, whose it was, and how deep bodies were in each other; None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
@@ -63,6 +66,7 @@ class Certificate:
     lyapunov: dict[str, Any]
     actuators: dict[str, Any]
     positions: dict[str, Any] | None
+    contacts: dict[str, Any] | None
     exit: dict[str, Any] | None
     of_modes: dict[str, Any]
     steps: int
@@ -131,6 +135,7 @@ def certify_run(
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
         positions=_positions(system, monitor),
+        contacts=_contacts(system, monitor),
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
@@ -319,6 +324,21 @@ def _positions(system: System, monitor: Any) -> dict[str, Any] | None:
         "least_margin": -float(monitor.positions_worst),
         "constraint": system.game.constraint_names[int(monitor.positions_constraint)],
         "time": float(monitor.positions_worst_time),
+    }
+
+
+def _contacts(system: System, monitor: Any) -> dict[str, Any] | None:
+    """What was seen of contacts between agents, at every integration step."""
+    if not system.agents.contacts:
+        return None
+    any_at_all = monitor.contacts > 0
+    agents = [1 + int(monitor.contact_agent), 1 + int(monitor.contact_other)]
+    return {
+        "count": int(monitor.contacts),
+        "steps": int(monitor.touching),
+        "first": float(monitor.contact_time) if any_at_all else None,
+        "agents": agents if any_at_all else None,
+        "depth": float(monitor.contact_depth),
     }
 
 

@@ -23,6 +23,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {seen['least_margin']:.6g}, constraint '{seen['constraint']}' at"
             f" {seen['time']:.4g} s"
         )
+    if report["contacts"] is not None:
+        rows["contacts"] = _contacts(report["contacts"])
     if gap is not None:
         size = f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}".rstrip()
         rows["widest gap"] = f"{size}, {gap['name']} at {gap['time']:.4g} s"
@@ -39,6 +41,15 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {bounds_text(epsilon)}"
         )
     return rows
+
+
+def _contacts(seen: dict[str, Any]) -> str:
+    if not seen["count"]:
+        return "none between agents"
+    return (
+        f"between agents at {seen['steps']} steps, first between {seen['agents'][0]} and"
+        f" {seen['agents'][1]} at {seen['first']:.4g} s, up to {seen['depth']:.2g} m deep"
+    )
 
 
 def _least_margin(worst: dict[str, Any] | None) -> str:

@@ -180,7 +180,7 @@ def test_robots_at_one_place_must_not_overlap(tmp_path):
     path.write_text(text.replace('mass="0.5"', 'mass="0.5" contype="0" conaffinity="0"'))
     robots = tuple(RobotFile(path, *axis) for axis in (("x", "u_x"), ("y", "u_y")) * 2)
     table, limit = np.tile([TAU, 9.0, 0.0], (4, 1)), np.full(4, np.inf)
-    agents = MjcfRobots(mjcf_position, table, limit, 2, robots, together=True)
+    agents = MjcfRobots(mjcf_position, table, limit, 2, robots=robots, together=True)
     plant = MjcfPlant(agents, 0.01)
     apart = np.array([0.0, 0.0, 1.0, 0.0])
     plant.reset(np.column_stack([apart, apart]))

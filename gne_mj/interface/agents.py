@@ -37,6 +37,7 @@ def flexible_robots(
     lookahead: float | None = None,
     local_damping: ArrayLike | None = None,
     reference_velocity: ArrayLike | None = None,
+    contacts: bool = False,
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
     """Robots on a lane: two masses, a spring and a damper [eq:MobileRobot].
@@ -53,6 +54,7 @@ def flexible_robots(
         local_damping: d in N s/m, the force being u - d v; 1.2 times the least that is proven
             (docs/positions.md) if left out.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
+        contacts: whether main masses collide in MuJoCo; contacts are counted then.
         input_limit: in N.
     """
     return made(RobotAgents, type="flexible-robot", **locals())
@@ -70,6 +72,7 @@ def planar_robots(
     lookahead: float | None = None,
     local_damping: ArrayLike | None = None,
     reference_velocity: ArrayLike | None = None,
+    contacts: bool = False,
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
     """The same robots in the plane, for games with ``dimension=2``.
@@ -87,6 +90,7 @@ def planar_robots(
             (docs/positions.md) if left out.
         reference_velocity: v_0 in m/s, to which q and v are relative, two numbers or one for
             both; 0 if left out.
+        contacts: whether main masses collide in MuJoCo; contacts are counted then.
         input_limit: in N.
     """
     return made(PlanarRobotAgents, type="planar-flexible-robot", **locals())
@@ -141,6 +145,7 @@ def mjcf_robots(
         lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
         local_damping: d in N s/m, then: the force is u - d v.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
+        contacts: whether main masses collide in MuJoCo; contacts are counted then.
         input_limit: in N or N m.
     """
     each = [file] if isinstance(file, str | Path) else list(file)

@@ -12,8 +12,9 @@ ACTION, RATE, PROPAGATE, STORAGE = range(4)
 PREPARE, BARRIER_FREE_TERMS, ADD_BARRIER_FREE_SLOPE, OWN_PROFILE, MEMORY_OUTPUTS, SOLVE, ACT = (
     range(4, 11)
 )
-# For penalties that change in time, and for agents whose positions follow their outputs
-PENALTY, POSITIONS, COUNT = 11, 12, 13
+# For penalties that change in time, agents whose positions follow their outputs, and bodies that
+# collide
+PENALTY, POSITIONS, CONTACTS, COUNT = range(11, 15)
 
 
 @kernel
@@ -47,6 +48,16 @@ def observe_positions(problem, work, monitor, time, state):
                 address_in(monitor), time, address_in(state),
             ),
         )  # fmt: skip
+
+
+@kernel
+def observe_contacts(problem, monitor, data, time):
+    """Note contacts between agents that mjData at an address has, if their bodies collide."""
+    if problem.functions[CONTACTS] != 0:
+        call_integer(
+            problem.functions[CONTACTS],
+            (problem.parameter_block, data, address_in(monitor), time),
+        )
 
 
 @kernel

@@ -52,6 +52,13 @@ class MonitorNumbers(Numbers):
     positions_worst: float  # the greatest value of a constraint at them
     positions_worst_time: float
     positions_constraint: float  # which one
+    # Contacts between agents in MuJoCo, see gne_mj.loops.contacts
+    contacts: float  # all, of all observations
+    touching: float  # observations with one
+    contact_time: float  # of the first one
+    contact_agent: float  # and whose it was
+    contact_other: float
+    contact_depth: float  # greatest overlap in m
 
 
 class Monitor(NamedTuple):

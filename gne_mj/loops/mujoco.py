@@ -86,6 +86,8 @@ def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
             fleet.gather(at, data, parameter_block, state)
         userdata = field(data, at.userdata, place.sizes.nuserdata)
         storage = fleet.stored(parts.channels, state, userdata) if stage == 0 else 0.0
+        if stage == 0 and monitor.exit == watch.INSIDE:
+            functions.observe_contacts(parts.problem, monitor, data, time)
         where = (address_in(progress), place.model, data)
         good = monitor.exit == watch.INSIDE and control_step(
             faults, where, parts, Instant(time, step, stage), storage, state, memory

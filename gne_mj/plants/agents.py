@@ -22,12 +22,14 @@ class Agents:
         parameters: (m, numbers of the type), one row a channel.
         input_limit: (m,) greatest |u| that the actuators deliver, infinite for no limit.
         dimension: channels of each agent; all channels are numbered agent by agent.
+        contacts: whether bodies of different agents collide, in MuJoCo.
     """
 
     kind: ModuleType
     parameters: NDArray[np.float64]
     input_limit: NDArray[np.float64]
     dimension: int = 1
+    contacts: bool = False
 
     def __post_init__(self) -> None:
         width = len(self.kind.PARAMETERS)
@@ -67,9 +69,10 @@ class Agents:
         return len(self.kind.STATES)
 
     def repeated(self, copies: int) -> Self:
-        """The same agents ``copies`` times in a row."""
+        """The same agents ``copies`` times in a row, each by itself: without contacts."""
         return replace(
             self,
+            contacts=False,
             parameters=np.tile(self.parameters, (copies, 1)),
             input_limit=np.tile(self.input_limit, copies),
         )

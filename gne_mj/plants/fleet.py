@@ -17,6 +17,8 @@ MODELS = {
     2: ("plane.xml", "planar_robot.xml", ("_x", "_y")),
 }
 
+HULL = "hull"  # the geom by which a robot's main mass collides
+
 # Robots that are attached at a time: each attaching costs by what is there, each robot by its group
 GROUP = 200
 # Fleets of more have no decoration, and memory in bytes by their number
@@ -31,7 +33,11 @@ def element_names(what: str, channels: int, dimension: int = 1) -> list[str]:
 
 
 def compose(
-    parameters: NDArray[np.float64], *, dimension: int = 1, decorated: bool = True
+    parameters: NDArray[np.float64],
+    *,
+    dimension: int = 1,
+    decorated: bool = True,
+    contacts: bool = False,
 ) -> mujoco.MjSpec:
     """The lane (or, of dimension 2, the plane) with its flexible robots.
 
@@ -42,6 +48,7 @@ def compose(
         dimension: axes that a robot moves along, 1 or 2; so many rows belong to each robot, and
             its masses are the same in all of them.
         decorated: keep what is for the eye only; without it MuJoCo steps somewhat faster.
+        contacts: let the robots' main masses collide, by the geom ``hull`` of each.
 
     Returns:
         What MuJoCo compiles; robot i's elements are named ``robot_i/...``, from 1.
@@ -63,25 +70,28 @@ def compose(
     if not decorated:
         for element in (*world.lights, *world.geoms):
             world.delete(element)
-    robot = _robot(model, decorated)
+    robot = _robot(model, decorated, contacts)
+    if contacts:
+        off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        world.option.disableflags &= ~int(off)
     for first in range(0, len(robots), GROUP):
         group = _group(robot, robots[first : first + GROUP], first + 1, ends)
         frame = world.worldbody.add_frame()
         world.attach(mujoco.MjSpec.from_string(group), prefix="robot_", frame=frame)
     if len(robots) > MANY:
-        # Else so much as contacts of all with all would need; there are none.
+        # Else so much as contacts of all with all would need; there are few.
         world.memory = _LEAST_ARENA + _ARENA_FOR_EACH * len(robots)
     return world
 
 
-def _robot(model: str, decorated: bool) -> ElementTree.Element:
-    """The file of one robot, without what is for the eye only if that is not wanted."""
+def _robot(model: str, decorated: bool, contacts: bool) -> ElementTree.Element:
+    """The file of one robot, without its decoration or its hull where that is not wanted."""
     robot = ElementTree.fromstring(read_model(model))
-    if not decorated:
-        for parent in (*robot.iter("body"), robot.find("tendon")):
-            for element in list(parent if parent is not None else ()):
-                if element.tag in ("geom", "site", "spatial"):
-                    parent.remove(element)  # type: ignore[union-attr]
+    for parent in (*robot.iter("body"), robot.find("tendon")):
+        for element in list(parent if parent is not None else ()):
+            wanted = contacts if element.get("name") == HULL else decorated
+            if element.tag in ("geom", "site", "spatial") and not wanted:
+                parent.remove(element)  # type: ignore[union-attr]
     return robot
 
 

@@ -132,7 +132,9 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
             kind, numbers = mjcf_position, np.column_stack(parts)
         else:
             self.check_unused("it is for robots with a lookahead, whose outputs are positions")
-        return MjcfRobots(kind, numbers, self.limits(sizes), axes, robots, self.positions)
+        return MjcfRobots(
+            kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions
+        )
 
     def _names(self, key: str, axes: int) -> list[str]:
         """Of every channel, from one name for all agents or one each; of vectors lists of names."""

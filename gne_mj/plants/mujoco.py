@@ -14,7 +14,7 @@ from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
 from gne_mj.parameter_block import ParameterBlock, floats, integers
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
-from gne_mj.plants.fleet import compile_model, compose, element_names
+from gne_mj.plants.fleet import HULL, compile_model, compose, element_names
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
@@ -59,6 +59,7 @@ class Sizes(NamedTuple):
 
 PLACE = len(names_of(RobotPlace))
 sizes_in, _place_in = in_numbers(Sizes, SIZES), numbers_in(RobotPlace)
+OWNERS = len(Sizes._fields)  # behind them in SIZES, the agent that each geom belongs to
 
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
@@ -193,7 +194,12 @@ class MujocoPlant(FleetPlant):
         self.passive = passive_callback(offsets(), kernels)
         with part_of("agents"), named(world="agents"):
             self.model = compile_model(
-                compose(agents.parameters[:, :5], dimension=agents.dimension, decorated=decorated),
+                compose(
+                    agents.parameters[:, :5],
+                    dimension=agents.dimension,
+                    decorated=decorated,
+                    contacts=agents.contacts,
+                ),
                 timestep=timestep,
                 integrator=INTEGRATORS[integrator],
                 userdata=ARCTANGENTS + agents.channels + userdata,
@@ -221,7 +227,16 @@ class MujocoPlant(FleetPlant):
         model = self.model
         workspace = ARCTANGENTS + self.agents.channels
         self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
-        return [flat, self._forces(self.agents), np.array(self.sizes, dtype=np.int64)]
+        sizes = np.array([*self.sizes, *self._owners()], dtype=np.int64)
+        return [flat, self._forces(self.agents), sizes]
+
+    def _owners(self) -> NDArray[np.int64]:
+        """(geoms,) which agent each that collides belongs to, from 0; -1 for all others."""
+        model, found = self.model, np.full(self.model.ngeom, -1)
+        if self.agents.contacts:
+            hulls = [model.geom(f"robot_{i + 1}/{HULL}").id for i in range(self.agents.count)]
+            found[hulls] = np.arange(self.agents.count)
+        return found
 
     @staticmethod
     def _forces(agents: Agents) -> NDArray[np.float64]:
@@ -255,8 +270,10 @@ class MujocoPlant(FleetPlant):
     def refresh(self) -> None:
         """Bring the springs' arctangents up to date, which are of the last step's start.
 
-        The callback must be installed.
+        The callback must be installed. Contacts, where there are such, likewise.
         """
+        if self.agents.contacts:
+            mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_passive(self.model, self.data)
 
     @property

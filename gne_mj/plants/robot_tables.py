@@ -26,6 +26,9 @@ class _RobotTable(AgentsTable, LookaheadKeys):
     output: Literal["velocity", "position"] = Field(
         "velocity", description="y: the velocity v, or the position with a look-ahead, q + tau v"
     )
+    contacts: bool = Field(
+        False, description="whether main masses collide in MuJoCo; contacts are counted then"
+    )
 
     @property
     def positions(self) -> bool:
@@ -41,7 +44,7 @@ class _RobotTable(AgentsTable, LookaheadKeys):
             raise InvalidInput("damping", self.damping, "no entry may be negative")
         if not self.positions:
             self.check_unused("it is for output = 'position'")
-            return Agents(flexible_robot, table, self.limits(sizes), self.axes)
+            return Agents(flexible_robot, table, self.limits(sizes), self.axes, self.contacts)
         if self.lookahead is None:
             raise InvalidInput("lookahead", None, "output = 'position' needs it, in s")
         tau, reference = np.full(len(table), self.lookahead), self.reference_rows(sizes)
@@ -52,7 +55,7 @@ class _RobotTable(AgentsTable, LookaheadKeys):
                 "local_damping", None, "it must be given where damping = 0: none is proven there"
             )
         table[:, 6] = self.damping_rows(sizes, default)
-        return Agents(position_robot, table, self.limits(sizes), self.axes)
+        return Agents(position_robot, table, self.limits(sizes), self.axes, self.contacts)
 
 
 @AGENTS.register

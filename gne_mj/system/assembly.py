@@ -88,6 +88,10 @@ class Assembly(SystemData):
             found[functions.PENALTY] = penalty(self.schedule.fall)
         if self.start_positions is not None:
             found[functions.POSITIONS] = positions()
+        if self.agents.contacts:
+            from gne_mj.loops.contacts import counter  # late: MuJoCo is slow to import
+
+            found[functions.CONTACTS] = counter()
         return found
 
     @property

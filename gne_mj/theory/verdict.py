@@ -99,6 +99,8 @@ def not_certified(
             "that the given epsilon is small enough; and a Lyapunov function: V's decrease is"
             " claimed of the limit epsilon -> 0 only"
         )
+    if theorem.system.agents.contacts:
+        found.append("anything once bodies of two agents have touched: a run counts contacts")
     if held is None or held.system.disturbance is None:
         found.append("anything under pushes from outside, or inputs that saturate")
     else:
