@@ -9,13 +9,14 @@ import tomllib
 from types import SimpleNamespace
 
 import pytest
+import typer.main
 from commands import COMMAND, environment, gne, gne_here
 
 import gne_mj
-from gne_mj.cli import signals
+from gne_mj.cli import app, signals
 from gne_mj.scenario import load_scenario, shipped
 
-COMMANDS = ("run", "solve", "certify", "paper", "plot", "passivity", "scenarios")
+COMMANDS = tuple(typer.main.get_command(app).commands)
 SHORT = ("--set", "simulation.duration=0.2")
 # crosses the barrier at a stage of its first step
 LEAVING = (
@@ -59,6 +60,17 @@ except SystemExit as ended:
     if not command:
         for name in COMMANDS:
             assert name in done.stdout
+
+
+def test_a_run_loads_no_optimisers():
+    code = (
+        "import sys, gne_mj; gne_mj.run('velocity-sync', {'simulation.duration': 0.1}).report();"
+        " print({'scipy.optimize', 'matplotlib'} & set(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "set()\n"
 
 
 def test_no_command_shows_the_help():

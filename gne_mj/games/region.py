@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.optimize import linprog
 
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Box
@@ -93,6 +92,8 @@ class Region:
 
 def _inner_point(normals: Array, offsets: Array, center: Array, radius: float) -> Array | None:
     """(2,) the middle of the greatest disc inside, by a linear program; None if it is too small."""
+    from scipy.optimize import linprog  # slow to load, and for polygons only
+
     if np.isfinite(radius):
         angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
         around = np.column_stack([np.cos(angle), np.sin(angle)])
