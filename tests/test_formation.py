@@ -368,7 +368,7 @@ def test_bad_numbers(key, bad, words):
         ({"region": {"bax": [[0, 0], [1, 1]]}}, "did you mean 'box'"),
         ({"region": {"box": [[0, 0, 0], [1, 1]]}}, r"game\.region\.box"),
         ({"links": [[1, 5]]}, r"systems\.s\.game\.links: got \[1, 5\], but agents are numbered"),
-        ({"edges": "star"}, r"game\.edges"),
+        ({"edges": "stern"}, r"game\.edges"),
         ({"place_weight": [1.0]}, r"systems\.s\.game\.place_weight: .* a list of 3"),
         ({"desired_place": [[0.0, 0.0]]}, r"systems\.s\.game\.desired_place: .* list 3 times"),
     ],
