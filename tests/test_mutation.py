@@ -4,7 +4,6 @@ import importlib
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -106,28 +105,29 @@ def test_coverage_is_told_by_tests(operators, tmp_path):
 
 def test_tests_that_execute_a_mutant_come_first(operators, monkeypatch):
     judge = importlib.import_module("judge")
-    tests = {"t.py::a": 2.0, "t.py::b": 1.0, "t.py::c": 0.5, "process.py::d": 3.0, "u.py::e": 1.0}
+    tests = {"t.py::a": 9.0, "t.py::b": 1.0, "t.py::c": 0.5, "process.py::d": 3.0, "u.py::e": 0.1}
     known = {
         "plain": judge.Baseline({"t.py::c": 0.1}, {"some.py": {"inner": ["t.py::c"]}}),
-        "compiled": judge.Baseline(tests, {"some.py": {"plain": ["t.py::a", "t.py::b"]}}),
+        "compiled": judge.Baseline(
+            tests, {"some.py": {"plain": ["u.py::e", "t.py::a", "t.py::b"]}}
+        ),
     }
+    rank = object.__new__(judge._Rank)
+    rank._near = {"t.py": 3, "u.py": 1}  # of b's file, but a takes too long to be among the first
 
-    def stages(left):
-        near = [test for test in left if test.startswith("t.py")]
-        return near, sorted(set(left) - set(near))
-
-    monkeypatch.setattr(judge, "_Rank", lambda mutant, tree: SimpleNamespace(stages=stages))
+    monkeypatch.setattr(judge, "_Rank", lambda mutant, tree: rank)
     monkeypatch.setattr(judge, "_starting_processes", lambda tree: {"process.py"})
     found = {m.function: m for m in operators.mutants("some.py", SOURCE.encode())}
     assert list(judge._stages(found["plain"], None, known)) == [
-        (False, ["t.py::b", "t.py::a"]), (False, ["t.py::c"]), (False, ["process.py::d"]),
+        (False, ["t.py::b"]), (False, ["t.py::a", "u.py::e"]), (False, ["t.py::c"]),
+        (False, ["process.py::d"]),
     ]  # fmt: skip
     assert list(judge._stages(found["inner"], None, known)) == [
-        (True, ["t.py::c"]), (False, ["t.py::a", "t.py::b"]), (False, ["process.py::d", "u.py::e"])
+        (True, ["t.py::c"]), (False, ["t.py::a", "t.py::b", "u.py::e"]), (False, ["process.py::d"]),
     ]  # fmt: skip
     later = known["compiled"].without({"t.py", "process.py"})
-    assert later.seconds == {"u.py::e": 1.0}
-    assert later.executing == {"some.py": {"plain": []}}
+    assert later.seconds == {"u.py::e": 0.1}
+    assert later.executing == {"some.py": {"plain": ["u.py::e"]}}
 
 
 # Keys of loops, and what a translated kernel's cache adds to them

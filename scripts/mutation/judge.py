@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from itertools import accumulate
 from pathlib import Path
 
 import coverage
@@ -22,6 +23,7 @@ from operators import Mutant
 LEFT_OUT = ("test_browser", "test_notebook", "test_packaging", "test_peers", "test_view_")
 PLAIN_LIMIT = 5.0  # s for a test without compiled code; those that take longer are left out
 TEST_LIMIT = 180.0  # s for any test, compiling included
+FIRST = 5.0  # s that the nearest tests may take, which run before all others
 
 _running: set[subprocess.Popen] = set()
 
@@ -192,21 +194,19 @@ def _stages(
     """
     rank, compiled, done = _Rank(mutant, tree), known["compiled"], set()
 
-    def executing(baseline: Baseline) -> list[str]:
+    def executing(baseline: Baseline) -> Iterator[list[str]]:
         own = baseline.executing.get(mutant.file, {}).get(mutant.function, [])
-        return sorted(own, key=lambda test: baseline.seconds[test])
+        return filter(None, rank.nearest_first(own, baseline.seconds))
 
     if mutant.native:
-        plain = executing(known["plain"])
-        if plain:
-            yield True, plain
+        for tests in executing(known["plain"]):
+            yield True, tests
         if mutant.function:  # where they can execute it they have, as plain Python
             done = set(known["plain"].seconds)
     else:
-        first = executing(compiled)
-        if first:
-            yield False, first
-        done = set(first)
+        for tests in executing(compiled):
+            yield False, tests
+            done |= set(tests)
     left = {test: seconds for test, seconds in compiled.seconds.items() if test not in done}
     near, others = rank.stages(left)
     if done and not mutant.native:
@@ -240,6 +240,19 @@ class _Rank:
                 + (file in direct)
                 + (file in through)
             )
+
+    def nearest_first(
+        self, tests: list[str], seconds: dict[str, float]
+    ) -> tuple[list[str], list[str]]:
+        """The quickest tests of the nearest files, few seconds of them, and then all others."""
+
+        def key(test: str) -> tuple[float, float]:
+            return -self._near.get(test.partition("::")[0], 0), seconds[test]
+
+        order = sorted(tests, key=key)
+        passed = accumulate(seconds[test] for test in order)
+        count = sum(1 for each in passed if each <= FIRST)
+        return order[:count], order[count:]
 
     def stages(self, seconds: dict[str, float]) -> tuple[list[str], list[str]]:
         """The tests of near files, nearest and quickest first, and then all others."""
