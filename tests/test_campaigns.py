@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts" / "campaigns"))
 import continuous
 import kills
 import kinds
+import positions
 import quadratic
 import stiff
 
@@ -222,3 +223,28 @@ def test_the_kill_script_notices_what_is_half_written(tmp_path, monkeypatch):
         assert name == "view --html"
         assert ended == "before"
         assert any(words in each for each in found), (fault, found)
+
+
+@pytest.mark.parametrize("draw", [positions.platoon, positions.formation])
+def test_the_positions_formulas_are_the_games(draw):
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        place = draw(rng)
+        profiles = place.middle + rng.normal(size=(50, place.game.actions))
+        inside = np.all(place.values(profiles) < 0, axis=1)
+        assert np.array_equal(inside, np.all(place.game.constraints(profiles) < 0, axis=1))
+        assert np.all(place.values(place.middle[None]) < 0)
+
+
+def test_random_platoons_and_formations_keep_their_positions(monkeypatch):
+    monkeypatch.setattr(positions, "CLOSEST", 1e-2)
+    rows = [positions.one(6, index) for index in range(4)]
+    assert {(row["kind"], row["mode"]) for row in rows} == {
+        (kind, mode) for kind in positions.KINDS for mode in positions.MODES
+    }
+    lines, broken = positions.report(rows)
+    assert broken == 0, lines
+    assert all(row["told_outside"] == row["outside"] == 0 for row in rows)
+    for key in ("outside", "contacts", "outputs_outside"):
+        assert positions.broken({**rows[0], key: 1}) == [key]
+    assert positions.broken(positions.crashed(7, ValueError("x"))) == ["crashed"]
