@@ -18,6 +18,7 @@ from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
 from gne_mj.system import System, mode_of
+from gne_mj.system.data import SystemData
 from gne_mj.system.modes import Figure, Mode
 from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed, input_unit
 
@@ -151,7 +152,7 @@ def _status(runs: Runs) -> Array:
     return run_metrics.status(runs.monitors, tail, runs.tolerance)
 
 
-def follow(system: System) -> bool:
+def follow(system: SystemData) -> bool:
     """Whether agents have positions that follow their outputs."""
     return followed_position(system.agents.kind) >= 0
 

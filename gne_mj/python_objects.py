@@ -2,7 +2,8 @@
 
 A scenario is text, so that it can be changed, swept and kept with results. What was made in a
 program or a notebook's cell is kept here under a name of its own, and the tables have that name.
-Another process does not know it, and says so.
+Another process does not know it, and says so; if it is made there again of the same functions, it
+has the same name.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,6 +16,7 @@ from pydantic import Field
 from gne_mj.controllers import Law
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.errors import InvalidInput
+from gne_mj.fingerprint import fingerprint
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.registry import GAMES, LAWS
@@ -25,17 +27,19 @@ OBJECT = "of this Python process; written by gne_mj.setup"
 _kept: dict[str, Any] = {}
 
 
-def keep(thing: Any, name: str) -> str:
+def keep(thing: Any, name: str, *functions: Any) -> str:
     """The name of a thing in tables, always the same one; it is kept until the process ends.
 
     Args:
         thing: a game, say.
         name: what its own begins with.
+        functions: what it is made of, if that says all of it: in another process it then has the
+            same name, and a thing that is made again takes the place of the one before.
     """
     for known, kept in _kept.items():
         if kept is thing:
             return known
-    known = f"{name} {token_hex(4)}"
+    known = f"{name} {fingerprint(*functions) if functions else token_hex(4)}"
     _kept[known] = thing
     return known
 
@@ -51,8 +55,8 @@ def kept(name: str, kind: type[T]) -> T:
         raise InvalidInput(
             "object",
             name,
-            "another Python process made it; make it here once more, or put its functions into a"
-            " file that the scenario names",
+            "another Python process made it: in a program give it again, also to batch(...,"
+            " resume=True), or put its functions into a file that the scenario names",
         )
     return thing
 

@@ -23,6 +23,7 @@ from gne_mj.certificate import Certificate
 from gne_mj.errors import InvalidInput
 from gne_mj.files import written
 from gne_mj.loops.base import Samples
+from gne_mj.recorded import structure_of
 from gne_mj.run_metrics import SUCCESSES
 from gne_mj.summary import summary
 from gne_mj.system import System
@@ -296,6 +297,7 @@ def _dataset(parts: list[SystemRecord], certificate: Certificate) -> "xarray.Dat
             "game": game.name,
             "agent_name": game.agent_name,
             "quantities": json.dumps([each.name for each in drawn if each.name != "action"]),
+            "structure": structure_of(system),
             "information": system.law.information,
             "mode": system.mode,
             "decentralised": int(system.decentralised),

@@ -18,7 +18,7 @@ from gne_mj.game_model import Game
 from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.quantity import Quantity
-from gne_mj.system import System
+from gne_mj.system.data import SystemData
 
 if TYPE_CHECKING:
     import pandas
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 # name -> (dimensions, values, attributes), as xarray takes them
 Labelled = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
-Text = str | Callable[[System], str]
+Text = str | Callable[[SystemData], str]
 
 AXIS = "agent or action"  # in place of the dimension of actions, see axis_of
 
@@ -75,11 +75,11 @@ class Variable:
     name: str
     dimensions: tuple[str, ...]
     source: Callable[[Any], Array]
-    there: Callable[[System], bool] = lambda system: True
+    there: Callable[[SystemData], bool] = lambda system: True
     unit: Text | None = None
     long_name: Text | None = None
     symbol: str | None = None
-    bounds: Callable[[System], Mapping[str, Array]] = lambda system: {}
+    bounds: Callable[[SystemData], Mapping[str, Array]] = lambda system: {}
     instant: bool = True
     figure: bool = False
     page: Literal["", "line", "estimates", "behind"] = ""
@@ -88,11 +88,11 @@ class Variable:
     panel: Panel | None = None
     columns: tuple[Column, ...] = ()
 
-    def dims(self, system: System) -> tuple[str, ...]:
+    def dims(self, system: SystemData) -> tuple[str, ...]:
         """The dimensions in a system's dataset."""
         return tuple(axis_of(system) if d == AXIS else d for d in self.dimensions)
 
-    def attributes(self, system: System) -> dict[str, str]:
+    def attributes(self, system: SystemData) -> dict[str, str]:
         """Units, long_name and symbol, those there are."""
         given = {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
         return {
@@ -112,7 +112,7 @@ class Rows:
         samples: at these times.
     """
 
-    system: System
+    system: SystemData
     time: NDArray[np.float64]
     samples: Samples
 
@@ -127,7 +127,7 @@ def changed(samples: Samples, change: Callable[[Array], Array]) -> Samples:
     return Samples(*(change(column) for column in samples))
 
 
-def axis_of(system: System) -> str:
+def axis_of(system: SystemData) -> str:
     """The dimension of actions: agents, where each has one."""
     return "agent" if system.game.actions == system.game.agents else "action"
 
@@ -142,7 +142,7 @@ def estimates_of(
     return estimates
 
 
-def declared(system: System) -> list[Variable]:
+def declared(system: SystemData) -> list[Variable]:
     """The variables that a system has, in the order of its dataset."""
     found: list[Variable] = []
     for signal in SIGNALS:
@@ -150,7 +150,7 @@ def declared(system: System) -> list[Variable]:
     return [variable for variable in found if variable.there(system)]
 
 
-def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
+def coordinates_of(system: SystemData, time: NDArray[np.float64]) -> dict[str, Any]:
     """The coordinates that go with a system's variables, at times (samples,) in s."""
     game = system.game
     coordinates: dict[str, Any] = {
@@ -165,7 +165,9 @@ def coordinates_of(system: System, time: NDArray[np.float64]) -> dict[str, Any]:
     return coordinates
 
 
-def check_names(system: System, variables: Iterable[Variable], others: Iterable[str] = ()) -> None:
+def check_names(
+    system: SystemData, variables: Iterable[Variable], others: Iterable[str] = ()
+) -> None:
     """Refuse a game or agent type of which a variable has the name of another one.
 
     Args:
@@ -187,7 +189,7 @@ def check_names(system: System, variables: Iterable[Variable], others: Iterable[
             taken.add(name)
 
 
-def variables_of(system: System, time: NDArray[np.float64], samples: Samples) -> Labelled:
+def variables_of(system: SystemData, time: NDArray[np.float64], samples: Samples) -> Labelled:
     """What is kept of a run's samples: (dimensions, values, attributes) by name.
 
     Args:
@@ -213,26 +215,26 @@ def labelled(variables: list[Variable], rows: Rows) -> Labelled:
 # ------------------------------------------------------------------------------- the signals
 
 
-def _action_unit(system: System) -> str:
+def _action_unit(system: SystemData) -> str:
     return system.game.action_unit
 
 
-def input_unit(system: System) -> str:
+def input_unit(system: SystemData) -> str:
     """The unit of inputs; the action's per second where the agent type names none."""
     return system.agents.kind.INPUT_UNIT or f"{system.game.action_unit or 1}/s"
 
 
-def _state_units(system: System) -> str:
+def _state_units(system: SystemData) -> str:
     return ", ".join(unit or system.game.action_unit for _, unit in system.agents.kind.STATES)
 
 
-def equilibrium_of(system: System) -> NDArray[np.float64]:
+def equilibrium_of(system: SystemData) -> NDArray[np.float64]:
     """(m,) y*; not a number where it is not known."""
     known = system.known_equilibrium
     return np.full(system.game.actions, np.nan) if known is None else known.action
 
 
-def _states(system: System) -> Iterator[Variable]:
+def _states(system: SystemData) -> Iterator[Variable]:
     """The agents' states but the output, each by its name, and what follows from them."""
     kind = system.agents.kind
     states = (_state(index, *state) for index, state in enumerate(kind.STATES))
@@ -258,7 +260,7 @@ def _state(index: int, name: str, unit: str) -> Variable:
     )
 
 
-def _quantities(system: System) -> Iterator[Variable]:
+def _quantities(system: SystemData) -> Iterator[Variable]:
     """What the game derives from its actions, with the bounds that it states."""
     return (
         _quantity(system.game.entries(quantity), quantity) for quantity in system.game.quantities
@@ -279,7 +281,7 @@ def _quantity(entries: tuple[int, ...], quantity: Quantity) -> Variable:
     )
 
 
-def _memory(system: System) -> Iterator[Variable]:
+def _memory(system: SystemData) -> Iterator[Variable]:
     """What the law says that its memory holds; all of it where it says nothing."""
     game, at = system.game, 0
     for part in system.law.memory_parts:
@@ -313,12 +315,12 @@ def _penalty(rows: Rows) -> Array:
     return rows.system.schedule.at(rows.time)
 
 
-def _is_faulty(system: System) -> bool:
+def _is_faulty(system: SystemData) -> bool:
     return bool(system.faults)
 
 
 # In the order of a dataset; a function yields what game, agent type or law declare of themselves
-SIGNALS: tuple[Variable | Callable[[System], Iterator[Variable]], ...] = (
+SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     Variable(
         "action", ("time", AXIS), lambda rows: rows.y,
         unit=_action_unit, long_name=lambda system: system.game.action_name,

@@ -9,7 +9,7 @@ import typer
 from gne_mj.cli.application import app
 from gne_mj.cli.arguments import FORMAT, INDEX, JSON, OUT, PORT, REPLACE, SET, WHERE, formats
 from gne_mj.cli.output import Results, folder_for, tell
-from gne_mj.cli.simulating import simulate, source_of, stored
+from gne_mj.cli.simulating import is_saved, simulate, source_of, stored
 from gne_mj.cli.views import REPLAY, watch
 from gne_mj.progress import telling
 
@@ -106,7 +106,10 @@ def _illustrate(trajectory: "Trajectory", folder: Path, quiet: bool) -> None:
 @app.command()
 def plot(
     folder: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Folder that `run --out` or `paper` wrote.")
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Folder that `run --out`, `paper` or a program's `save` wrote."
+        ),
     ],
     out: WHERE = None,
     format_: FORMAT = None,
@@ -123,7 +126,7 @@ def plot(
     need("plots", "drawing figures")
     kinds = formats(format_)
     trajectory = stored(folder)
-    target = folder_for(out, folder)
+    target = folder_for(out, folder.parent if is_saved(folder) else folder)
     with named(folder="out"), telling("drawing") as shown:
         anyway = replace or target == folder
         paths = plots.save(trajectory, target, kinds, replace=anyway, progress=shown)

@@ -86,12 +86,17 @@ def is_batch(folder: Path) -> bool:
     return (folder / "manifest.json").is_file()
 
 
+def is_saved(folder: Path) -> bool:
+    """Whether a folder is a trajectory itself, as `Trajectory.save` writes it."""
+    return (folder / ".zgroup").is_file()
+
+
 def stored(folder: Path) -> "Trajectory":
-    """The trajectory that a run wrote into a folder."""
+    """The trajectory that a run wrote into a folder, or that a program saved as one."""
     from gne_mj.errors import InvalidInput
     from gne_mj.trajectory import Trajectory
 
-    store = folder / "trajectory.zarr"
+    store = folder if is_saved(folder) else folder / "trajectory.zarr"
     if not store.is_dir():
         batch = "; of a batch say which run, by `index`" if is_batch(folder) else ""
         raise InvalidInput(

@@ -30,7 +30,9 @@ def view(
     folder: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN", help="Folder that `run --out`, `paper` or (with --index) `batch` wrote."
+            metavar="RUN",
+            help="Folder that `run --out`, `paper`, a program's `save` or (with --index) `batch`"
+            " wrote.",
         ),
     ],
     index: INDEX = None,

@@ -126,7 +126,7 @@ def table_of(game: ExpressionGame) -> ExpressionsTable:
             words[key] = None if np.all(np.isinf(limits)) else _bounded(limits.tolist())
     return ExpressionsTable(
         type="expressions",
-        object=keep(game.functions, "game"),
+        object=keep(game.functions, "game", *(game.functions or ())),
         parameters=dict(game.numbers),
         dimension=dimension if isinstance(dimension, int) else list(map(int, dimension)),
         **words,

@@ -105,6 +105,6 @@ def own_law(
     """
     given = {"action": action, "rate": rate, "initial_memory": initial_memory}
     functions = {name: function for name, function in given.items() if function is not None}
-    name = keep(LawFunctions(functions), getattr(action, "__name__", "law"))
+    name = keep(LawFunctions(functions), getattr(action, "__name__", "law"), functions)
     return made(PythonLaw, information="python", object=name, graph=graph, mode=mode,
                 parameters=parameters)  # fmt: skip

@@ -96,8 +96,7 @@ def view(shown: Trajectory | Source, title: str = "gne-mj replay", *, port: int 
     Open its ``url`` in a browser. ``gne-mj run --view`` shows a run while it is going on.
 
     Args:
-        shown: a trajectory of this process, or one with a scenario that has no Python object; a
-            scenario or game is run first.
+        shown: a trajectory; a scenario or game is run first.
         title: of the page.
         port: 0 for any that is free.
 

@@ -19,6 +19,7 @@ from gne_mj.controllers import Law
 from gne_mj.controllers.full_information import FullController
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InfeasibleStart, InvalidInput, named, nearest, part_of, renaming
+from gne_mj.faults import Fault
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
@@ -183,10 +184,6 @@ class SystemTable(Table):
             state = at.state
             length = len(law.initial_memory(state[:, agents.kind.OUTPUT]))
             memory = at.memory[:length].copy()
-        faults = []
-        for number, fault in enumerate(self.faults):
-            with part_of(f"faults.{number}"):
-                faults.append(fault.build())
         with part_of("barrier"):
             schedule = self.barrier.build(1e-9)
         system = System(
@@ -196,7 +193,7 @@ class SystemTable(Table):
             law=law,
             rho=self.barrier.rho if schedule is None else schedule.floor,
             schedule=schedule,
-            faults=tuple(faults),
+            faults=self._faults(),
             seed=simulation.seed,
             disturbance=self._disturbance(game),
             state=state,
@@ -211,6 +208,19 @@ class SystemTable(Table):
             return system
         floor = least_rho(system, acts)
         return replace(system, rho=floor, schedule=self.barrier.build(floor))
+
+    def players(self, sizes: Sizes) -> tuple[Agents, tuple[Fault, ...]]:
+        """The agents, for actions of so many entries each, and what goes wrong with them."""
+        with part_of("agents"):
+            agents = self.agents.build(sizes)
+        return agents, self._faults()
+
+    def _faults(self) -> tuple[Fault, ...]:
+        found = []
+        for number, fault in enumerate(self.faults):
+            with part_of(f"faults.{number}"):
+                found.append(fault.build())
+        return tuple(found)
 
     @contextmanager
     def naming(self, name: str) -> Iterator[None]:

@@ -13,7 +13,8 @@ from gne_mj.plants.agent_type import has_ode, in_mujoco
 from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import MujocoPlant
-from gne_mj.system import Clock, System
+from gne_mj.system import Clock
+from gne_mj.system.data import SystemData
 from gne_mj.viewer.mirror import Mirror
 
 
@@ -115,7 +116,7 @@ class Fleet:
         return None
 
 
-def fleet_of(system: System, clock: Clock, plant: FleetPlant | None = None) -> Fleet | None:
+def fleet_of(system: SystemData, clock: Clock, plant: FleetPlant | None = None) -> Fleet | None:
     """The fleet of a system, or None if its agents have no bodies.
 
     Args:
@@ -132,7 +133,7 @@ def fleet_of(system: System, clock: Clock, plant: FleetPlant | None = None) -> F
         return None
 
 
-def _plant(system: System, clock: Clock) -> FleetPlant | None:
+def _plant(system: SystemData, clock: Clock) -> FleetPlant | None:
     if not in_mujoco(system.agents.kind):
         return None
     try:

@@ -10,6 +10,7 @@ import umsgpack
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
+from gne_mj.recorded import recorded_system, sizes_of
 from gne_mj.scenario import load_scenario
 from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.pack import packed_small
@@ -30,7 +31,8 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
         title: of the page; the systems' names if left out.
 
     Raises:
-        InvalidInput: it holds no scenario, or files of the user's that the scenario names are gone.
+        InvalidInput: it holds no scenario, or the robots' own files are gone. Its game and law need
+            not be there.
     """
     source = trajectory.tree.attrs["scenario"]
     if not source:
@@ -38,10 +40,15 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
             "trajectory", "of no scenario", "robots are drawn from the scenario that it must hold"
         )
     scenario = load_scenario(json.loads(source))
-    clock = scenario.clock()
-    shown_systems = [ShownSystem(system, clock) for system in scenario.system_objects()]
-    names = ", ".join(shown_system.system.name for shown_system in shown_systems)
-    return scene_pack(Scene(shown_systems, title or names, clock.duration), trajectory)
+    clock, shown_systems = scenario.clock(), []
+    for name, table in scenario.systems.items():
+        data = trajectory[name]
+        with table.naming(name):
+            agents, faults = table.players(sizes_of(data))
+        system = recorded_system(name, data, agents, faults, scenario.simulation.seed)
+        shown_systems.append(ShownSystem(system, clock))
+    scene = Scene(shown_systems, title or ", ".join(scenario.systems), clock.duration)
+    return scene_pack(scene, trajectory)
 
 
 def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:

@@ -12,7 +12,8 @@ from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.quantity import Quantity
-from gne_mj.system import Clock, System, mode_of
+from gne_mj.system import Clock, mode_of
+from gne_mj.system.data import SystemData
 from gne_mj.variables import Variable, declared
 from gne_mj.viewer.fleet import fleet_of
 
@@ -32,7 +33,7 @@ class ShownSystem:
         fleet: its robots; None for agents without bodies.
     """
 
-    def __init__(self, system: System, clock: Clock, plant: FleetPlant | None = None) -> None:
+    def __init__(self, system: SystemData, clock: Clock, plant: FleetPlant | None = None) -> None:
         self.system, self.clock = system, clock
         self.fleet = fleet_of(system, clock, plant)
 
@@ -187,7 +188,7 @@ def is_line(system: str, key: str) -> bool:
     return key == line_key(system, "action") or key.startswith(line_key(system, ""))
 
 
-def _about(system: System, line: Variable) -> dict[str, Any]:
+def _about(system: SystemData, line: Variable) -> dict[str, Any]:
     """What JSON tells the page of a line but the action."""
     game, attributes, bounds = system.game, line.attributes(system), line.bounds(system)
     labels = {

@@ -1,0 +1,198 @@
+"""A system as its run recorded it: enough to show the run again, where its functions are not.
+
+A page shows who plays, who hears or measures whom, quantities and their bounds, and estimates. With
+its own results a run keeps what of these the results do not say (the attribute ``structure``), so
+that neither a game's file nor the program that made it is needed to look at what it did.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gne_mj.controllers import Law
+from gne_mj.controllers.law import MemoryPart
+from gne_mj.errors import InvalidInput
+from gne_mj.faults import Fault
+from gne_mj.game_model import Game
+from gne_mj.graph import Graph, complete
+from gne_mj.native import kernel
+from gne_mj.plants.agents import Agents
+from gne_mj.quantity import Quantity
+from gne_mj.system.data import SystemData
+
+if TYPE_CHECKING:
+    import xarray
+
+_ALL = "all"  # in place of a list of all agents, or of all edges
+
+
+def structure_of(system: SystemData) -> str:
+    """What a system's results do not say of it, as JSON; agents are numbered from 1."""
+    game, graph = system.game, system.law.graph
+    edges = None if graph is None else [[i + 1, j + 1] for i, j in graph.edges]
+    everyone = edges is not None and 2 * len(edges) == game.agents * (game.agents - 1)
+    return json.dumps(
+        {
+            "sizes": list(game.sizes),
+            "axes": list(game.axes),
+            "in_cost": _numbered(game.in_cost, game.agents),
+            "in_constraint": _numbered(game.in_constraint, game.agents),
+            "owners": None if game.owners is None else _numbered(game.owners, game.agents),
+            "quantities": [quantity.name for quantity in game.quantities],
+            "graph": _ALL if everyone else edges,
+            "estimates": [part.name for part in system.law.memory_parts if part.rows],
+        },
+        default=int,
+    )
+
+
+def sizes_of(data: "xarray.Dataset") -> tuple[int, ...]:
+    """m_i of each agent of a recorded system.
+
+    Raises:
+        InvalidInput: an older version has recorded it.
+    """
+    return tuple(_structure(data)["sizes"])
+
+
+def recorded_system(
+    name: str, data: "xarray.Dataset", agents: Agents, faults: tuple[Fault, ...], seed: int
+) -> SystemData:
+    """The system of a dataset; its game and law have no functions that could be called.
+
+    Args:
+        name: of the system.
+        data: what it recorded.
+        agents: who played.
+        faults, seed: what went wrong.
+
+    Raises:
+        InvalidInput: an older version has recorded it.
+    """
+    known, attributes = _structure(data), data.attrs
+    count, action = len(known["sizes"]), data["action"].attrs
+    owners = known["owners"]
+    game = Game(
+        name=attributes["game"],
+        kernels=sys.modules[__name__],
+        parameters=np.zeros(0),
+        sizes=tuple(known["sizes"]),
+        in_cost=_from_numbered(known["in_cost"], count),
+        in_constraint=_from_numbered(known["in_constraint"], count),
+        owners=None if owners is None else _from_numbered(owners, count),
+        constraint_names=tuple(map(str, data["constraint_name"].to_numpy())),
+        action_name=action["long_name"],
+        action_unit=action["units"],
+        agent_name=attributes["agent_name"],
+        axes=tuple(known["axes"]),
+        quantities=tuple(_quantity(data, each) for each in known["quantities"]),
+        tested=True,
+    )
+    return SystemData(
+        name=name,
+        game=game,
+        agents=agents,
+        law=_RecordedLaw(data, known, count),
+        rho=attributes["rho"],
+        state=data["state"].to_numpy()[0],
+        mode=attributes["mode"],
+        engine=attributes["engine"],
+        integrator=attributes["integrator"],
+        decentralised=bool(attributes["decentralised"]),
+        faults=faults,
+        seed=seed,
+    )
+
+
+class _RecordedLaw(Law):
+    """What is known of a law."""
+
+    def __init__(self, data: "xarray.Dataset", known: dict[str, Any], agents: int) -> None:
+        edges, names = known["graph"], known["estimates"]
+        if edges is not None:
+            pairs = tuple((i - 1, j - 1) for i, j in edges) if edges != _ALL else ()
+            self.graph = complete(agents) if edges == _ALL else Graph(agents, pairs)
+        parts = [MemoryPart(name, data[name].attrs["long_name"], rows=True) for name in names]
+        vars(self).update(information=data.attrs["information"], memory_parts=tuple(parts))
+
+    @property
+    def kernels(self) -> ModuleType:
+        """None that could be called."""
+        return sys.modules[__name__]
+
+
+def _structure(data: "xarray.Dataset") -> dict[str, Any]:
+    if "structure" not in data.attrs:
+        raise InvalidInput(
+            "trajectory", "without 'structure'", "an older version has recorded it; run it again"
+        )
+    found: dict[str, Any] = json.loads(data.attrs["structure"])
+    return found
+
+
+def _quantity(data: "xarray.Dataset", name: str) -> Quantity:
+    """A quantity with its bounds, of values that are recorded and not found anew."""
+    variable = data[name]
+    bounds = {key: data[f"{name}_{key}"].to_numpy() for key in ("bound", "lower_bound")
+              if f"{name}_{key}" in data}  # fmt: skip
+    about = {"long_name": name, "units": "", "symbol": "", **variable.attrs}
+    return Quantity(
+        name=name,
+        long_name=about["long_name"],
+        unit=about["units"],
+        values=lambda y: np.full((len(y), *variable.shape[1:]), np.nan),
+        each=str(variable.dims[1]) if variable.ndim > 1 else "",
+        symbol=about["symbol"],
+        **bounds,
+    )
+
+
+def _numbered(rows: Sequence[Sequence[int]], agents: int) -> list[Any]:
+    """Lists of agents from 1, those of all of them by a word."""
+    return [_ALL if len(row) == agents else [i + 1 for i in row] for row in rows]
+
+
+def _from_numbered(rows: list[Any], agents: int) -> list[Sequence[int]]:
+    return [range(agents) if row == _ALL else [i - 1 for i in row] for row in rows]
+
+
+# The kernels that a game's module must have; nothing asks for their values.
+
+
+@kernel
+def cost(q, i, y):
+    """Unknown."""
+    return np.nan
+
+
+@kernel
+def cost_gradient(q, i, a, y):
+    """Unknown."""
+    return np.nan
+
+
+@kernel
+def add_cost_hessian(q, i, a, y, scale, out):
+    """Unknown."""
+
+
+@kernel
+def constraint(q, k, y):
+    """Unknown."""
+    return np.nan
+
+
+@kernel
+def constraint_gradient(q, k, a, y):
+    """Unknown."""
+    return np.nan
+
+
+@kernel
+def constraint_hessian(q, k, a, b, y):
+    """Unknown."""
+    return np.nan
