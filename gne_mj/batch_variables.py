@@ -119,7 +119,9 @@ class Runs:
     @property
     def violated(self) -> NDArray[np.bool_]:
         """(runs,) whether a run ended early at a constraint that is known."""
-        return self.left & (self.monitors.exit != watch.DIVERGED)
+        exits = self.monitors.exit
+        of_pairs = (exits == watch.STEP_TOO_SMALL) & (self.monitors.exit_agent >= 0)
+        return self.left & (exits != watch.DIVERGED) & (exits != watch.TOO_NEAR) & ~of_pairs
 
 
 def _where(condition: NDArray[np.bool_], values: Array) -> Array:
@@ -160,6 +162,22 @@ def follow(system: SystemData) -> bool:
 def collide(system: System) -> bool:
     """Whether bodies of different agents collide."""
     return system.agents.contacts
+
+
+def apart(system: System) -> bool:
+    """Whether agents keep apart."""
+    return system.separation is not None
+
+
+def _least_distance(runs: Runs) -> Array:
+    """Not a number where no two agents came within reach."""
+    least = runs.seen("least_distance")
+    return _where(runs.observed & np.isfinite(least), least)
+
+
+def _held(runs: Runs) -> Array:
+    still = run_metrics.at_rest(runs.time, runs.y, runs.duration, runs.tolerance)
+    return (still & (_status(runs) == "completed")).astype(float)
 
 
 def _of_monitor(name: str, entry: str, **about: Any) -> Variable:
@@ -268,6 +286,20 @@ JUDGED = (
         long_name="contacts between agents, at all steps together",
         panel=Panel("contacts", log=False, worst="max"),
         columns=(Column("contacts", "contacts", lambda each: int(each.sum())),),
+    ),
+    _of_monitor(
+        "too_near", "too_near", there=apart, long_name="observations of two agents too near"
+    ),
+    Variable(
+        "least_distance", ("run",), _least_distance, there=apart, unit="m",
+        long_name="least distance of the positions of two agents",
+        panel=Panel("least distance", log=False, worst="min"),
+        columns=(Column("least_distance_min", "least distance", lambda each: each.min()),),
+    ),
+    Variable(
+        "held", ("run",), _held, there=apart,
+        long_name="1: at rest, away from equilibrium, held by separation",
+        columns=(Column("held", "held", lambda each: int(each.sum())),),
     ),
 )  # fmt: skip
 

@@ -124,7 +124,17 @@ def exit_map(
         timestep: the longest integration step in s; periods are made of whole steps.
         grid: what is tried.
         progress: called after every run, with integration steps and the number of runs.
+
+    Raises:
+        InvalidInput: agents keep apart.
     """
+    if system.separation is not None:
+        raise InvalidInput(
+            "system.separation",
+            "given",
+            "a map is of ways from the equilibrium to the boundary of the game's set, and agents"
+            " that keep apart cannot begin on all of them: 'gne-mj batch' draws starts that fit",
+        )
     starts = _rays(system, grid)
     plants: dict[tuple[str, bool], Any] = {}
     cells: list[Cell] = []

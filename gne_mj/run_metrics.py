@@ -19,6 +19,7 @@ EXITS = {
     watch.DIVERGED: "diverged",
     watch.STEP_TOO_SMALL: "step_too_small",
     watch.FORCES_LOST: "forces_left_out",
+    watch.TOO_NEAR: "too_near",
 }
 STATUS = "<U28"  # dtype that holds every status, infeasible_start too
 SETTLED = 0.02  # of the initial distance
@@ -62,6 +63,22 @@ def tail_distance(
         distance[:, time >= time[-1] - TAIL * duration - 1e-9], axis=1
     )
     return greatest
+
+
+def at_rest(
+    time: NDArray[np.float64], action: NDArray[np.float64], duration: float, tolerance: float
+) -> NDArray[np.bool_]:
+    """(runs,) whether outputs move by no more than a tolerance over the last part of the run.
+
+    Args:
+        time: (samples,) in s.
+        action: (runs, samples, m) outputs.
+        duration: how long the run was meant to last, in s.
+        tolerance: in the outputs' unit.
+    """
+    moved = np.max(np.abs(action - action[:, -1:]), axis=2)
+    still: NDArray[np.bool_] = tail_distance(time, moved, duration) <= tolerance
+    return still
 
 
 def settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from gne_mj.equilibrium import middle
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
+from gne_mj.separation import Separation
 
 HALVINGS = 60
+TRIES = 1000  # of a seed's starts, where agents must be apart
 DEPTHS = (1e-4, 1e-8)  # of an interior profile before it is moved, in lengths of the profile
 LEAST_SQUARES = 60  # steps for each
 
@@ -52,6 +54,34 @@ def random_starts(
     low = np.where(open_ended, farthest, low)
     found = middle + (shares * low)[:, None] * rays
     return np.where(inside(shares * low)[:, None], found, middle)
+
+
+def separated_starts(
+    game: Game,
+    middle: NDArray[np.float64],
+    seeds: Sequence[int],
+    spread: float,
+    separation: Separation,
+) -> NDArray[np.float64]:
+    """The same of agents that keep apart: the first one of a seed that is so, at rest.
+
+    Raises:
+        InvalidInput: of a seed none was found.
+    """
+    found = []
+    for seed in seeds:
+        for number in range(TRIES):
+            (y,) = random_starts(game, middle, [(seed, number)], spread)
+            if separation.nearest(y, y)[2] > separation.distance:
+                break
+        else:
+            raise InvalidInput(
+                "separation.distance",
+                separation.distance,
+                f"of {TRIES} random starts in none all agents are so far apart",
+            )
+        found.append(y)
+    return np.array(found).reshape(len(seeds), game.actions)
 
 
 def interior_profile(game: Game, start: NDArray[np.float64]) -> NDArray[np.float64]:

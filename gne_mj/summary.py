@@ -25,6 +25,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         )
     if report["contacts"] is not None:
         rows["contacts"] = _contacts(report["contacts"])
+    if report["separation"] is not None:
+        rows["separation"] = _separation(report["separation"])
     if gap is not None:
         size = f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}".rstrip()
         rows["widest gap"] = f"{size}, {gap['name']} at {gap['time']:.4g} s"
@@ -56,6 +58,17 @@ def _least_margin(worst: dict[str, Any] | None) -> str:
     if worst is None:
         return "nothing was observed"
     return f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s"
+
+
+def _separation(seen: dict[str, Any]) -> str:
+    if seen["least_distance"] is None:
+        return f"no two agents came within {seen['reach']:g} m"
+    first, second = seen["agents"]
+    return (
+        f"at least {seen['least_distance']:.6g} m, agents {first} and {second} at"
+        f" {seen['time']:.4g} s, where {seen['distance']:g} m are kept; up to"
+        f" {seen['most_pairs']} pairs near at once"
+    )
 
 
 def _convergence(report: dict[str, Any]) -> dict[str, str]:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 _ORDER = (
     "diverged",
     "forces_left_out",
+    "too_near",
     "left_feasible_set",
     "estimate_left_feasible_set",
     "step_too_small",

@@ -262,14 +262,14 @@ def test_a_steps_length_is_measured_where_the_agent_looks():
     residual, parts = equation_of(local, system, 3)
     assert residual(1, 2, system.start)[0]
     step = np.array([0.01])
-    got = local.local_length(parts.problem, 1, 2, step, parts.solver)
+    got = local.local_length(parts.problem, 1, 2, np.zeros(0), step, parts.solver)
     ball, product = 4.0 - system.start @ system.start, 1.0 - system.start[1] * system.start[2]
     of_ball = (2 * 0.5 * 0.03 / ball) ** 2 + 2 * 0.03**2 / ball
     of_product = (-0.4 * 0.02 / product) ** 2
     assert got == pytest.approx(np.sqrt(max(of_ball, of_product)))
     parts.problem.order.band[1] = 0
     residual(1, 2, system.start)
-    alone = local.local_length(parts.problem, 1, 2, step, parts.solver)
+    alone = local.local_length(parts.problem, 1, 2, np.zeros(0), step, parts.solver)
     assert alone == pytest.approx(np.sqrt((0.01 / ball) ** 2 + 2 * 0.01**2 / ball))
 
 
@@ -277,7 +277,8 @@ def test_both_entries_of_an_action_count_in_its_length():
     system = coupled_system(decentralised=True)
     residual, parts = equation_of(local, system, 3)
     assert residual(0, 1, system.start)[0]
-    got = local.local_length(parts.problem, 0, 1, np.array([0.001, -0.02]), parts.solver)
+    step = np.array([0.001, -0.02])
+    got = local.local_length(parts.problem, 0, 1, np.zeros(0), step, parts.solver)
     ball, product = 4.0 - system.start @ system.start, 1.0 - system.start[1] * system.start[2]
     of_ball = (2 * 0.4 * 0.06 / ball) ** 2 + 2 * 0.06**2 / ball
     of_product = (0.5 * 0.04 / product) ** 2

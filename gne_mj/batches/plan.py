@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from gne_mj.batches.sweep import Sweep
 from gne_mj.bounds import MOST_RECORDED, MOST_RUNS, check_room
-from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.scenario import Scenario, full_key, load_scenario
-from gne_mj.starts import random_starts
+from gne_mj.starts import random_starts, separated_starts
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import versions
 
@@ -245,18 +245,24 @@ class Plan:
         if not self.starts:
             return np.tile(system.start, (len(starts), 1))
         middle = system.centre
-        return random_starts(system.game, middle, self.seeds[list(starts)].tolist(), self.spread)
+        seeds = self.seeds[list(starts)].tolist()
+        if system.separation is not None:
+            with part_of(f"systems.{self.name}"):
+                return separated_starts(system.game, middle, seeds, self.spread, system.separation)
+        return random_starts(system.game, middle, seeds, self.spread)
 
     def positions(
         self, combination: Combination, starts: Sequence[int]
     ) -> list[NDArray[np.float64] | None]:
         """q(0) (m,) of these random starts, where positions follow outputs; else None.
 
-        Drawn as outputs are, in directions and at shares of their own.
+        Drawn as outputs are, in directions and at shares of their own. Agents that keep apart are
+        at rest.
         """
         system = combination.system
         assert system is not None
-        if not self.starts or system.start_positions is None:
+        resting = system.start_positions is None or system.separation is not None
+        if not self.starts or resting:
             return [None] * len(starts)
         seeds = [(int(seed), 1) for seed in self.seeds[list(starts)]]
         return list(random_starts(system.game, system.centre, seeds, self.spread))

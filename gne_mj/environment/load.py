@@ -79,16 +79,11 @@ def environment_of(
         random: seed or generator of the random starts.
 
     Raises:
-        InvalidInput: agents that do not run in MuJoCo, faults (there are none here), or an option
-            that is not one of the above.
+        InvalidInput: agents that do not run in MuJoCo, faults or separation (there are none here),
+            or an option that is not one of the above.
         UserCodeError, NotFinite: costs at the start that are not numbers.
     """
-    if system.engine != "mujoco":
-        raise InvalidInput("system.engine", system.engine, "an environment is of engine 'mujoco'")
-    if system.faults:
-        raise InvalidInput(
-            "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
-        )
+    _check(system)
     periods = _episode(clock)
     if exit_cost is None:
         costs = finite_costs(system.game, system.start)
@@ -104,6 +99,18 @@ def environment_of(
         rng=np.random.default_rng(random),
     )
     return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
+
+
+def _check(system: System) -> None:
+    """Refuse what an environment does not have."""
+    if system.engine != "mujoco":
+        raise InvalidInput("system.engine", system.engine, "an environment is of engine 'mujoco'")
+    if system.faults:
+        raise InvalidInput(
+            "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
+        )
+    if system.separation is not None:
+        raise InvalidInput("system.separation", "given", "an environment has none: remove it")
 
 
 def _episode(clock: Clock) -> int:

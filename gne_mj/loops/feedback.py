@@ -79,6 +79,8 @@ class Problem(NamedTuple):
     faults: Faults = NO_FAULTS
     # at y*: division.sizes_at; read in mode continuous only
     size: Annotated[np.ndarray, "1 + p"] = np.zeros(1)
+    # of agents that keep apart: gne_mj.separation.Separation.numbers
+    separation: Annotated[np.ndarray, "3"] = np.zeros(3)
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
     parameter_block: int = 0
@@ -103,6 +105,7 @@ class StepScratch(NamedTuple):
     division: division.Division  # of steps, mode continuous
     stages: division.Stages
     solver: Annotated[np.ndarray, "solver"]  # of mode implicit
+    separation: Annotated[np.ndarray, "separation"]  # of agents that keep apart
 
 
 class Sizes(NamedTuple):
@@ -110,13 +113,14 @@ class Sizes(NamedTuple):
 
     history: int = 0
     solver: int = 0
+    separation: int = 0
 
 
 NO_SIZES = Sizes()
 
 
 work_length, work_views = in_array(
-    StepScratch, "m p agents history solver", propagation=scratch_length
+    StepScratch, "m p agents history solver separation", propagation=scratch_length
 )
 
 

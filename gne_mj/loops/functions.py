@@ -12,9 +12,9 @@ ACTION, RATE, PROPAGATE, STORAGE = range(4)
 PREPARE, BARRIER_FREE_TERMS, ADD_BARRIER_FREE_SLOPE, OWN_PROFILE, MEMORY_OUTPUTS, SOLVE, ACT = (
     range(4, 11)
 )
-# For penalties that change in time, agents whose positions follow their outputs, and bodies that
-# collide
-PENALTY, POSITIONS, CONTACTS, COUNT = range(11, 15)
+# For penalties that change in time, agents whose positions follow their outputs, bodies that
+# collide, and agents that keep apart
+PENALTY, POSITIONS, CONTACTS, KEEP_APART, PUSH_APART, COUNT = range(11, 17)
 
 
 @kernel
@@ -58,6 +58,37 @@ def observe_contacts(problem, monitor, data, time):
             problem.functions[CONTACTS],
             (problem.parameter_block, data, address_in(monitor), time),
         )
+
+
+@kernel
+def keep_apart(problem, place, at, state):
+    """Look at agents that keep apart; False, with the exit latched, if they do not."""
+    if problem.functions[KEEP_APART] == 0:
+        return True
+    kept = call_integer(
+        problem.functions[KEEP_APART],
+        (problem.parameter_block, place[0], at.time, at.step, at.stage, address_in(state)),
+    )
+    return kept != 0
+
+
+@kernel
+def foreseen(faults, problem):
+    """Whether the law's action follows from the present state alone, whatever comes next."""
+    return faults.PREDICTION_KNOWN and problem.functions[KEEP_APART] == 0
+
+
+@kernel
+def push_apart(problem, place, at):
+    """Add to work.commanded what keeps agents apart; False, with the exit latched, if that is too
+    much."""
+    if problem.functions[PUSH_APART] == 0:
+        return True
+    good = call_integer(
+        problem.functions[PUSH_APART],
+        (problem.parameter_block, place[0], at.time, at.step, at.stage),
+    )
+    return good != 0
 
 
 @kernel
@@ -152,6 +183,7 @@ def solve(problem, memory, work):
             address_in(work.now),
             address_in(work.solver),
             len(work.solver),
+            address_in(work.separation),
         ),
     )
 

@@ -86,7 +86,7 @@ def assemble(problem, first, last, b, memory, work, solver):
 
 
 @kernel
-def local_length(problem, first, last, step, solver):
+def local_length(problem, first, last, memory, step, solver):
     """The step's length in the barrier's own norm, that of the worst action and constraint.
 
     With s = -g - t its square is (dg step / s)^2 + d2g step^2 / s: where a gap vanishes, dg does.

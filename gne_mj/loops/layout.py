@@ -41,6 +41,7 @@ class Steps(NamedTuple):
     mode: int
     history: int  # lengths of scratch arrays that depend on the kind of loop
     solver: int
+    separation: int
     method: int
     output: int  # which of a channel's states is its output
     position: int  # and which a position that follows it; -1 without
@@ -82,6 +83,7 @@ class Setup(NamedTuple):
     clock: LoopClock
     history: int = 0  # lengths of scratch arrays that depend on the kind of loop
     solver: int = 0
+    separation: int = 0
 
 
 def parameter_arrays(
@@ -112,6 +114,7 @@ def parameter_arrays(
         clock.mode,
         setup.history,
         setup.solver,
+        setup.separation,
         clock.method,
         agents.kind.OUTPUT,
         followed_position(agents.kind),
@@ -182,20 +185,22 @@ class Workspace(NamedTuple):
 
 
 SCRATCH = {"propagation": scratch_length}  # what its shapes use
-_length, _workspace_in = in_array(Workspace, "m p agents history solver", **SCRATCH)
+_length, _workspace_in = in_array(Workspace, "m p agents history solver separation", **SCRATCH)
 
 
 @kernel
 def loop_workspace_length(s):
     """Entries of a workspace, without what the engine adds; of sizes as a parameter block has
     them."""
-    return _length(s.actions, s.constraints, s.agents, s.history, s.solver)
+    return _length(s.actions, s.constraints, s.agents, s.history, s.solver, s.separation)
 
 
 @kernel
 def loop_workspace_in(flat, s):
     """A workspace's views, without what the engine adds."""
-    return _workspace_in(flat, 0, s.actions, s.constraints, s.agents, s.history, s.solver)
+    return _workspace_in(
+        flat, 0, s.actions, s.constraints, s.agents, s.history, s.solver, s.separation
+    )
 
 
 class Parts(NamedTuple):

@@ -15,6 +15,7 @@ from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
 from gne_mj.linked_game import compiled_for
 from gne_mj.loops import functions, implicit
 from gne_mj.loops import positions as followed
+from gne_mj.loops import separation as apart
 from gne_mj.loops.layout import (
     Instant,
     channels_in,
@@ -41,6 +42,14 @@ class LawWork(NamedTuple):
     now: Now
 
 
+class SolverWork(NamedTuple):
+    """What an equation of mode implicit works on."""
+
+    profile: np.ndarray  # (m,) overwritten
+    now: Now
+    separation: np.ndarray  # of agents that keep apart
+
+
 _now_in = numbers_in(Now)
 _monitor_in = numbers_in(MonitorNumbers)
 _LENGTH_OF_MONITOR = len(names_of(MonitorNumbers))
@@ -50,6 +59,13 @@ _LENGTH_OF_MONITOR = len(names_of(MonitorNumbers))
 def law_work_at(profile, now, m):
     """From the addresses of both."""
     return LawWork(floats_at(profile, m), _now_in(floats_at(now, LENGTH_OF_NOW), 0))
+
+
+@kernel
+def parts_at(block, workspace, steps):
+    """The parts of a run, from the addresses of its parameter block and workspace."""
+    length = loop_workspace_length(steps)
+    return parts_in(block, loop_workspace_in(floats_at(workspace, length), steps))
 
 
 def link(
@@ -169,6 +185,31 @@ def positions() -> Any:
 
 
 @cache
+def separation(held: bool) -> dict[int, Any]:
+    """What keeps agents apart, for all laws, games and agents; in held modes the solver pushes."""
+    source = source_key()
+
+    def keep(block, workspace, time, step, stage, state):
+        _ = source
+        steps = steps_in(block)
+        good = apart.keep(
+            parts_at(block, workspace, steps), Instant(time, step, stage),
+            floats_at(state, steps.actions * steps.states),
+        )  # fmt: skip
+        return 1 if good else 0
+
+    def push(block, workspace, time, step, stage):
+        _ = source
+        parts = parts_at(block, workspace, steps_in(block))
+        return 1 if apart.add_to_law(parts, Instant(time, step, stage)) else 0
+
+    found = {functions.KEEP_APART: callback(_whole(_whole, _whole, _real, *[_whole] * 3), keep)}
+    if not held:
+        found[functions.PUSH_APART] = callback(_whole(_whole, _whole, _real, _whole, _whole), push)
+    return found
+
+
+@cache
 def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any]:
     """What mode implicit solves a law for, each agent by itself if ``alone``."""
     entries = (
@@ -242,20 +283,20 @@ def solve(equation: ModuleType) -> Any:
     """The solver of mode implicit, for all laws and games.
 
     Args:
-        equation: :mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`.
+        equation: :mod:`gne_mj.loops.joint`, :mod:`gne_mj.loops.apart` or
+            :mod:`gne_mj.loops.local`.
     """
     source = source_key()
 
-    def solve(block, memory, profile, now, solver, length):
+    def solve(block, memory, profile, now, solver, length, separation):
         _ = source
         steps, problem = steps_in(block), problem_in(block)
         views = solver_in(floats_at(solver, length), problem.order, steps.constraints, steps.states)
-        return equation.solve(
-            problem, floats_at(memory, steps.memory), law_work_at(profile, now, steps.actions),
-            views,
-        )  # fmt: skip
+        of_law = law_work_at(profile, now, steps.actions)
+        work = SolverWork(of_law.profile, of_law.now, floats_at(separation, steps.separation))
+        return equation.solve(problem, floats_at(memory, steps.memory), work, views)
 
-    return callback(_whole(*[_whole] * 6), solve)
+    return callback(_whole(*[_whole] * 7), solve)
 
 
 @cache
@@ -272,9 +313,7 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
     def act(block, workspace, time, step, state, memory, model, data):
         _ = source
         steps = steps_in(block)
-        parts = parts_in(
-            block, loop_workspace_in(floats_at(workspace, loop_workspace_length(steps)), steps)
-        )
+        parts = parts_at(block, workspace, steps)
         good = implicit.act(
             faults, plant, (at, model, data, block), parts, Instant(time, step, 0),
             floats_at(state, steps.actions * steps.states), floats_at(memory, steps.memory),

@@ -128,7 +128,7 @@ def assemble(problem, first, last, b, memory, work, solver):
 
 
 @kernel
-def local_length(problem, first, last, step, solver):
+def local_length(problem, first, last, memory, step, solver):
     """The step's length in the barrier's own norm, as :func:`gne_mj.loops.joint.local_length`."""
     data, greatest, slot = problem.data, 0.0, 0
     low, high = data.offsets[first], data.offsets[first + 1]

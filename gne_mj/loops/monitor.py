@@ -59,6 +59,14 @@ class MonitorNumbers(Numbers):
     contact_agent: float  # and whose it was
     contact_other: float
     contact_depth: float  # greatest overlap in m
+    # Agents that keep apart, see gne_mj.loops.separation
+    apart: float  # observations of them
+    least_distance: float  # in m, of the positions of two agents; infinite if none were near
+    least_distance_time: float
+    nearest_first: float  # which two
+    nearest_second: float
+    too_near: float  # observations with two that were too near
+    most_pairs: float  # that were near at once
 
 
 class Monitor(NamedTuple):
@@ -77,7 +85,9 @@ class Monitor(NamedTuple):
 
 # STEP_TOO_SMALL: the boundary is so near that even the finest pieces of a step do not do
 # FORCES_LOST: MuJoCo has left out forces; EXIT_VALUE says which of its warnings told so
-INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST = range(6)
+# TOO_NEAR: two agents are; exit_agent and exit_constraint say which, as they do where a step is too
+# small for two agents
+INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST, TOO_NEAR = range(7)
 
 
 def fresh(actions: int, constraints: int, *runs: int) -> Any:

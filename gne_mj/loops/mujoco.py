@@ -225,7 +225,7 @@ def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
         place, steps = place_of(at, parameter_block, model, data), steps_in(parameter_block)
         workspace = workspace_at(place, steps)
         parts, progress = parts_in(parameter_block, workspace.loop), workspace.loop.progress
-        state = workspace.state
+        state, here = workspace.state, (address_in(progress), model, data)
         memory = field(data, at.act, place.sizes.na)[place.sizes.memory :]
         divided, h, moving = parts.work.division, parts.clock.h, steps.mode == CONTINUOUS
         step, done, result = np.int64(progress.step), 0, UNDER_WAY
@@ -240,7 +240,7 @@ def _advance_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
                     fleet.refresh(model, data, parameter_block)
                     fleet.gather(at, data, parameter_block, state)
                     end = Instant(division.ends(divided, step, h), step, division.END)
-                    good = control_step(faults, (0, model, data), parts, end, 0.0, state, memory)
+                    good = control_step(faults, here, parts, end, 0.0, state, memory)
                 result = end_piece(faults, machine, parts, step, steps.evaluations, good)
             else:
                 result = whole_step(place, machine, parts, step)

@@ -36,7 +36,7 @@ class MujocoWorkspace(NamedTuple):
 
 
 _length, _workspace_in = in_array(
-    MujocoWorkspace, "m p agents states held history solver", **SCRATCH
+    MujocoWorkspace, "m p agents states held history solver separation", **SCRATCH
 )
 
 
@@ -50,7 +50,14 @@ def held_memory(s):
 def mujoco_workspace_length(s):
     """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
     return _length(
-        s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history, s.solver
+        s.actions,
+        s.constraints,
+        s.agents,
+        s.states,
+        held_memory(s),
+        s.history,
+        s.solver,
+        s.separation,
     )
 
 
@@ -59,7 +66,7 @@ def mujoco_workspace_in(userdata, start, s):
     """The views of a workspace that begins there."""
     return _workspace_in(
         userdata, start, s.actions, s.constraints, s.agents, s.states, held_memory(s), s.history,
-        s.solver,
+        s.solver, s.separation,
     )  # fmt: skip
 
 
@@ -67,7 +74,8 @@ def workspace_of(userdata: NDArray[np.float64], start: int, s: Steps) -> Any:
     """The same as Python knows it, by name."""
     dtype = dtype_of(
         MujocoWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-        held=held_memory(s), history=s.history, solver=s.solver, **SCRATCH,
+        held=held_memory(s), history=s.history, solver=s.solver,
+        separation=s.separation, **SCRATCH,
     )  # fmt: skip
     return by_name(userdata[start:], dtype)
 

@@ -6,10 +6,10 @@ For some agents' outputs y at the end of a control period it solves
 
 where ``base + slope * u`` is what the plant reaches under the held input u. ``equation`` is the
 module that says which agents solve together and where their barriers look:
-:mod:`gne_mj.loops.joint` or :mod:`gne_mj.loops.local`. Its derivative's symmetric part is positive
-definite, so Newton's direction lowers the residual's norm, and halving the step until it does so
-and stays inside converges from every interior start. Each iterate is strictly inside, so that the
-set is kept even by one that is not accurate.
+:mod:`gne_mj.loops.joint`, :mod:`gne_mj.loops.apart` or :mod:`gne_mj.loops.local`. Its derivative's
+symmetric part is positive definite, so Newton's direction lowers the residual's norm, and halving
+the step until it does so and stays inside converges from every interior start. Each iterate is
+strictly inside, so that the set is kept even by one that is not accurate.
 """
 
 from typing import Annotated, NamedTuple
@@ -108,7 +108,7 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
     target, patience = work.now.penalty, PATIENCE
     numbers.rho = target
     low, high = at[first], at[last]
-    y, trial, step = solver.y, solver.trial, solver.step
+    y, trial, step, old = solver.y, solver.trial, solver.step, solver.old_step
     starts, length, norm, remaining = 0, 0.0, np.inf, np.inf
     for _ in range(MOST_EVALUATIONS):
         copy(y[low:high], trial[low:high])
@@ -127,7 +127,7 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
             copy(source[low:high], y[low:high])
             starts, patience = starts + 1, PATIENCE
             continue
-        size = put_residual(equation, problem, first, last, solver.residual, solver.old_step)
+        size = put_residual(equation, problem, first, last, solver.residual, old)
         if length > 0.0:
             if not (good and size <= (1.0 - DECREASE * length) * norm):
                 length *= 0.5
@@ -138,16 +138,16 @@ def newton(equation, problem, first, last, reuse, memory, work, solver):
         norm, numbers.steps = size, numbers.steps + 1.0
         usable = reuse and numbers.uses > 0.0 and numbers.rho == target
         if usable:
-            banded.solve_definite(solver.band, high - low, b, solver.old_step)
+            banded.solve_definite(solver.band, high - low, b, old)
             if numbers.uses < MOST_USES:
-                remaining = equation.local_length(problem, first, last, solver.old_step, solver)
+                remaining = equation.local_length(problem, first, last, memory, old, solver)
                 if remaining * max(numbers.leaves, remaining) <= ACCURATE:
                     numbers.uses += 1.0
-                    return arrive(equation, problem, first, solver.old_step, y[:high])
+                    return arrive(equation, problem, first, old, y[:high])
         if not find_step(equation, problem, first, last, memory, work, solver):
             return UNSOLVED
         numbers.leaves, numbers.uses = share_left(high - low, solver) if usable else 1.0, 1.0
-        remaining = equation.local_length(problem, first, last, step, solver)
+        remaining = equation.local_length(problem, first, last, memory, step, solver)
         if not remaining < np.inf:
             return UNSOLVED
         length = 1.0

@@ -51,6 +51,18 @@ def measure(channels, state, y):
 
 
 @kernel
+def look(parts, place, at, known, state):
+    """Measure unless outputs are known; False, with the exit latched, if they are outside or agents
+    are not kept apart."""
+    work = parts.work
+    if known == division.NOTHING:
+        measure(parts.channels, state, work.y)
+        if not inside(parts.problem, at.time, max(at.stage, 0), work.y, work, parts.monitor):
+            return False
+    return functions.keep_apart(parts.problem, place, at, state)
+
+
+@kernel
 def control_step(faults, place, parts, at, storage, state, memory):
     """Measure and act at a stage of a step, and at its start (stage 0) observe; fill work.u.
 
@@ -76,13 +88,11 @@ def control_step(faults, place, parts, at, storage, state, memory):
     known = divided.known if at.stage == 0 else float(division.NOTHING)
     divided.known = division.NOTHING
     instant = clock.mode == CONTINUOUS or at.step % clock.period == 0
-    if known == division.NOTHING:
-        measure(parts.channels, state, work.y)
-        if not inside(problem, at.time, stage, work.y, work, monitor):
-            if not instant:
-                monitor.exit_between = 1.0
-            return False
-    if at.stage == division.END and not faults.PREDICTION_KNOWN:
+    if not look(parts, place, at, known, state):
+        if not instant:
+            monitor.exit_between = 1.0
+        return False
+    if at.stage == division.END and not functions.foreseen(faults, problem):
         divided.known = division.OUTPUTS
         return True
     if instant and known != division.LAW:
@@ -95,6 +105,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
         else:
             measurement = faults.sense(problem, work, work.y, work.measurement)
             good = explicit_law(problem, at.time, stage, measurement, memory, work, monitor)
+            good = good and functions.push_apart(problem, place, at)
         if not good:
             return False
         if at.stage == division.END:
@@ -130,7 +141,7 @@ class OdeWorkspace(NamedTuple):
     vectors: Vectors
 
 
-_SIZES = "m p agents states memory history solver"
+_SIZES = "m p agents states memory history solver separation"
 _length, _workspace_in = in_array(OdeWorkspace, _SIZES, **SCRATCH)
 
 
@@ -138,15 +149,16 @@ _length, _workspace_in = in_array(OdeWorkspace, _SIZES, **SCRATCH)
 def ode_workspace_length(s):
     """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
     return _length(
-        s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
-    )  # fmt: skip
+        s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver, s.separation
+    )
 
 
 @kernel
 def ode_workspace_in(flat, s):
     """A workspace's views."""
     return _workspace_in(
-        flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver
+        flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
+        s.separation,
     )  # fmt: skip
 
 
@@ -156,7 +168,8 @@ def workspaces_of(flat: NDArray[np.float64], s: Steps) -> Any:
         flat,
         dtype_of(
             OdeWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-            memory=s.memory, history=s.history, solver=s.solver, **SCRATCH,
+            memory=s.memory, history=s.history, solver=s.solver, separation=s.separation,
+            **SCRATCH,
         ),
     )  # fmt: skip
 

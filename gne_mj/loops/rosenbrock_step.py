@@ -95,7 +95,7 @@ class Workspace(NamedTuple):
     work: StepScratch
 
 
-STEP_SCRATCH = SCRATCH | {"history": 0, "solver": 0}
+STEP_SCRATCH = SCRATCH | {"history": 0, "solver": 0, "separation": 0}
 workspace_length, _workspace_in = in_array(Workspace, "m p agents", **STEP_SCRATCH)
 
 

@@ -29,6 +29,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, MODES, load_plugins
 from gne_mj.scenario_tables.faults import FaultTable, MarginTable
+from gne_mj.separation import Separation, SeparationTable
 from gne_mj.simulation import Remade, Simulation
 from gne_mj.starts import interior_profile
 from gne_mj.system import Clock, System, mode_of
@@ -123,6 +124,9 @@ class SystemTable(Table):
         PlantTable(), description="what moves the agents"
     )
     initial: Annotated[InitialTable, Fills("")] = Field(InitialTable(), description="the start")
+    separation: SeparationTable | None = Field(
+        None, description="agents in the plane keep at least a distance from each other"
+    )
     margin: Annotated[MarginTable | None, Fills("disturbance")] = Field(
         None, description="the barrier is tightened so that these disturbances keep all inside"
     )
@@ -196,6 +200,7 @@ class SystemTable(Table):
             faults=self._faults(),
             seed=simulation.seed,
             disturbance=self._disturbance(game),
+            separation=self._separation(),
             state=state,
             memory=memory,
             mode=self.controller.mode,
@@ -315,6 +320,12 @@ class SystemTable(Table):
             return None
         with part_of("margin"):
             return self.margin.disturbance(game)
+
+    def _separation(self) -> Separation | None:
+        if self.separation is None:
+            return None
+        with part_of("separation"):
+            return self.separation.build()
 
     def _start(
         self, game: Game, agents: Agents, law: Law

@@ -17,8 +17,9 @@ from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
-from gne_mj.loops.link import link, penalty, positions
+from gne_mj.loops.link import link, penalty, positions, separation
 from gne_mj.loops.ode import OdeLoop
+from gne_mj.loops.separation import neighbours_length
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
@@ -92,6 +93,8 @@ class Assembly(SystemData):
             from gne_mj.loops.contacts import counter  # late: MuJoCo is slow to import
 
             found[functions.CONTACTS] = counter()
+        if self.separation is not None:
+            found |= separation(mode_of(self).held)
         return found
 
     @property
@@ -134,6 +137,7 @@ class Assembly(SystemData):
             propagator=propagator,
             schedule=np.zeros(3) if self.schedule is None else self.schedule.numbers,
             order=self.rows,
+            separation=np.zeros(3) if self.separation is None else self.separation.numbers,
             functions=self.functions,
             faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
@@ -161,6 +165,7 @@ class Assembly(SystemData):
         return Sizes(
             history=(late + 1) * m * (self.agents.states + 1) if late else 0,
             solver=mode_of(self).solver_length(self, self.rows),
+            separation=0 if self.separation is None else neighbours_length(self.game.agents),
         )
 
     def mujoco_plant(self, clock: Clock, *, decorated: bool = True) -> "FleetPlant":

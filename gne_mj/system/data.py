@@ -18,6 +18,7 @@ from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.plants.agents import Agents
+from gne_mj.separation import Separation
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,7 @@ class SystemData:
     faults: tuple[Fault, ...] = ()
     seed: int = 0
     disturbance: Disturbance | None = None
+    separation: Separation | None = None
     barrier: LogBarrier = field(init=False)
 
     @property

@@ -35,6 +35,11 @@ def law_at_start(system: System) -> Array:
     y = system.start.copy()
     left = functions.action(problem, y, weights, memory, scratch, u)
     raise_pending()
+    if system.separation is not None and system.start_positions is not None:
+        pushes = system.separation.pushes(system.start_positions, system.start, rho)
+        for (i, j), push in pushes.items():
+            u[2 * i : 2 * i + 2] += push
+            u[2 * j : 2 * j + 2] -= push
     return u if left < 0 else np.full(game.actions, np.nan)
 
 

@@ -6,6 +6,7 @@ from gne_mj.barrier import LogBarrier
 from gne_mj.errors import InvalidInput
 from gne_mj.game_check import refuse
 from gne_mj.system import checks
+from gne_mj.system.apart import check_separation
 from gne_mj.system.assembly import Assembly
 
 
@@ -32,6 +33,7 @@ class System(Assembly):
         faults: what goes wrong (:mod:`gne_mj.faults`).
         seed: of what is random in the faults.
         disturbance: what the game's tightening is meant to cover; None if nothing is declared.
+        separation: how far apart agents in the plane keep; None if nothing keeps them apart.
 
     Raises:
         InvalidInput: parts that do not fit together.
@@ -64,3 +66,4 @@ class System(Assembly):
         checks.check_memory(self)
         checks.check_engine(self)
         checks.check_faults(self)
+        check_separation(self)

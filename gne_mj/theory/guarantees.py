@@ -18,6 +18,7 @@ from gne_mj.theory.coupling import needed_connectivity
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
 from gne_mj.theory.positions import positions_of
+from gne_mj.theory.separation import kept_apart
 from gne_mj.theory.theorem import HELD, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
@@ -47,6 +48,7 @@ class Guarantees:
     division: dict[str, Any] | None
     held: dict[str, Any] | None
     positions: dict[str, Any] | None
+    separation: dict[str, Any] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
     measured: list[str]
@@ -82,7 +84,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     theorem = Theorem(system)
     held = ZeroOrderHold(system, clock) if mode_of(system).promises else None
     law, pieces = system.law, forecast(system, clock)
-    positions = positions_of(system, clock)
+    positions, apart = positions_of(system, clock), kept_apart(theorem, held, clock)
     known = system.known_equilibrium
     return Guarantees(
         system=_system(system),
@@ -118,15 +120,18 @@ def certify(system: System, clock: Clock) -> Guarantees:
         if held is None
         else {**held.report(), "period_search": None, "push_search": None},
         positions=None if positions is None else positions.report(),
+        separation=None if apart is None else apart.report(),
         lyapunov_claimed=theorem.lyapunov,
         guaranteed=[
             *verdict.guaranteed(theorem, held),
             *([] if positions is None else positions.guaranteed(theorem, held)),
+            *([] if apart is None else apart.guaranteed()),
         ],
         measured=verdict.measured(theorem, pieces),
         not_certified=[
             *verdict.not_certified(theorem, held, pieces),
             *([] if positions is None else positions.not_certified(held)),
+            *([] if apart is None else apart.not_certified()),
         ],
     )
 

@@ -60,12 +60,22 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield from _held(g["held"])
     if g["positions"] is not None:
         yield "positions", _positions(g["positions"])
+    if g["separation"] is not None:
+        yield "separation", _separation(g["separation"])
     for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
     for n, sentence in enumerate(g["measured"]):
         yield "only measured" if n == 0 else "", sentence
     for n, sentence in enumerate(g["not_certified"]):
         yield "not certified" if n == 0 else "", sentence
+
+
+def _separation(apart: dict[str, Any]) -> str:
+    promised = "promised" if apart["promised"] else "not promised"
+    return (
+        f"at least {apart['distance']:g} m, {promised}; pairs within {apart['reach']:g} m look at"
+        f" each other, half-planes turn by up to {apart['turn']:g} rad"
+    )
 
 
 def _positions(positions: dict[str, Any]) -> str:

@@ -24,6 +24,8 @@ from gne_mj.theory.gain import Gain, required_gain
 from gne_mj.theory.spectra import DENSE
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
+# Why no theorem covers agents that keep apart
+SEPARATED = "agents keep apart by half-planes that turn, and no theorem has constraints that do"
 HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.zero_order_hold
 
 
@@ -159,6 +161,8 @@ class Theorem:
             found.append("the penalty changes in time, and the theorems have a constant one")
         if self.system.faults:
             found.append("the scenario has faults, and the theorems have none")
+        if self.system.separation is not None:
+            found.append(SEPARATED)
         mode = mode_of(self.system)
         if not mode.promises and limited(self.system) and self.commanded_input.exceeded:
             found.append(

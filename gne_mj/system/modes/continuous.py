@@ -24,6 +24,7 @@ class Continuous(Mode):
     name = "continuous"
     native = CONTINUOUS
     held = False
+    keeps_apart = True
     section = "division"
     figures = (
         Figure(

@@ -17,7 +17,7 @@ from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
-from gne_mj.loops import functions, joint, link, local
+from gne_mj.loops import apart, functions, joint, link, local
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import IMPLICIT
@@ -37,6 +37,7 @@ class Implicit(Mode):
     name = "implicit"
     native = IMPLICIT
     promises = True
+    keeps_apart = True
     section = "implicit"
     figures = (
         Figure("solutions", entry("solutions")),
@@ -48,6 +49,8 @@ class Implicit(Mode):
 
     def equation(self, system: SystemData) -> ModuleType:
         """All together, unless agents keep to their shares or the law's barriers are their own."""
+        if system.separation is not None:
+            return apart
         return local if system.decentralised or system.law.alone else joint
 
     def prediction(self, system: SystemData) -> Mapping[int, Any]:
@@ -74,6 +77,8 @@ class Implicit(Mode):
         game = system.game
         if self.equation(system) is local:
             position, half_band = np.arange(game.actions), max(game.sizes) - 1
+        elif self.equation(system) is apart:  # which orders rows itself: there is room for any
+            position, half_band = np.arange(game.actions), game.actions - 1
         else:
             position, half_band = order(game)
         band = np.array([half_band, int(system.decentralised)])

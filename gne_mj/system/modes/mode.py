@@ -48,6 +48,7 @@ class Mode:
         held: whether an input acts for a whole control period.
         promises: whether inputs are solved for such that the outputs which they lead to are inside
             (:mod:`gne_mj.theory.zero_order_hold` says when that is certain).
+        keeps_apart: whether agents can keep apart in it (:mod:`gne_mj.loops.separation`).
         section: of a run's report, for :meth:`report`; empty for none.
         figures: that batches keep of each run.
     """
@@ -56,6 +57,7 @@ class Mode:
     native: ClassVar[int]
     held: ClassVar[bool] = True
     promises: ClassVar[bool] = False
+    keeps_apart: ClassVar[bool] = False
     section: ClassVar[str] = ""
     figures: ClassVar[tuple[Figure, ...]] = ()
 

@@ -1,0 +1,132 @@
+"""How agents keep apart in the plane: at least a distance between any two positions.
+
+That is not convex, and no constraint of a game. It is kept by half-planes that turn
+(:mod:`gne_mj.loops.separation`, docs/positions.md).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gne_mj.errors import InvalidInput
+from gne_mj.loops.separation import Rule, half_plane, push
+from gne_mj.toml_table import Table
+
+REACH, TURN = 2.5, 0.5  # where they are left out: in distances, and in rad
+MOST_TURN = 1.5
+HOLDS = 0.01  # of the greatest push, what a pair that holds another has at least
+
+
+@dataclass(frozen=True)
+class Separation:
+    """At least a distance between the positions of any two agents.
+
+    Args:
+        distance: r in m, positive.
+        reach: in m, more than the distance; only pairs that are nearer than this are looked at and
+            push each other.
+        turn: how far half-planes are turned at most, in rad from 0 to 1.5, all the same way, so
+            that agents which meet head on pass.
+
+    Raises:
+        InvalidInput: a number that is not so.
+    """
+
+    distance: float
+    reach: float
+    turn: float = TURN
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.distance < np.inf:
+            raise InvalidInput("distance", self.distance, "it must be positive and finite")
+        if not self.distance < self.reach < np.inf:
+            expected = f"it must be more than the distance, {self.distance:g} m, and finite"
+            raise InvalidInput("reach", self.reach, expected)
+        if not 0.0 <= self.turn <= MOST_TURN:
+            raise InvalidInput("turn", self.turn, f"it must be from 0 to {MOST_TURN:g} rad")
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """For native code: those of :class:`gne_mj.loops.separation.Rule`."""
+        return np.array([self.distance, self.reach, self.turn])
+
+    def nearest(
+        self, position: NDArray[np.float64], output: NDArray[np.float64]
+    ) -> tuple[int, int, float]:
+        """The two agents, from 0, that are nearest on their ways, and how near in m.
+
+        Args:
+            position: q (m,) in m.
+            output: y (m,) in m.
+        """
+        i, j, size = _distances(position, output)
+        at = int(np.argmin(size))
+        return int(i[at]), int(j[at]), float(size[at])
+
+    def pushes(
+        self, position: NDArray[np.float64], output: NDArray[np.float64], rho: float
+    ) -> dict[tuple[int, int], NDArray[np.float64]]:
+        """What pairs of agents, from 0, that are near push the first one with, each (2,).
+
+        The second one feels the opposite.
+
+        Args:
+            position: q (m,) in m.
+            output: y (m,) in m.
+            rho: the penalty.
+        """
+        i, j, size = _distances(position, output)
+        q, y, rule, found = position.reshape(-1, 2), output.reshape(-1, 2), Rule(*self.numbers), {}
+        for k in np.flatnonzero((size < self.reach) & (size > self.distance)):
+            first, second = int(i[k]), int(j[k])
+            ahead = y[first] - y[second]
+            x, z, _ = half_plane(rule, *(q[first] - q[second]), *ahead)
+            slack = x * ahead[0] + z * ahead[1] - self.distance
+            found[first, second] = push(rho, slack, self.reach - self.distance) * np.array([x, z])
+        return found
+
+    def holding(
+        self, position: NDArray[np.float64], output: NDArray[np.float64], rho: float
+    ) -> list[tuple[int, int]]:
+        """The pairs of agents, from 0, that push each other, the hardest first.
+
+        Those that push less than 1% of the hardest are left out.
+        """
+        pushes = self.pushes(position, output, rho)
+        sizes = {pair: float(np.hypot(*push)) for pair, push in pushes.items()}
+        least = HOLDS * max(sizes.values(), default=0.0)
+        return sorted((pair for pair in sizes if sizes[pair] > least), key=lambda p: -sizes[p])
+
+
+def _distances(
+    position: NDArray[np.float64], output: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """All pairs of agents, and how near each is on its way from positions to outputs, in m."""
+    q, y = position.reshape(-1, 2), output.reshape(-1, 2)
+    i, j = np.triu_indices(len(q), 1)
+    start, way = q[i] - q[j], (y[i] - y[j]) - (q[i] - q[j])
+    length = np.maximum(np.sum(way**2, axis=1), np.finfo(float).tiny)
+    share = np.clip(-np.sum(start * way, axis=1) / length, 0.0, 1.0)
+    return i, j, np.linalg.norm(start + share[:, None] * way, axis=1)
+
+
+class SeparationTable(Table):
+    """Agents in the plane keep at least a distance from each other."""
+
+    distance: float = Field(gt=0, description="r in m, between the positions of any two agents")
+    reach: float | None = Field(
+        None,
+        gt=0,
+        description="m, more than the distance, of which it is 2.5 times if left out: pairs that"
+        " are farther apart on their ways are not looked at",
+    )
+    turn: float = Field(
+        TURN, ge=0, le=MOST_TURN, description="rad, how far half-planes turn, so that agents pass"
+    )
+
+    def build(self) -> Separation:
+        """The separation."""
+        reach = REACH * self.distance if self.reach is None else self.reach
+        return Separation(self.distance, reach, self.turn)

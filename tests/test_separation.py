@@ -1,0 +1,469 @@
+"""Agents that keep apart: half-planes, neighbours, loops against plain Python, exits, reports."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from batch_plans import all_chunks
+from builders import relative_error, run_loop
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from separation_reference import Swap, half_plane, nearest_point
+
+import gne_mj as gm
+from gne_mj import certificate
+from gne_mj.batches.plan import make_plan
+from gne_mj.batches.sweep import Sweep
+from gne_mj.environment import load_environment
+from gne_mj.errors import InfeasibleStart, InvalidInput
+from gne_mj.exit_map import Grid, exit_map
+from gne_mj.loops import apart, cells
+from gne_mj.loops import monitor as watch
+from gne_mj.loops import separation as native
+from gne_mj.plants.position_robot import least_damping
+from gne_mj.records import fresh
+from gne_mj.scenario import load_scenario
+from gne_mj.separation import Separation
+from gne_mj.summary import summary
+from gne_mj.theory import certify
+
+R, REACH, TURN = 0.6, 1.5, 0.5
+RULE = native.Rule(R, REACH, TURN)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def swap(**changes):
+    """The scenario with keys of its system changed."""
+    keys = {key.replace("__", "."): value for key, value in changes.items()}
+    keys = {"plant.engine": "ode", **keys}
+    return load_scenario("swap", {"agents.contacts": keys["plant.engine"] == "mujoco", **keys})
+
+
+def system_of(**changes):
+    return swap(**changes).system_objects()[0]
+
+
+def near_of(agents):
+    """Room for pairs."""
+    return fresh(native.Neighbours, agents=agents)
+
+
+def drawn(rng, agents):
+    """Places and outputs, some outputs far ahead, some agents close together."""
+    spread = rng.choice([0.5, 3.0, 30.0])
+    q = rng.uniform(-spread, spread, 2 * agents)
+    return q, q + rng.normal(0, rng.choice([0.0, 0.3, 5.0]), 2 * agents)
+
+
+def apart_by(rng):
+    """q_i - q_j and y_i - y_j of two agents that a line can keep apart, often just so."""
+    while True:
+        a, b = rng.normal(0, rng.choice([0.8, 3.0]), (2, 2))
+        size = np.linalg.norm(nearest_point(a, b))
+        if size > 1e-3:
+            scale = R * (1.0 + 10.0 ** rng.uniform(-9, 0.5)) / size
+            return scale * a, scale * b
+
+
+def cloud(rng, agents):
+    """Points more than R apart, shape (2 agents,)."""
+    points = []
+    while len(points) < agents:
+        point = rng.uniform(-2.5, 2.5, 2)
+        if all(np.linalg.norm(point - other) > 1.02 * R for other in points):
+            points.append(point)
+    return np.array(points).ravel()
+
+
+# --------------------------------------------------------------------- half-planes, neighbours
+
+
+@given(seed=seeds)
+def test_half_planes_are_those_of_plain_python_and_leave_half_of_the_margin(seed):
+    rng = np.random.default_rng(seed)
+    a, b = apart_by(rng)
+    turn = rng.choice([0.0, 0.5, 1.5])
+    x, y, size = native.half_plane(native.Rule(R, REACH, turn), *a, *b)
+    n, margin = np.array([x, y]), size - R
+    assert np.hypot(x, y) == pytest.approx(1.0)
+    assert min(n @ a, n @ b) - R >= 0.5 * margin * (1.0 - 1e-6) - 1e-15
+    np.testing.assert_allclose(n, half_plane(R, turn, a, b), atol=1e-6)
+    if turn == 0.0:  # nothing is farther from both
+        angles = np.linspace(-np.pi, np.pi, 721)
+        others = np.column_stack([np.cos(angles), np.sin(angles)])
+        assert min(n @ a, n @ b) >= np.max(np.minimum(others @ a, others @ b)) - 1e-12
+    back = native.half_plane(native.Rule(R, REACH, turn), *-a, *-b)
+    np.testing.assert_allclose(back[:2], -n, atol=1e-12)  # the same line, seen by the other
+
+
+@given(seed=seeds)
+def test_the_old_half_plane_stays_allowed_so_that_there_is_a_next_one(seed):
+    """Whatever y+ is inside it, and q+ on the way from q to y+."""
+    rng = np.random.default_rng(seed)
+    a, b = apart_by(rng)
+    x, y, _ = native.half_plane(RULE, *a, *b)
+    n = np.array([x, y])
+    for _ in range(10):
+        b = b + rng.normal(0, rng.choice([0.01, 1.0]), 2)
+        b = b + max(0.0, R * (1.0 + 1e-9) - n @ b) * n  # inside, on the edge if it was not
+        a = a + rng.uniform(0, 1) * (b - a)
+        assert min(n @ a, n @ b) > R
+        x, y, size = native.half_plane(RULE, *a, *b)
+        n = np.array([x, y])
+        assert size > R
+        assert min(n @ a, n @ b) > R
+
+
+@given(seed=seeds)
+@settings(max_examples=60)
+def test_cells_find_the_pairs_that_all_pairs_show(seed):
+    rng = np.random.default_rng(seed)
+    agents = int(rng.integers(2, 40))
+    q, y = drawn(rng, agents)
+    if rng.random() < 0.1:
+        q[0] = 1e30
+    near = near_of(agents)
+    cells.find(near, q, y, REACH, 0.0)
+    count = int(near.numbers.pairs)
+    found = set(zip(near.first[:count].tolist(), near.second[:count].tolist(), strict=True))
+    assert len(found) == count
+    points, ahead = q.reshape(-1, 2), y.reshape(-1, 2)
+    expected = {
+        (i, j)
+        for i in range(agents)
+        for j in range(i + 1, agents)
+        if np.linalg.norm(nearest_point(points[i] - points[j], ahead[i] - ahead[j])) < REACH
+    }
+    assert found == expected
+
+
+@given(seed=seeds)
+@settings(max_examples=60)
+def test_pairs_that_are_not_near_cannot_come_too_near_within_a_period(seed):
+    """Wherever outputs go, every pair that is not in the list stays half way from the reach."""
+    rng = np.random.default_rng(seed)
+    agents = int(rng.integers(2, 15))
+    near = near_of(agents)
+    near.place[:] = cloud(rng, agents)
+    near.output[:] = near.place + rng.normal(0, 0.05, 2 * agents)
+    cells.find(near, near.place, near.output, REACH, 0.0)
+    near.numbers.renewed = near.numbers.pairs
+    y = near.output + rng.normal(0, rng.choice([0.03, 1.0, 5.0]), 2 * agents)
+    before = near.numbers.pairs
+    added = apart.add_pairs(RULE, near, y)
+    assert added == (near.numbers.pairs > before)
+    assert not apart.add_pairs(RULE, near, y)
+    count = int(near.numbers.pairs)
+    known = set(zip(near.first[:count].tolist(), near.second[:count].tolist(), strict=True))
+    assert len(known) == count
+    q, ahead = near.place.reshape(-1, 2), y.reshape(-1, 2)
+    for i in range(agents):
+        for j in range(i + 1, agents):
+            if (i, j) not in known:
+                way = nearest_point(q[i] - q[j], ahead[i] - ahead[j])
+                assert np.linalg.norm(way) >= 0.5 * (R + REACH)
+
+
+@given(seed=seeds)
+@settings(max_examples=30)
+def test_the_pushes_slope_is_that_of_its_differences(seed):
+    """And the push itself begins at 0, with its slope, where two agents are at the reach."""
+    rng, h, most = np.random.default_rng(seed), 1e-6, REACH - R
+    s = most * 10.0 ** rng.uniform(-3, -0.01)
+    slope = (native.push(0.05, s * (1 + h), most) - native.push(0.05, s * (1 - h), most)) / (
+        2 * h * s
+    )
+    assert slope == pytest.approx(-0.05 / s**2, rel=1e-6)
+    assert native.push(0.05, most, most) == 0.0
+    assert native.push(0.05, most * (1 - h), most) == pytest.approx(0.05 / most * h, rel=1e-3)
+
+
+# ------------------------------------------------------------------------------------- loops
+
+
+def four(rng):
+    """Four robots in each other's way, and their oracle."""
+    q = cloud(rng, 4)
+    y, place = q + rng.normal(0, 0.02, 8), -q
+    table = {
+        "game__desired_place": place.reshape(-1, 2).tolist(),
+        "agents__count": 4,
+        "agents__main_mass": [1.0, 2.0, 0.7, 1.0],
+        "initial": {"action": y.reshape(-1, 2).tolist(), "position": q.reshape(-1, 2).tolist()},
+    }
+    return table, Swap(place.reshape(-1, 2), 5.0, 0.05, R, REACH, TURN)
+
+
+@pytest.mark.parametrize("engine", ["ode", "mujoco"])
+def test_mode_implicit_is_the_one_of_plain_python(engine):
+    """Outputs from the equation solved by SciPy on an energy's differences, half-planes by
+    bisection."""
+    rng, h = np.random.default_rng(1), 0.01
+    table, oracle = four(rng)
+    system = system_of(plant__engine=engine, **table)
+    p = system.agents.parameters
+    M, m, k, atan, gamma, tau, d, _ = p.T
+    assert np.allclose(d, 1.2 * least_damping(p))
+    states, *_ = run_loop(system, h, 60)
+    s, y, w, q = states[0].T
+    near = 0
+    for row in states[1:]:
+        v = (y - q) / tau
+        force = k * s + atan * np.arctan(s) + gamma * (v - w)
+        free_v = v + h * (-d * v - force) / M
+        free = q + (h + tau) * free_v
+        pairs = oracle.pairs(q, y)
+        near = max(near, len(pairs))
+        y = oracle.implicit(free, h / M * (tau + h), y, pairs)
+        v = (y - q) / (tau + h)
+        w = w + h * force / m
+        s, q = s + h * (v - w), q + h * v
+        np.testing.assert_allclose(row.T, [s, y, w, q], atol=2e-6)
+    assert near >= 3
+
+
+def test_continuous_time_is_the_one_of_plain_python():
+    """Half-planes that are renewed at every step, and held over its stages."""
+    rng, h = np.random.default_rng(1), 1e-3
+    table, oracle = four(rng)
+    system = system_of(
+        controller__mode="continuous", plant__integrator="rk4", barrier__rho=0.2, **table
+    )
+    oracle.rho = 0.2
+    M, m, k, atan, gamma, tau, d, _ = system.agents.parameters.T
+
+    def rate(x, pairs):
+        s, y, w, q = x
+        v = (y - q) / tau
+        force = k * s + atan * np.arctan(s) + gamma * (v - w)
+        u = oracle.law(y, pairs)
+        return np.array([v - w, v + tau * (u - d * v - force) / M, force / m, v])
+
+    states, _, _, loop = run_loop(system, h, 150)
+    assert loop.monitor.divided == 0
+    x = states[0].T
+    for row in states[1:]:
+        pairs = oracle.pairs(x[3], x[1])
+        k1 = rate(x, pairs)
+        k2 = rate(x + 0.5 * h * k1, pairs)
+        k3 = rate(x + 0.5 * h * k2, pairs)
+        k4 = rate(x + h * k3, pairs)
+        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        np.testing.assert_allclose(row.T, x, atol=1e-7)
+
+
+def least_distance(states):
+    """Of all positions at all samples, in m."""
+    points = states[:, :, 3].reshape(len(states), -1, 2)
+    i, j = np.triu_indices(points.shape[1], 1)
+    return np.min(np.linalg.norm(points[:, i] - points[:, j], axis=2))
+
+
+MODES = {
+    "implicit": {},
+    "continuous": {"controller__mode": "continuous", "plant__integrator": "rk4"},
+    "euler": {"controller__mode": "continuous"},
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_swaps_in_mujoco_and_as_ode_keep_apart_and_arrive(mode):
+    found = {}
+    for engine in ("mujoco", "ode"):
+        system = system_of(plant__engine=engine, **MODES[mode])
+        found[engine], _, _, loop = run_loop(system, 0.005, 3000)
+        seen = loop.monitor
+        assert seen.exit == watch.INSIDE
+        assert seen.too_near == 0
+        assert least_distance(found[engine]) >= R
+        assert R <= seen.least_distance <= least_distance(found[engine]) + 1e-12
+        if mode == "implicit":
+            assert seen.least_distance == pytest.approx(least_distance(found[engine]), abs=1e-12)
+            assert seen.apart == 3001
+        assert np.max(np.abs(found[engine][-1, :, 1] - system.centre)) < 1e-2
+    assert relative_error(found["mujoco"][:100], found["ode"][:100]) < 1e-9
+
+
+def test_partial_information_keeps_apart_too():
+    controller = {
+        "information": "partial", "graph": "ring", "coupling": 5.0, "time_constant": 0.1,
+        "mode": "implicit",
+    }  # fmt: skip
+    states, _, _, loop = run_loop(system_of(controller=controller), 0.01, 1000)
+    assert loop.monitor.exit == watch.INSIDE
+    assert least_distance(states) >= R
+
+
+def test_agents_that_never_come_near_move_as_without_separation():
+    away = {"game__desired_place": [[-2, 0], [0, 2], [2, 0]], "agents__count": 3}
+    start = {"initial__action": [[-4, 0], [0, 4], [4, 0]]}
+    found = [
+        run_loop(system_of(**away, **start, **more), 0.01, 200)[0]
+        for more in ({"separation": None}, {})
+    ]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-13)
+
+
+# ------------------------------------------------------------------------------- what is told
+
+
+def pushed(size, **changes):
+    """Two robots next to each other, one of which is pushed at the other."""
+    push = {"type": "push", "agents": [1], "force": size, "axis": 1, "start": 0.1}
+    pair = {"game__desired_place": [[-0.5, 0], [0.5, 0]], "agents__count": 2}
+    return swap(
+        **pair, initial__action=[[-0.5, 0], [0.5, 0]], simulation__duration=1.0, faults=[push],
+        **changes,
+    )  # fmt: skip
+
+
+def test_agents_that_are_pushed_too_near_end_the_run():
+    run = pushed(200.0).simulation_object().run()
+    assert run.status == "too_near"
+    report = run.reports["robots"]
+    assert "agents 1 and 2" in report["message"]
+    assert report["separation"]["too_near"] in (0, 1)
+    assert report["exit"]["agents"] == [1, 2]
+    assert report["exit"]["constraint"] is None
+    assert "separation" in summary(report)
+
+
+def test_a_deadlock_is_told_with_the_pair_that_holds():
+    """Two robots head on whose half-planes do not turn."""
+    head_on = {
+        "game__desired_place": [[2, 0], [-2, 0]], "agents__count": 2, "separation__turn": 0.0,
+        "initial__action": [[-2, 0], [2, 0]], "agents__appendage_mass": 0.1,
+    }  # fmt: skip
+    run = swap(**head_on).simulation_object().run()
+    assert run.status == "completed"
+    report = run.reports["robots"]
+    told = "at rest, away from equilibrium: held by the separation of agents 1 and 2"
+    assert told in report["message"]
+    assert report["separation"]["held_by"] == [[1, 2]]
+    assert swap(**{**head_on, "separation__turn": 0.3}).simulation_object().run().status == (
+        "converged"
+    )
+
+
+PARTIAL = {"information": "partial", "graph": "ring", "mode": "implicit"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"controller__mode": "sampled"}, r"separation: .*'sampled'.*'continuous' or 'implicit'"),
+        ({"controller__decentralised": True}, r"separation: .*full and partial"),
+        (
+            {"controller": {"information": "distributed", "graph": "ring", "mode": "implicit",
+                            "epsilon": 0.1, "gain": 1.0}},
+            r"separation: .*full and partial",
+        ),
+        ({"faults": [{"type": "noise", "amplitude": 0.1}]}, r"separation: .*sensors"),
+        ({"margin": {"push": 0.1}}, r"separation: .*margin"),
+        ({"separation__reach": 0.5}, r"separation\.reach: .*more than the distance, 0\.6 m"),
+        ({"separation": {"distance": 0.6, "gap": 1.0}}, r"gap"),
+    ],
+)  # fmt: skip
+def test_what_it_is_not_for_is_refused(changes, words):
+    with pytest.raises(InvalidInput, match=words):
+        system_of(**changes)
+
+
+def test_agents_on_a_lane_and_those_of_velocities_are_refused():
+    for name in ("platoon", "planar-sync"):
+        with pytest.raises(InvalidInput, match=r"separation: .*in the plane"):
+            load_scenario(name, {"separation": {"distance": 0.1}}).system_objects()
+
+
+def test_a_start_too_near_names_the_agents():
+    start = swap().systems["robots"].initial.action
+    near = [list(place) for place in start]
+    near[3] = [start[2][0] + 0.5, start[2][1]]
+    with pytest.raises(InfeasibleStart, match="separation of agents 3 and 4"):
+        system_of(initial__action=near)
+    ahead = [list(place) for place in start]
+    ahead[0], ahead[4] = ahead[4], ahead[0]  # outputs run past each other
+    with pytest.raises(InfeasibleStart, match="separation of agents"):
+        system_of(initial={"action": ahead, "position": start})
+
+
+def test_certificates_promise_safety_and_no_arrival():
+    scenario = swap()
+    clock = scenario.clock()
+    found = certify(scenario.system_objects()[0], clock)
+    kept = "the positions of any two agents are at least 0.6 m apart"
+    assert any(kept in text and "every integration step" in text for text in found.guaranteed)
+    assert any("that agents arrive" in text for text in found.not_certified)
+    assert not found.lyapunov_claimed
+    assert "separation" in str(found)
+    found = certify(system_of(**MODES["continuous"]), clock)
+    assert f"{kept} in continuous time" in found.guaranteed
+    assert not found.lyapunov_claimed
+    assert not any("tends to" in text for text in found.guaranteed)
+    for changes in ({"agents__local_damping": 0.1, **MODES["continuous"]}, MODES["euler"],
+                    {"plant__integrator": "rk4"}, {"agents__input_limit": 1.0}):  # fmt: skip
+        found = certify(system_of(**changes), clock)
+        assert not found.separation["promised"]
+        assert not any(kept in text for text in found.guaranteed)
+        assert any("that agents keep 0.6 m apart" in text for text in found.not_certified)
+
+
+def test_batches_draw_starts_that_are_apart_and_keep_distances():
+    scenario = swap(simulation__duration=0.5)
+    plan = make_plan(scenario, sweeps=[Sweep("separation.distance", (0.5, 0.6))], starts=3, seed=4)
+    rows = all_chunks(plan, 1)
+    least = rows["least_distance"][1]
+    assert np.all((least >= np.repeat([0.5, 0.6], 3)) | np.isnan(least))
+    assert np.all(rows["too_near"][1] == 0)
+    for run in range(plan.runs):
+        system = plan.alone(run).system_objects()[0]
+        assert np.array_equal(system.start, system.start_positions)
+
+
+def test_maps_and_environments_say_why_they_are_none():
+    system = system_of()
+    with pytest.raises(InvalidInput, match=r"system\.separation: .*gne-mj batch"):
+        exit_map(system, 0.01, Grid((0.01,), (0.5,)))
+    with pytest.raises(InvalidInput, match=r"systems\.robots\.separation: .*environment"):
+        load_environment("swap")
+
+
+GOLDEN = Path(__file__).parent / "golden" / "separation.json"
+
+
+def figures(name):
+    """What a run of a shipped scenario is known by."""
+    run = gm.run(name)
+    report, data = run.reports["robots"], run["robots"]
+    least, most = (f(data["position"].values, axis=0).tolist() for f in (np.min, np.max))
+    return report, {
+        "least_distance": report["separation"]["least_distance"],
+        "most_pairs": report["separation"]["most_pairs"],
+        "settling_time": report["settling_time"],
+        "least": least,
+        "most": most,
+        "peak": report["actuators"]["peak"],
+    }
+
+
+@pytest.mark.parametrize("name", ["swap"])
+def test_shipped_scenarios(name):
+    report, found = figures(name)
+    for key, value in json.loads(GOLDEN.read_text())[name].items():
+        assert found[key] == pytest.approx(value, abs=1e-6), key
+    assert report["status"] == "converged"
+    assert report["contacts"]["count"] == 0
+    assert report["separation"]["too_near"] == 0
+    assert report["positions"]["outside"] == 0
+
+
+def test_numbers_that_make_no_sense_are_refused():
+    for numbers in ((0.0, 1.0, 0.1), (1.0, 1.0, 0.1), (1.0, 2.0, 2.0), (np.nan, 2.0, 0.1)):
+        with pytest.raises(InvalidInput):
+            Separation(*numbers)
+
+
+def test_sentences_name_the_first_pairs_and_count_the_rest():
+    pairs = [(0, k) for k in range(1, 8)]
+    assert certificate._pairs(pairs).endswith("agents 1 and 6 and 2 pairs more")
