@@ -152,7 +152,7 @@ def same_model(found, wanted):
         assert names[0] == names[1]
 
 
-def by_dm_control(table, dimension):
+def by_dm_control(table, dimension, contacts):
     """The fleet as dm_control attaches robots."""
     from dm_control import mjcf
 
@@ -166,20 +166,25 @@ def by_dm_control(table, dimension):
         for end, row in zip(ends, rows, strict=True):
             spring = robot.find("tendon", f"spring{end}")
             spring.stiffness, spring.damping = row[2], row[4]
+        if not contacts:
+            robot.find("geom", fleet.HULL).remove()
         world.attach(robot)
+    if contacts:
+        world.option.flag.contact = world.option.flag.constraint = "enable"
     world.option.timestep = 0.003
     world.option.integrator = "Euler"
     world.size.nuserdata = 7
     return mujoco.MjModel.from_xml_string(world.to_xml_string())
 
 
+@pytest.mark.parametrize("contacts", [False, True])
 @pytest.mark.parametrize("dimension", [1, 2])
-def test_fleets_are_those_of_dm_control(monkeypatch, dimension):
+def test_fleets_are_those_of_dm_control(monkeypatch, dimension, contacts):
     table = numbers(5, dimension)
-    wanted = by_dm_control(table, dimension)
+    wanted = by_dm_control(table, dimension, contacts)
     for group in (200, 2):  # all at once, and in three parts
         monkeypatch.setattr(fleet, "GROUP", group)
-        world = fleet.compose(table, dimension=dimension)
+        world = fleet.compose(table, dimension=dimension, contacts=contacts)
         found = fleet.compile_model(world, timestep=0.003, integrator="Euler", userdata=7)
         same_model(found, wanted)
 
