@@ -24,6 +24,13 @@ class Quantity:
         symbol: its formula in TeX, for figures; may be empty.
         bound: greatest allowed value, one number or (entries,); None if there is none.
         lower_bound: least allowed value likewise.
+        between: of distances between agents the two of each entry, from 0, shape (entries, 2); -1
+            for entries that are none. They are drawn where the agents are.
+        outline: corners of the part of the plane that the values say the use of, in order round it,
+            in the action's unit, shape (K, 2).
+
+    Raises:
+        InvalidInput: an ``each`` that is none, or pairs or corners of another shape.
     """
 
     name: str
@@ -34,10 +41,26 @@ class Quantity:
     symbol: str = ""
     bound: ArrayLike | None = None
     lower_bound: ArrayLike | None = None
+    between: ArrayLike | None = None
+    outline: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         if self.each not in ("", "agent", "constraint"):
             raise InvalidInput("each", self.each, "it must be 'agent', 'constraint' or ''")
+        for key in ("between", "outline"):
+            given = getattr(self, key)
+            if given is not None and (np.ndim(given) != 2 or np.shape(given)[1] != 2):
+                raise InvalidInput(key, np.shape(given), "its shape must be (..., 2)")
+
+    @property
+    def pairs(self) -> list[list[int]]:
+        """The two agents that each entry is a distance between, from 0; without entries: none."""
+        return [] if self.between is None else np.asarray(self.between, dtype=int).tolist()
+
+    @property
+    def corners(self) -> list[list[float]]:
+        """Of its outline; without: none."""
+        return [] if self.outline is None else np.asarray(self.outline, dtype=float).tolist()
 
     def at(self, profiles: NDArray[np.float64], entries: tuple[int, ...]) -> NDArray[np.float64]:
         """The values at profiles (samples, m), of shape (samples, *entries).

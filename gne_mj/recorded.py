@@ -22,6 +22,7 @@ from gne_mj.graph import Graph, complete
 from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
 from gne_mj.quantity import Quantity
+from gne_mj.separation import Separation
 from gne_mj.system.data import SystemData
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ _ALL = "all"  # in place of a list of all agents, or of all edges
 
 def structure_of(system: SystemData) -> str:
     """What a system's results do not say of it, as JSON; agents are numbered from 1."""
-    game, graph = system.game, system.law.graph
+    game, graph, apart = system.game, system.law.graph, system.separation
     edges = None if graph is None else [[i + 1, j + 1] for i, j in graph.edges]
     everyone = edges is not None and 2 * len(edges) == game.agents * (game.agents - 1)
     return json.dumps(
@@ -44,6 +45,7 @@ def structure_of(system: SystemData) -> str:
             "owners": None if game.owners is None else _numbered(game.owners, game.agents),
             "quantities": [quantity.name for quantity in game.quantities],
             "graph": _ALL if everyone else edges,
+            "separation": None if apart is None else [apart.distance, apart.reach, apart.turn],
             "estimates": [part.name for part in system.law.memory_parts if part.rows],
         },
         default=int,
@@ -105,6 +107,7 @@ def recorded_system(
         decentralised=bool(attributes["decentralised"]),
         faults=faults,
         seed=seed,
+        separation=None if known["separation"] is None else Separation(*known["separation"]),
     )
 
 
@@ -148,6 +151,7 @@ def _quantity(data: "xarray.Dataset", name: str) -> Quantity:
         each=str(variable.dims[1]) if variable.ndim > 1 else "",
         symbol=about["symbol"],
         **bounds,
+        **{key: json.loads(about[key]) for key in ("between", "outline") if key in about},
     )
 
 

@@ -4,8 +4,9 @@ Trajectories, rows and summaries of batches, the live page, replays and figures 
 ``SIGNALS``: to add a signal is to add its :class:`Variable` there (docs/developers.md).
 """
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -60,6 +61,7 @@ class Variable:
         there: whether a system has it.
         unit, long_name: for every reader; None writes no such attribute, "" an empty one.
         symbol: its formula in TeX, likewise.
+        more: further attributes, by name.
         bounds: arrays by the variables' names NAME_bound and NAME_lower_bound, without the time.
         instant: whether state and memory say it, so that a live page has it at any moment; of
             others it has what was recorded last.
@@ -79,6 +81,7 @@ class Variable:
     unit: Text | None = None
     long_name: Text | None = None
     symbol: str | None = None
+    more: Mapping[str, str] = field(default_factory=dict)
     bounds: Callable[[SystemData], Mapping[str, Array]] = lambda system: {}
     instant: bool = True
     figure: bool = False
@@ -93,8 +96,10 @@ class Variable:
         return tuple(axis_of(system) if d == AXIS else d for d in self.dimensions)
 
     def attributes(self, system: SystemData) -> dict[str, str]:
-        """Units, long_name and symbol, those there are."""
-        given = {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+        """Units, long_name, symbol and what else is said, those there are."""
+        given: dict[str, Text | None] = {
+            "units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **self.more
+        }  # fmt: skip
         return {
             key: text(system) if callable(text) else text
             for key, text in given.items()
@@ -275,10 +280,17 @@ def _quantity(entries: tuple[int, ...], quantity: Quantity) -> Variable:
         unit=quantity.unit,
         long_name=quantity.long_name,
         symbol=quantity.symbol,
+        more=_drawn(quantity),
         bounds=lambda system: quantity.bounds(entries),
         figure=True,
         page="line",
     )
+
+
+def _drawn(quantity: Quantity) -> dict[str, str]:
+    """Between which agents it is, and of which outline, for figures."""
+    found = {"between": quantity.pairs, "outline": quantity.corners}
+    return {key: json.dumps(value) for key, value in found.items() if value}
 
 
 def _memory(system: SystemData) -> Iterator[Variable]:

@@ -175,6 +175,18 @@ def test_the_regions_middle_and_shares(seed):
     assert np.all((points[inside] > lower) & (points[inside] < upper))
 
 
+@given(seed=seeds)
+def test_the_outline_is_the_boundary(seed):
+    region = region_of(**random_region(np.random.default_rng(seed)))
+    corners = region.outline
+    assert region.share(corners) == pytest.approx(1.0, abs=1e-9)
+    # in order round it, and nothing is missing but what an arc's chords cut off
+    along = np.roll(corners, -1, axis=0) - corners
+    ahead = np.roll(along, -1, axis=0)
+    assert np.all(along[:, 0] * ahead[:, 1] - along[:, 1] * ahead[:, 0] > -1e-9)
+    assert np.all(region.share(corners + 0.5 * along) > 0.99)
+
+
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
 def test_the_middle_is_found_at_every_size(size):
     region = region_of(vertices=size * np.array([[0, 0], [4, 0], [0, 3]]))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import gne_mj as gm
+from gne_mj import plots
 from gne_mj.batches.chunk import Runner
 from gne_mj.batches.plan import make_plan
 from gne_mj.batches.sweep import Sweep
@@ -307,3 +308,41 @@ def test_shipped_scenarios(name):
     found = certify(scenario.system_objects()[0], scenario.clock())
     assert found.status == "certified"
     assert found.positions["follow"]
+
+
+# ---------------------------------------------------------------------------- what is shown of it
+
+
+def test_the_page_is_told_of_plans():
+    clock = Clock(0.4, 0.01, 0.01, 0.05)
+    shown = {
+        name: ShownSystem(load_scenario(name).system_objects()[0], clock).meta()
+        for name in ("platoon", "formation", "velocity-sync")
+    }
+    assert shown["velocity-sync"]["plan"] is None
+    assert shown["platoon"]["plan"] == {"velocity": [3.0, 0.0], "region": [], "radius": [0.4] * 5}
+    (spacing, place, _) = shown["platoon"]["quantities"]
+    assert spacing["between"] == [None, [1, 2], [2, 3], [3, 4], [4, 5]]
+    assert place["between"] == []
+    plan = shown["formation"]["plan"]
+    assert plan["velocity"] == [1.0, 0.5]
+    assert plan["radius"] == [None] * 5
+    corners = load_scenario("formation").systems["robots"].game.region.vertices
+    assert np.allclose(sorted(plan["region"]), sorted(map(list, corners)))
+    links = shown["formation"]["quantities"][0]["between"]
+    assert links[:4] == [[1, 2], [1, 3], [2, 4], [3, 5]]
+    assert set(map(str, links[4:])) == {"None"}
+
+
+def test_ways_are_drawn_from_what_a_trajectory_keeps(tmp_path):
+    run = gm.run("formation", {"simulation.duration": 0.2})
+    run.save(tmp_path / "run.zarr")
+    kept = gm.Trajectory.load(tmp_path / "run.zarr")
+    figure = plots.draw(kept)["robots-plane"]
+    (axes,) = figure.axes
+    position = run["robots"]["position"].values.reshape(-1, 5, 2)
+    ways = [line.get_xydata() for line in axes.lines]
+    for agent in range(5):
+        assert any(np.array_equal(way, position[:, agent]) for way in ways)
+    assert "robots-plane" not in plots.draw(gm.run("platoon", {"simulation.duration": 0.1}))
+    assert "robots-plane" not in plots.draw(gm.run("planar-sync", {"simulation.duration": 0.1}))

@@ -168,6 +168,26 @@ def test_keys_and_buttons_drive_a_replay(page, recorded, served):
     quiet(recorded, *origins(served))
 
 
+def test_outputs_region_and_distances_lie_on_the_ground(page, recorded):
+    trajectory = gne_mj.run("formation", {"simulation.duration": 2.0})
+    data, server = trajectory["robots"], serve(trajectory)
+    try:
+        opened(page, server.url)
+        for sample in (0, 10, -1):
+            time = float(data["time"][sample])
+            seek(page, time)
+            plan = page.evaluate("window.gne.plan('robots')")
+            moved = time * np.array([1.0, 0.5])
+            outputs = data["action"][sample].values.reshape(5, 2) + moved
+            assert np.allclose(plan["outputs"], outputs, atol=1e-5)
+            assert np.allclose(plan["region"], moved)
+            assert len(plan["strips"]) == 4
+        assert plan["discs"] == [None] * 5
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
+
+
 def test_a_file_opens_from_disk_without_any_network(page, recorded, paper, tmp_path):
     path = write_html(paper, tmp_path / "run.html", "from disk")
     page.context.set_offline(True)

@@ -159,7 +159,7 @@ def _quantities(
     """
     share = Quantity(
         name="region_share", long_name="share of the region", unit="",
-        values=partial(_region_shares, region), each="agent", bound=1.0,
+        values=partial(_region_shares, region), each="agent", bound=1.0, outline=region.outline,
     )  # fmt: skip
     if not links:
         return (share,)
@@ -168,6 +168,7 @@ def _quantities(
         name="link_length", long_name="link length", unit="m",
         values=partial(_link_lengths, _ends(links).T, nothing), each="constraint",
         symbol="|y_i - y_j|", bound=np.concatenate([length, nothing]),
+        between=np.concatenate([_ends(links), np.full((others, 2), -1)]),
     )  # fmt: skip
     return lengths, share
 

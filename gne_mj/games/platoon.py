@@ -169,6 +169,7 @@ def _quantities(lower: Array, upper: Array) -> tuple[Quantity, ...]:
         ),
         each="agent", symbol="y_{i-1} - y_i", bound=followers(upper),
         lower_bound=followers(lower),
+        between=[(-1, -1), *((i, i + 1) for i in range(len(lower) - 1))],
     )  # fmt: skip
     return spacing, place
 

@@ -15,6 +15,7 @@ from gne_mj.toml_table import Table, Unit
 Array = NDArray[np.float64]
 
 _SIDES = 64  # of a polygon within the disc, which stands for it where a point inside is looked for
+_ARC = 128  # corners that stand for the disc where it is drawn
 _THINNEST = 1e-6  # of a region, as a share of its length
 _FARTHEST = 1e100  # m, so that squares are numbers
 _STEPS = 100  # towards the least barrier; some 10 are taken
@@ -61,6 +62,18 @@ class Region:
         """How far the boundary is from the middle, at least, in m; 0 if nothing is inside."""
         return self._middle[1]
 
+    @property
+    def outline(self) -> Array:
+        """(K, 2) its corners in order round it, in m; an arc of the disc has many."""
+        (left, low), (right, high) = self.box
+        points = np.array([[left, low], [right, low], [right, high], [left, high]])
+        if self.disc:
+            angle = 2.0 * np.pi * np.arange(_ARC) / _ARC
+            points = self.center + self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        for normal, offset in zip(self.normals, self.offsets, strict=True):
+            points = _cut(points, points @ normal - offset)
+        return points
+
     def share(self, points: Array) -> Array:
         """How much of the way to the boundary points (..., 2) have gone: 1 on it, more outside.
 
@@ -88,6 +101,18 @@ class Region:
         y = _least_barrier(self.normals, offsets, center, radius, y)
         room = np.append(offsets - self.normals @ y, radius - np.linalg.norm(y - center))
         return about + size * y, size * float(np.min(room))
+
+
+def _cut(points: Array, beyond: Array) -> Array:
+    """The part of a polygon that is not beyond a line, by how far its corners (K,) are."""
+    kept = []
+    for k, (point, far) in enumerate(zip(points, beyond, strict=True)):
+        before, far_before = points[k - 1], beyond[k - 1]
+        if (far > 0.0) != (far_before > 0.0):
+            kept.append(before + far_before / (far_before - far) * (point - before))
+        if not far > 0.0:
+            kept.append(point)
+    return np.array(kept).reshape(-1, 2)
 
 
 def _inner_point(normals: Array, offsets: Array, center: Array, radius: float) -> Array | None:

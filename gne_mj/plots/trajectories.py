@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.files import refuse_existing, written
+from gne_mj.plots.plane import plane
 from gne_mj.plots.style import LEGEND, axis_label, line_style, styled, subplots
 from gne_mj.progress import Tell, nothing
 from gne_mj.run_metrics import SUCCESSES
@@ -22,12 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+ROOM = 0.04  # of a panel's height, beyond bounds
+
+
 def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
     """All figures of a trajectory's systems, by name.
 
     For each system its actions, one panel for each of their axes, as ``robots-velocities``, and
     each other variable that figures draw (:class:`gne_mj.variables.Variable`), with its bounds, as
-    ``robots-gaps`` or, where it is one number, ``channels-total-power``.
+    ``robots-gaps`` or, where it is one number, ``channels-total-power``. Of positions in the plane
+    ``robots-plane`` has the ways from above (:mod:`gne_mj.plots.plane`).
     """
     figures = {}
     with styled():
@@ -39,6 +44,9 @@ def draw(trajectory: Trajectory) -> dict[str, "Figure"]:
             for drawn, title in titles.items():
                 words = title if data[drawn].ndim == 1 else _plural(title)
                 figures[f"{name}-{words}"] = _drawn(data, drawn)
+            from_above = plane(data)
+            if from_above is not None:
+                figures[f"{name}-plane"] = from_above
     return figures
 
 
@@ -158,3 +166,7 @@ def _bounds(axes: "Axes", bounds: NDArray[np.float64], label: str | None) -> Non
         colour = line_style(int(number))["color"] if own else "black"
         axes.axhline(value, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), label=label)
         label = None
+    low, high = axes.get_ylim()
+    room, drawn = ROOM * (high - low), values[np.isfinite(values)]
+    if len(drawn):  # a bound on the edge of a panel is hard to see
+        axes.set_ylim(min(low, np.min(drawn) - room), max(high, np.max(drawn) + room))

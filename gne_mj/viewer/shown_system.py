@@ -1,5 +1,6 @@
 """What a page shows of one system: words about it once, arrays of numbers from what is recorded."""
 
+import json
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from gne_mj.faults import for_native
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
+from gne_mj.plants.agent_type import followed_position
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, mode_of
@@ -56,6 +58,7 @@ class ShownSystem:
                 "axis": list(game.axis_of_action) if max(game.sizes) > 1 else [""] * game.actions,
             },
             "quantities": [_about(system, line) for line in self._shown("line")[1:]],
+            "plan": None if self.fleet is None else plan_of(system),
             "edges": self._edges,
             "edges_are": "measurements" if system.law.graph is None else "messages",
             "links": self._links,
@@ -142,6 +145,37 @@ class ShownSystem:
         return (np.column_stack([hearer, graph.data.neighbour]) + 1).tolist()
 
 
+def plan_of(system: SystemData) -> dict[str, Any] | None:
+    """What the page draws on the ground of agents whose positions follow their outputs.
+
+    How fast what positions are relative to moves, in m/s, the corners of a region, in m, pairs of
+    agents, from 1, with a least distance in m; None of others.
+    """
+    kind, game = system.agents.kind, system.game
+    if followed_position(kind) < 0 or not 1 <= system.agents.dimension <= 2:
+        return None
+    velocity = system.agents.parameters[: system.agents.dimension]
+    at = kind.PARAMETERS.index("reference_velocity")
+    return {
+        "velocity": [*velocity[:, at].tolist(), 0.0][:2],
+        "region": next((each.corners for each in game.quantities if each.corners), []),
+        "radius": _radii(system),
+    }
+
+
+def _radii(system: SystemData) -> list[float | None]:
+    """Of discs around the agents, of which no two meet while least distances are kept, in m."""
+    game, apart = system.game, system.separation
+    found = np.full(game.agents, np.inf if apart is None else 0.5 * apart.distance)
+    for quantity in game.quantities:
+        bounds = quantity.bounds(game.entries(quantity)) if quantity.pairs else {}
+        least = bounds.get(f"{quantity.name}_lower_bound", np.zeros(0))
+        for pair, distance in zip(quantity.pairs, least.reshape(-1), strict=False):
+            if pair[0] >= 0 and distance > 0.0:
+                found[pair] = np.minimum(found[pair], 0.5 * distance)
+    return [float(radius) if np.isfinite(radius) else None for radius in found]
+
+
 def shares(game: Game, values: Values) -> NDArray[np.float64]:
     """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
 
@@ -206,6 +240,8 @@ def _about(system: SystemData, line: Variable) -> dict[str, Any]:
         "unit": attributes.get("units", ""),
         "labels": labels[line.dims(system)[1]] if len(line.dimensions) > 1 else [""],
     }
+    pairs = json.loads(attributes.get("between", "[]"))
+    about["between"] = [[i + 1, j + 1] if i >= 0 else None for i, j in pairs]
     for key in ("bound", "lower_bound"):
         given = bounds.get(f"{line.name}_{key}")
         about[key] = None

@@ -2,7 +2,7 @@
 import { css } from "./colours.js";
 import { theme } from "./theme.js";
 /** @import { Page } from "./page.js" */
-/** @import { Scene, Source } from "./types.d.ts" */
+/** @import { Scene, Source, Three } from "./types.d.ts" */
 
 /** @param {Page} page */
 export const handleOf = (page) => ({
@@ -21,6 +21,8 @@ export const handleOf = (page) => ({
   position: (/** @type {string} */ path) => page.scene.position(path),
   /** CSS colour of an agent (from 0) as it is drawn. */
   tint: (/** @type {number} */ agent, /** @type {string} */ system) => tintOf(page, agent, system),
+  /** What lies on the ground under a system's robots: outputs, the region's middle, strips. */
+  plan: (/** @type {string} */ system) => planOf(page, system),
   /** What is plotted. */
   get plots() {
     return page.plots.describe();
@@ -43,6 +45,22 @@ const tintOf = ({ scene }, agent, name) => {
     ? bars.bars[bars.system.action.owner.indexOf(agent + 1)]
     : scene.tinted.get(name)?.[agent]?.[0];
   return drawn ? css(drawn.material.color.toArray()) : null;
+};
+
+/**
+ * @param {Page} page
+ * @param {string} name of the system
+ */
+const planOf = ({ scene }, name) => {
+  const plan = scene.plans.find(({ system }) => system.name === name);
+  if (!plan) return null;
+  const place = (/** @type {Three} */ object) => object.position.toArray().slice(0, 2);
+  return {
+    outputs: plan.marks.map(place),
+    region: plan.region && place(plan.region.edge),
+    strips: plan.distances.map(({ strip }) => css(strip.material.color.toArray())),
+    discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius),
+  };
 };
 
 /** @param {Page} page */

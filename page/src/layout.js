@@ -2,6 +2,7 @@
 import { THREE } from "./meshcat.js";
 import { toView } from "./viewer.js";
 /** @import { Bars } from "./bars.js" */
+/** @import { Plan } from "./plan.js" */
 /** @import { Instant, Numbers, Point, System } from "./types.d.ts" */
 
 export class Layout {
@@ -10,6 +11,9 @@ export class Layout {
     this.fleets = [];
     /** @type {Bars[]} */
     this.bars = [];
+    /** @type {Plan[]} */
+    this.plans = [];
+    this.time = 0; // s
     this.floor = 0; // the lowest point of what is drawn
     this.known = false; // whether there was an instant of the scene
     this.spill = 0; // how far bodies have swung out of the box, m
@@ -24,10 +28,12 @@ export class Layout {
    * Another scene.
    * @param {System[]} fleets
    * @param {Bars[]} bars
+   * @param {Plan[]} plans
    */
-  begin(fleets, bars) {
+  begin(fleets, bars, plans) {
     this.fleets = fleets;
     this.bars = bars;
+    this.plans = plans;
     this.known = false;
     this.spill = 0;
     this.box = null;
@@ -37,6 +43,7 @@ export class Layout {
   update(instant) {
     this.poses = instant.poses ?? new Float64Array(0);
     this.known = true;
+    this.time = instant.time;
     this.box = this.boxOf();
     if (this.box) this.noteSpill(this.box, instant.time);
   }
@@ -126,6 +133,7 @@ export class Layout {
         for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
           points.push([x, y, this.floor]);
     }
+    for (const plan of this.plans) points.push(...plan.corners(this.time, this.floor));
     for (const bars of this.bars) points.push(...bars.corners());
     return points.length ? points.map(toView) : [new THREE.Vector3()];
   }

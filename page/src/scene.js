@@ -7,8 +7,10 @@ import { Ghosts } from "./ghosts.js";
 import { Ground } from "./ground.js";
 import { Layout } from "./layout.js";
 import { THREE } from "./meshcat.js";
+import { plansOf } from "./plan.js";
 import { colour, theme } from "./theme.js";
 import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
+/** @import { Plan } from "./plan.js" */
 /** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
@@ -24,6 +26,8 @@ export class Scene {
     this.ghosts = new Ghosts(this);
     /** @type {Bars[]} */
     this.bars = [];
+    /** @type {Plan[]} */
+    this.plans = [];
     /** @type {Three[]} */
     this.objects = []; // what has a pose
     /** @type {Map<string, Three[][]>} */
@@ -53,7 +57,7 @@ export class Scene {
   restyle() {
     this.ground.uniforms.colour.value.set(colour("grid"));
     this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
-    for (const bars of this.bars) bars.restyle();
+    for (const each of [...this.bars, ...this.plans]) each.restyle();
     this.dimStatics();
     this.ghosts.forget();
     this.dirty();
@@ -75,10 +79,11 @@ export class Scene {
   /** Forgets a scene, as another one comes. */
   clear() {
     empty(this.viewer);
-    for (const bars of this.bars) bars.remove();
+    for (const each of [...this.bars, ...this.plans]) each.remove();
     this.ghosts.show(null);
     this.batches.clear();
     this.bars = [];
+    this.plans = [];
     this.meta = null;
     this.instant = null;
     this.stale = true;
@@ -88,13 +93,14 @@ export class Scene {
   setMeta(meta) {
     this.meta = meta;
     this.fleets = meta.systems.filter((system) => system.drawn_as === "fleet");
-    for (const bars of this.bars) bars.remove();
+    for (const each of [...this.bars, ...this.plans]) each.remove();
+    this.plans = plansOf(this.viewer.scene, this.fleets);
     this.bars = meta.systems
       .filter((system) => system.drawn_as === "bars")
       .map((system) => new Bars(this.viewer.scene, system));
     this.instant = null;
     this.ghosts.show(null);
-    this.layout.begin(this.fleets, this.bars);
+    this.layout.begin(this.fleets, this.bars, this.plans);
     this.camera.placed = false;
     this.floorKnown = false;
     this.stale = true;
@@ -176,6 +182,7 @@ export class Scene {
     this.applyTints(instant);
     this.findFloor();
     this.layout.update(instant);
+    for (const plan of this.plans) plan.update(instant, this.layout);
     this.placeBars(instant, store);
     this.batches.update();
     this.ghosts.apply(instant);

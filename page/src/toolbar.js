@@ -70,6 +70,10 @@ export class Toolbar {
     if (words.has("measurements")) parts.push("dashed lines: measured directly");
     if (linked.some((system) => system.links.length && system.message_period !== null))
       parts.push("✕ lost");
+    const planned = this.systems.filter(({ plan }) => plan);
+    if (planned.length) parts.push("rings: outputs, where robots head");
+    if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
+      parts.push("strips: bounded distances");
     const note = byId("link-note");
     note.textContent = parts.join(" · ");
     note.hidden = parts.length === 0;

@@ -19,6 +19,14 @@ export interface Quantity {
   labels: string[];
   bound: (number | null)[] | null;
   lower_bound: (number | null)[] | null;
+  between: ([number, number] | null)[]; // agents, from 1, of each entry that is a distance
+}
+
+/** What lies on the ground under robots whose positions are decided. */
+export interface Plan {
+  velocity: number[]; // m/s, of what positions are relative to
+  region: [number, number][]; // corners, m
+  radius: (number | null)[]; // m, of each agent's disc
 }
 
 export interface System {
@@ -39,6 +47,7 @@ export interface System {
   estimates: boolean;
   anchors: number[]; // the item at which each robot is
   height: number; // m
+  plan: Plan | null;
   tints: string[][]; // paths of what has each agent's colour
 }
 

@@ -98,6 +98,12 @@ def disturbed() -> None:
     figure.savefig(FOLDER / "disturbed-gaps.png", dpi=160)
 
 
+def formation() -> None:
+    """The shipped formation from above."""
+    figure = plots.draw(run("formation"))["robots-plane"]
+    figure.savefig(FOLDER / "formation.png", dpi=160)
+
+
 def _finish(figure: plt.Figure, axes: plt.Axes, name: str, title: str | None) -> None:
     axes.grid(which="major", alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
@@ -109,3 +115,4 @@ if __name__ == "__main__":
     penalties()
     losses()
     disturbed()
+    formation()

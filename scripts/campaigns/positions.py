@@ -162,7 +162,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
     margins = tuple(float(log_uniform(rng, CLOSEST, 0.5)) for _ in range(2))
     state = start(rng, place, agents, margins)
     rho, continuous = float(log_uniform(rng, 3e-3, 1.0)), mode == "continuous"
-    h, steps = step(rng, agents), int(rng.integers(200, 1200))
+    h, steps = step(rng, agents), int(rng.integers(100, 400 if continuous else 1200))
     if continuous:  # whose pieces of steps have an end, and the barrier is stiff near a bound
         nearest = float(np.min(-place.values(state[None, :, position_robot.OUTPUT])))
         h = min(h, max(stiff_step(agents, rho, nearest), SHORTEST))

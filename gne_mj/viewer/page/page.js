@@ -102,6 +102,8 @@
     position: (path) => page.scene.position(path),
     /** CSS colour of an agent (from 0) as it is drawn. */
     tint: (agent, system) => tintOf(page, agent, system),
+    /** What lies on the ground under a system's robots: outputs, the region's middle, strips. */
+    plan: (system) => planOf(page, system),
     /** What is plotted. */
     get plots() {
       return page.plots.describe();
@@ -116,6 +118,17 @@
     const bars2 = scene.bars.find(({ system }) => system.name === name);
     const drawn = bars2 ? bars2.bars[bars2.system.action.owner.indexOf(agent + 1)] : scene.tinted.get(name)?.[agent]?.[0];
     return drawn ? css(drawn.material.color.toArray()) : null;
+  };
+  var planOf = ({ scene }, name) => {
+    const plan = scene.plans.find(({ system }) => system.name === name);
+    if (!plan) return null;
+    const place = (object) => object.position.toArray().slice(0, 2);
+    return {
+      outputs: plan.marks.map(place),
+      region: plan.region && place(plan.region.edge),
+      strips: plan.distances.map(({ strip }) => css(strip.material.color.toArray())),
+      discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius)
+    };
   };
   var stateOf = ({ meta, mode: mode2, live, overlay, playback, scene, source, tuning }) => ({
     mode: mode2,
@@ -940,8 +953,8 @@
       const name = String(agent + 1);
       const out = share > 1;
       const digits = out && share < 1.1 ? 1 : 0;
-      const used = out ? "outside" : "";
-      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
+      const used2 = out ? "outside" : "";
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
       for (const text of percent ? [percent, ""] : [""]) {
         const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
         if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
@@ -6926,6 +6939,8 @@
     constructor() {
       this.fleets = [];
       this.bars = [];
+      this.plans = [];
+      this.time = 0;
       this.floor = 0;
       this.known = false;
       this.spill = 0;
@@ -6937,10 +6952,12 @@
      * Another scene.
      * @param {System[]} fleets
      * @param {Bars[]} bars
+     * @param {Plan[]} plans
      */
-    begin(fleets, bars2) {
+    begin(fleets, bars2, plans) {
       this.fleets = fleets;
       this.bars = bars2;
+      this.plans = plans;
       this.known = false;
       this.spill = 0;
       this.box = null;
@@ -6949,6 +6966,7 @@
     update(instant) {
       this.poses = instant.poses ?? new Float64Array(0);
       this.known = true;
+      this.time = instant.time;
       this.box = this.boxOf();
       if (this.box) this.noteSpill(this.box, instant.time);
     }
@@ -7032,6 +7050,7 @@
           for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
             points2.push([x, y, this.floor]);
       }
+      for (const plan of this.plans) points2.push(...plan.corners(this.time, this.floor));
       for (const bars2 of this.bars) points2.push(...bars2.corners());
       return points2.length ? points2.map(toView) : [new THREE.Vector3()];
     }
@@ -7050,6 +7069,163 @@
     }
   };
 
+  // src/plan.js
+  var STRIP = new THREE.PlaneGeometry(1, 1);
+  var AROUND = 48;
+  var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND);
+  var WIDTH3 = 0.05;
+  var LEAD = 0.02;
+  var RIM = 0.025;
+  var STEP = 4e-3;
+  var used = (value, high, low) => {
+    const middle = typeof high === "number" && typeof low === "number" ? (high + low) / 2 : 0;
+    const up = typeof high === "number" ? (value - middle) / (high - middle) : -Infinity;
+    const down = typeof low === "number" ? (value - middle) / (low - middle) : -Infinity;
+    return Math.max(up, down);
+  };
+  var Plan = class {
+    /**
+     * @param {Three} parent
+     * @param {System} system
+     * @param {Meta} plan
+     */
+    constructor(parent, system, plan) {
+      this.system = system;
+      this.plan = plan;
+      this.group = new THREE.Group();
+      parent.add(this.group);
+      this.region = plan.region.length ? this.addRegion() : null;
+      this.distances = system.quantities.flatMap((quantity) => this.addDistances(quantity));
+      this.discs = plan.radius.map((radius) => radius === null ? null : this.addDisc(radius));
+      this.leads = plan.radius.map(() => this.add(STRIP, 0.6));
+      this.marks = plan.radius.map(() => this.add(MARK));
+      this.restyle();
+    }
+    /**
+     * @param {Three} geometry
+     * @param {number} opacity
+     */
+    add(geometry, opacity = 1) {
+      const material = new THREE.MeshBasicMaterial({
+        transparent: true,
+        opacity,
+        depthWrite: false,
+        side: THREE.DoubleSide
+      });
+      const mesh2 = new THREE.Mesh(geometry, material);
+      this.group.add(mesh2);
+      return mesh2;
+    }
+    addRegion() {
+      const corners = this.plan.region.map(([x, y]) => new THREE.Vector2(x, y));
+      const fill = this.add(new THREE.ShapeGeometry(new THREE.Shape(corners)), 0.1);
+      const edge = new THREE.LineLoop(
+        new THREE.BufferGeometry().setFromPoints(corners.map(({ x, y }) => new THREE.Vector3(x, y))),
+        new THREE.LineBasicMaterial()
+      );
+      this.group.add(edge);
+      return { fill, edge };
+    }
+    /**
+     * A strip for each entry that has a greatest value.
+     * @param {Quantity} quantity
+     */
+    addDistances(quantity) {
+      return quantity.between.flatMap(
+        (pair, entry) => pair && typeof quantity.bound?.[entry] === "number" ? [{ quantity, entry, pair, strip: this.add(STRIP, 0.9) }] : []
+      );
+    }
+    /** @param {number} radius */
+    addDisc(radius) {
+      return this.add(new THREE.RingGeometry(Math.max(radius - RIM, 0), radius, AROUND), 0.8);
+    }
+    restyle() {
+      this.region?.fill.material.color.set(colour("limit"));
+      this.region?.edge.material.color.set(colour("limit"));
+      for (const disc of this.discs) disc?.material.color.set(colour("muted"));
+      for (const mesh2 of [...this.leads, ...this.marks]) mesh2.material.color.set(colour("accent"));
+    }
+    remove() {
+      this.group.parent?.remove(this.group);
+    }
+    /**
+     * Where what positions are relative to is.
+     * @param {number} time s
+     */
+    origin(time) {
+      return this.plan.velocity.map((v) => v * time);
+    }
+    /** Corners of the region, if it is of the size of a fleet, for the camera. */
+    corners(time, floor2) {
+      const [x, y] = this.origin(time);
+      return this.plan.region.map(([a, b]) => (
+        /** @type {Point} */
+        [x + a, y + b, floor2]
+      ));
+    }
+    /**
+     * @param {Instant} instant
+     * @param {Layout} layout
+     */
+    update(instant, layout) {
+      const own = instant.systems[this.system.name];
+      const [x, y] = this.origin(instant.time);
+      const level = layout.floor + STEP;
+      if (this.region)
+        for (const part of [this.region.fill, this.region.edge]) part.position.set(x, y, level);
+      for (const distance of this.distances) this.placeDistance(distance, own, layout);
+      for (let agent = 0; agent < this.system.agents; agent++) {
+        const [px, py] = layout.agentAt(this.system, agent);
+        this.discs[agent]?.position.set(px, py, level + STEP);
+        this.placeOutput(agent, [px, py], own.action, instant.time, level);
+      }
+    }
+    /**
+     * @param {Plan["distances"][number]} distance
+     * @param {Record<string, Numbers | undefined>} own arrays of the system
+     * @param {Layout} layout
+     */
+    placeDistance({ quantity, entry, pair: [a, b], strip }, own, layout) {
+      const value = own[`quantity/${quantity.name}`]?.[entry] ?? NaN;
+      const share = used(value, quantity.bound?.[entry], quantity.lower_bound?.[entry]);
+      strip.material.color.setRGB(...ramp(share));
+      const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
+      this.stretch(strip, ends[0], ends[1], WIDTH3, layout.floor + 2 * STEP);
+    }
+    /**
+     * The mark at an agent's output, and the line that leads to it.
+     * @param {number} agent
+     * @param {number[]} from where it is
+     * @param {Numbers | undefined} action
+     * @param {number} time s
+     * @param {number} level m
+     */
+    placeOutput(agent, from, action, time, level) {
+      const { owner } = this.system.action;
+      const to = this.origin(time);
+      if (to.length < 2 || !action) return;
+      const axes = owner.flatMap((each, k) => each === agent + 1 ? [k] : []);
+      axes.forEach((k, axis) => to[axis] += action[k]);
+      if (axes.length === 1) to[1] = from[1];
+      this.marks[agent].position.set(to[0], to[1], level + 3 * STEP);
+      this.stretch(this.leads[agent], from, to, LEAD, level + 2 * STEP);
+    }
+    /**
+     * @param {Three} strip
+     * @param {ArrayLike<number>} from
+     * @param {ArrayLike<number>} to
+     * @param {number} width
+     * @param {number} level
+     */
+    stretch(strip, from, to, width, level) {
+      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+      strip.position.set((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, level);
+      strip.rotation.z = Math.atan2(dy, dx);
+      strip.scale.set(Math.max(Math.hypot(dx, dy), 1e-6), width, 1);
+    }
+  };
+  var plansOf = (parent, systems) => systems.flatMap((system) => system.plan ? [new Plan(parent, system, system.plan)] : []);
+
   // src/scene.js
   var AGAIN2 = 500;
   var Scene = class {
@@ -7062,6 +7238,7 @@
       this.batches = new Batches(this.viewer.scene);
       this.ghosts = new Ghosts(this);
       this.bars = [];
+      this.plans = [];
       this.objects = [];
       this.tinted = /* @__PURE__ */ new Map();
       this.statics = [];
@@ -7083,7 +7260,7 @@
     restyle() {
       this.ground.uniforms.colour.value.set(colour("grid"));
       this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
-      for (const bars2 of this.bars) bars2.restyle();
+      for (const each of [...this.bars, ...this.plans]) each.restyle();
       this.dimStatics();
       this.ghosts.forget();
       this.dirty();
@@ -7102,10 +7279,11 @@
     /** Forgets a scene, as another one comes. */
     clear() {
       empty(this.viewer);
-      for (const bars2 of this.bars) bars2.remove();
+      for (const each of [...this.bars, ...this.plans]) each.remove();
       this.ghosts.show(null);
       this.batches.clear();
       this.bars = [];
+      this.plans = [];
       this.meta = null;
       this.instant = null;
       this.stale = true;
@@ -7114,11 +7292,12 @@
     setMeta(meta) {
       this.meta = meta;
       this.fleets = meta.systems.filter((system) => system.drawn_as === "fleet");
-      for (const bars2 of this.bars) bars2.remove();
+      for (const each of [...this.bars, ...this.plans]) each.remove();
+      this.plans = plansOf(this.viewer.scene, this.fleets);
       this.bars = meta.systems.filter((system) => system.drawn_as === "bars").map((system) => new Bars(this.viewer.scene, system));
       this.instant = null;
       this.ghosts.show(null);
-      this.layout.begin(this.fleets, this.bars);
+      this.layout.begin(this.fleets, this.bars, this.plans);
       this.camera.placed = false;
       this.floorKnown = false;
       this.stale = true;
@@ -7191,6 +7370,7 @@
       this.applyTints(instant);
       this.findFloor();
       this.layout.update(instant);
+      for (const plan of this.plans) plan.update(instant, this.layout);
       this.placeBars(instant, store);
       this.batches.update();
       this.ghosts.apply(instant);
@@ -7317,6 +7497,10 @@
       if (words.has("measurements")) parts.push("dashed lines: measured directly");
       if (linked.some((system) => system.links.length && system.message_period !== null))
         parts.push("✕ lost");
+      const planned = this.systems.filter(({ plan }) => plan);
+      if (planned.length) parts.push("rings: outputs, where robots head");
+      if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
+        parts.push("strips: bounded distances");
       const note = byId("link-note");
       note.textContent = parts.join(" · ");
       note.hidden = parts.length === 0;
