@@ -159,12 +159,12 @@ def follow(system: SystemData) -> bool:
     return followed_position(system.agents.kind) >= 0
 
 
-def collide(system: System) -> bool:
+def collide(system: SystemData) -> bool:
     """Whether bodies of different agents collide."""
     return system.agents.contacts
 
 
-def apart(system: System) -> bool:
+def apart(system: SystemData) -> bool:
     """Whether agents keep apart."""
     return system.separation is not None
 

@@ -328,7 +328,7 @@ def test_the_page_is_told_of_plans():
     assert plan["velocity"] == [1.0, 0.5]
     assert plan["radius"] == [None] * 5
     corners = load_scenario("formation").systems["robots"].game.region.vertices
-    assert np.allclose(sorted(plan["region"]), sorted(map(list, corners)))
+    assert {tuple(np.round(each, 9) + 0.0) for each in plan["region"]} == set(map(tuple, corners))
     links = shown["formation"]["quantities"][0]["between"]
     assert links[:4] == [[1, 2], [1, 3], [2, 4], [3, 5]]
     assert set(map(str, links[4:])) == {"None"}
