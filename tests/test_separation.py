@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from batch_plans import all_chunks
-from builders import relative_error, run_loop
+from builders import clock, relative_error, run_loop
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_loops import parts_of
 from separation_reference import Swap, half_plane, nearest_point
 
 import gne_mj as gm
@@ -163,6 +164,55 @@ def test_pairs_that_are_not_near_cannot_come_too_near_within_a_period(seed):
             if (i, j) not in known:
                 way = nearest_point(q[i] - q[j], ahead[i] - ahead[j])
                 assert np.linalg.norm(way) >= 0.5 * (R + REACH)
+
+
+@given(seed=seeds)
+@settings(max_examples=20, deadline=None)
+def test_rows_of_the_equation_are_the_slopes_of_its_differences(seed):
+    """Of pairs in the barrier, in whatever order the matrix has its rows."""
+    rng, h = np.random.default_rng(seed), 1e-7
+    parts = parts_of(system_of(), clock(0.01))
+    scratch, solver = parts.loop.work, parts.solver
+    near = native.neighbours_in(scratch.separation, parts.problem)
+    q = cloud(rng, 8)
+    near.place[:], near.output[:] = q, q + rng.normal(0, 0.005, 16)
+    cells.find(near, near.place, near.output, REACH, 0.0)
+    assert native.renew(RULE, near, 0, parts.monitor, 0.0)
+    solver.base[:], solver.stiff[:], solver.numbers.rho = q, rng.uniform(50, 200, 16), 0.05
+    at, order = np.zeros(16, dtype=np.int64), parts.problem.order
+    apart.put_in_line(near, at, True)
+    b = int(apart.half_band(parts.problem, near, at))
+    ordered = parts.problem._replace(order=order._replace(position=at, band=np.array([b, 0])))
+    kept = apart.Kept(np.zeros(0), near, RULE)
+
+    def residual(trial):
+        solver.trial[:] = trial
+        assert apart.residual(ordered, 0, 8, kept, scratch, solver)
+        return solver.residual.copy()
+
+    y, m = near.output.copy(), 16
+    steps = h * np.eye(m)
+    expected = np.array([(residual(y + s) - residual(y - s)) / (2 * h) for s in steps]).T
+    residual(y)
+    apart.assemble(ordered, 0, 8, b, kept, scratch, solver)
+    found = np.zeros((m, m))
+    for r in range(m):
+        for c in range(m):
+            if abs(at[r] - at[c]) <= b:
+                found[r, c] = solver.band[at[r], at[c] - at[r] + b]
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5 * np.max(np.abs(expected)))
+    step = rng.normal(0, 1e-3, m)
+    length = apart.local_length(ordered, 0, 8, kept, step[np.argsort(at)], solver)
+    moved = step.reshape(-1, 2)
+    used = [
+        abs(n @ (moved[int(i)] - moved[int(j)])) / s
+        for i, j, n, s in zip(
+            near.first, near.second, np.column_stack([near.along, near.across]), near.slack,
+            strict=True,
+        )
+        if s > 0 and (i, j) != (0, 0)
+    ]  # fmt: skip
+    assert length >= max(used, default=0.0) * (1 - 1e-12)
 
 
 @given(seed=seeds)
@@ -390,20 +440,20 @@ def test_a_start_too_near_names_the_agents():
 
 def test_certificates_promise_safety_and_no_arrival():
     scenario = swap()
-    clock = scenario.clock()
-    found = certify(scenario.system_objects()[0], clock)
+    ticks = scenario.clock()
+    found = certify(scenario.system_objects()[0], ticks)
     kept = "the positions of any two agents are at least 0.6 m apart"
     assert any(kept in text and "every integration step" in text for text in found.guaranteed)
     assert any("that agents arrive" in text for text in found.not_certified)
     assert not found.lyapunov_claimed
     assert "separation" in str(found)
-    found = certify(system_of(**MODES["continuous"]), clock)
+    found = certify(system_of(**MODES["continuous"]), ticks)
     assert f"{kept} in continuous time" in found.guaranteed
     assert not found.lyapunov_claimed
     assert not any("tends to" in text for text in found.guaranteed)
     for changes in ({"agents__local_damping": 0.1, **MODES["continuous"]}, MODES["euler"],
                     {"plant__integrator": "rk4"}, {"agents__input_limit": 1.0}):  # fmt: skip
-        found = certify(system_of(**changes), clock)
+        found = certify(system_of(**changes), ticks)
         assert not found.separation["promised"]
         assert not any(kept in text for text in found.guaranteed)
         assert any("that agents keep 0.6 m apart" in text for text in found.not_certified)
@@ -447,7 +497,7 @@ def figures(name):
     }
 
 
-@pytest.mark.parametrize("name", ["swap"])
+@pytest.mark.parametrize("name", ["swap", "herd"])
 def test_shipped_scenarios(name):
     report, found = figures(name)
     for key, value in json.loads(GOLDEN.read_text())[name].items():

@@ -314,7 +314,7 @@ def map_(
     )
     results = Results(out)
     with stopping() as stop:
-        with telling(PREPARING, quiet=as_json) as tell:
+        with telling(PREPARING, quiet=as_json) as tell, loaded.naming(name):
             built = loaded.systems[name].build(name, loaded.simulation)
             cells = mapping.exit_map(
                 built, loaded.simulation.timestep, grid, tell, stopped=stop.is_set

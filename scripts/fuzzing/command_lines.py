@@ -23,7 +23,7 @@ NUMBERS = (
 )  # fmt: skip
 NAMES = (
     "velocity-sync", "osnr", "paper", "cournot", "planar-sync", "disturbed", "platoon",
-    "formation", "swap", "nothing", "",
+    "formation", "swap", "herd", "nothing", "",
     "nothing.toml", "/dev/zero", "/", ".toml", "x" * 5000, "é\udcff.toml", "a\nb", "-", "~",
     "PATH", "folder.toml", "pipe.toml", "zero.toml", "velocity-sync.toml", "OUT",
 )  # fmt: skip
