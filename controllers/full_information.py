@@ -44,6 +44,18 @@ def action(game, problem, y, weights, memory, work, u):
 
 
 @kernel
+def action_of_all(game, problem, y, weights, memory, work, u):
+    """The same of a game that knows F as a whole, and forms once what all costs share."""
+    data = problem.data
+    at = data.offsets
+    game.pseudo_gradient(data.parameters, y, u)
+    for i in range(len(at) - 1):
+        for a in range(at[i], at[i + 1]):
+            u[a] = -u[a] - weighted_gradient(game, data, i, a, y, weights)
+    return -1
+
+
+@kernel
 def prepare(problem, first, last, y, memory):
     """Nothing to prepare."""
 

@@ -12,7 +12,9 @@ and ``now`` (:mod:`gne_mj.controllers.settings`).
 ``storage(problem, memory)``                            the memory's part of the Lyapunov function
 =====================================================  =======================================
 
-and, for mode implicit, in which u = -barrier_free - gain * (gradient of the barrier),
+Laws whose agents all evaluate their costs at y may have ``action_of_all`` besides, which takes
+games that have ``pseudo_gradient(q, y, out)`` (:mod:`gne_mj.linked_game`) and does the same. And,
+for mode implicit, in which u = -barrier_free - gain * (gradient of the barrier),
 
 ===================================================  =========================================
 ``barrier_free(game, problem, i, a, y, memory)``      entry a of agent i's action, but the barrier

@@ -46,6 +46,15 @@ def weigh(game, q, tightening, rho, y, g, weights):
     return outside
 
 
+@kernel
+def each_gradient(game, q, agents, at, y, out):
+    """Fill these agents' entries of out (m,), which begin at ``at``, with dJ_i/dy_a."""
+    for entry in range(len(agents)):
+        i = agents[entry]
+        for a in range(at[i], at[i + 1]):
+            out[a] = game.cost_gradient(q, i, a, y)
+
+
 def compiled_functions(game: ModuleType) -> NDArray[np.int64]:
     """The addresses of a module's functions, as ``GameData.functions`` has them."""
     return np.array([owner.address for owner in _compiled(game)], dtype=np.int64)
@@ -121,12 +130,22 @@ def _functions_of_many(game: ModuleType, source: str) -> list[Any]:
 
     def gradients(q, size, agents, count, offsets, _columns, y, m, out):
         _ = source
-        which, at = integers_at(agents, count), integers_at(offsets, m + 1)
-        found = floats_at(out, m)
-        for entry in range(count):
-            i = which[entry]
-            for a in range(at[i], at[i + 1]):
-                found[a] = game.cost_gradient(floats_at(q, size), i, a, floats_at(y, m))
+        each_gradient(
+            game, floats_at(q, size), integers_at(agents, count), integers_at(offsets, m + 1),
+            floats_at(y, m), floats_at(out, m),
+        )  # fmt: skip
+        return 0
+
+    def gradients_at_once(q, size, agents, count, offsets, _columns, y, m, out):
+        _ = source
+        at = integers_at(offsets, m + 1)
+        if at[count] == m:  # of all agents
+            game.pseudo_gradient(floats_at(q, size), floats_at(y, m), floats_at(out, m))
+        else:
+            each_gradient(
+                game, floats_at(q, size), integers_at(agents, count), at, floats_at(y, m),
+                floats_at(out, m),
+            )  # fmt: skip
         return 0
 
     def slopes(q, size, constraints, count, rows, columns, y, m, out):
@@ -143,7 +162,7 @@ def _functions_of_many(game: ModuleType, source: str) -> list[Any]:
     return [
         callback(_WEIGHTS, evaluate),
         callback(_OF_MANY, values),
-        callback(_OF_MANY, gradients),
+        callback(_OF_MANY, gradients_at_once if hasattr(game, "pseudo_gradient") else gradients),
         callback(_OF_MANY, slopes),
     ]
 

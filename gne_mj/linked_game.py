@@ -34,6 +34,8 @@ FUNCTIONS = {
     "constraint_gradient": ("q", "l", "a", "y"),
     "constraint_hessian": ("q", "l", "a", "b", "y"),
 }
+# And what games that bring LLVM code have besides
+KNOWN = {**FUNCTIONS, "pseudo_gradient": ("q", "y", "out")}
 NUMBER, WHOLE = ir.DoubleType(), ir.IntType(64)
 _numbers = count()
 
@@ -46,8 +48,8 @@ def symbol(name: str) -> str:
 def declared(module: ir.Module, name: str) -> ir.Function:
     """One of the functions, in a module of LLVM code."""
     kinds = {**dict.fromkeys(("q", "y", "out"), NUMBER.as_pointer()), "scale": NUMBER}
-    result = ir.VoidType() if "out" in FUNCTIONS[name] else NUMBER
-    kind = ir.FunctionType(result, [kinds.get(each, WHOLE) for each in FUNCTIONS[name]])
+    result = ir.VoidType() if "out" in KNOWN[name] else NUMBER
+    kind = ir.FunctionType(result, [kinds.get(each, WHOLE) for each in KNOWN[name]])
     return cgutils.get_or_insert_function(module, kind, symbol(name))
 
 
@@ -62,12 +64,12 @@ def _calling(name: str, given: tuple[types.Type, ...]) -> Any:
             for kind, value in zip(signature.args, arguments, strict=True)
         ]
         found = builder.call(declared(builder.module, name), values)
-        return context.get_dummy_value() if "out" in FUNCTIONS[name] else found
+        return context.get_dummy_value() if "out" in KNOWN[name] else found
 
     kinds = [kind if isinstance(kind, types.Array) else
              types.float64 if each == "scale" else types.int64
-             for each, kind in zip(FUNCTIONS[name], given, strict=True)]  # fmt: skip
-    result = types.none if "out" in FUNCTIONS[name] else types.float64
+             for each, kind in zip(KNOWN[name], given, strict=True)]  # fmt: skip
+    result = types.none if "out" in KNOWN[name] else types.float64
     return result(*kinds), codegen
 
 
@@ -81,6 +83,12 @@ def cost(typingctx: Any, q: Any, i: Any, y: Any) -> Any:
 def cost_gradient(typingctx: Any, q: Any, i: Any, a: Any, y: Any) -> Any:
     """dJ_i/dy_a."""
     return _calling("cost_gradient", (q, i, a, y))
+
+
+@intrinsic
+def pseudo_gradient(typingctx: Any, q: Any, y: Any, out: Any) -> Any:
+    """Fill out (m,) with F(y), what all agents' costs share being formed once."""
+    return _calling("pseudo_gradient", (q, y, out))
 
 
 @intrinsic
@@ -133,7 +141,7 @@ def compiled_for(game: ModuleType, make: Callable[..., list[Any]], *others: Any)
 def _without_game(make: Callable[..., list[Any]], *others: Any) -> list[Any]:
     # Machine code of symbols without a body is never run, but must be able to be loaded
     never = ctypes.cast(ctypes.pythonapi.Py_FatalError, ctypes.c_void_p).value
-    for name in FUNCTIONS:
+    for name in KNOWN:
         llvm.add_symbol(symbol(name), never)
     return make(sys.modules[__name__], *others)
 

@@ -1,5 +1,6 @@
 """Games from expressions against hand-written kernels, differences and refusals."""
 
+import inspect
 import math
 import re
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 from expression_games import PAIRS, energy
 from random_expressions import RandomGame, hyper_dual
 
+import gne_mj as gm
+from gne_mj import game_functions
 from gne_mj.errors import GneError, InvalidInput, UserCodeError
 from gne_mj.expressions import fixed, game
 from gne_mj.expressions.llvm import llvm
@@ -102,13 +105,47 @@ def test_machine_code_of_random_games_computes_what_their_kernels_say(seed):
         kernels.add_cost_hessian(q, i, i, y, 1.0, rows[i])
     _agree(made.pseudo_gradient_jacobian(y), rows)
     _agree(made.costs(y), [kernels.cost(q, i, y) for i in each])
-    _agree(made.pseudo_gradient(y), [kernels.cost_gradient(q, i, i, y) for i in each])
+    gradients = np.zeros(drawn.count)
+    kernels.pseudo_gradient(q, y, gradients)
+    _agree(gradients, [kernels.cost_gradient(q, i, i, y) for i in each])
+    _agree(made.pseudo_gradient(y), gradients)
     _agree(made.constraints(y), [kernels.constraint(q, k, y) for k in each])
     slopes = made.constraint_jacobian(y)
     for k, own in enumerate(made.in_constraint):
         _agree(slopes[k, own], [kernels.constraint_gradient(q, k, a, y) for a in own])
         bends = [[kernels.constraint_hessian(q, k, a, b, y) for b in own] for a in own]
         _agree(made.constraint_hessian(k, y), bends)
+
+
+def test_what_all_costs_share_is_formed_once_for_all():
+    def cost(i, y, p):  # of two kinds
+        others = (y**2).sum()
+        return y[i] * y.mean() * others if i % 3 else p.price * y[i] * others
+
+    made = game(7, cost, lambda y, p: [y <= 9.0], price=2.0)
+    text = inspect.getsource(made.kernels)
+    first = text.index("def pseudo_gradient")
+    before, loop = text[first : text.index("\n\n", first)].split("    for i in range(7):")
+    assert before.count("for k") == 2
+    assert "for k" not in loop
+    y = np.linspace(-1.0, 2.0, 7)
+    mean, others, odd = y.mean(), (y**2).sum(), np.arange(7) % 3 > 0
+    expected = np.where(
+        odd, mean * others + y * others / 7 + 2 * y**2 * mean, 2 * (others + 2 * y**2)
+    )
+    _agree(made.pseudo_gradient(y), expected)
+    some = np.full(7, np.nan)  # in a solver agents may be held
+    game_functions.gradients(made.data, np.array([1, 4]), y, some)
+    _agree(some[[1, 4]], expected[[1, 4]])
+    assert np.isnan(some[[0, 2, 3, 5, 6]]).all()
+
+
+def test_a_closed_loop_that_forms_sums_once_is_that_of_hand_written_kernels():
+    start = np.linspace(0.5, 1.5, 6)
+    own, hand = (
+        gm.run(each, agents=gm.pi_cascades(6), start=start, duration=0.2) for each in energy()
+    )
+    _agree(own.data["action"].to_numpy(), hand.data["action"].to_numpy())
 
 
 def test_machine_code_has_every_function_of_numpy_that_formulas_have():

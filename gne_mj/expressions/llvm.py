@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from gne_mj.linked_game import FUNCTIONS, NUMBER, WHOLE, declared
+from gne_mj.linked_game import KNOWN, NUMBER, WHOLE, declared
 
 # By NumPy's names: what LLVM knows itself, and what C calls otherwise
 _INTRINSIC = {"sqrt": "sqrt", "exp": "exp", "log": "log", "sin": "sin", "cos": "cos", "abs": "fabs"}
@@ -34,7 +34,7 @@ def llvm(text: str) -> str:
     """
     module = ir.Module("game")
     for each in ast.parse(text).body:
-        if isinstance(each, ast.FunctionDef) and each.name in FUNCTIONS:
+        if isinstance(each, ast.FunctionDef) and each.name in KNOWN:
             _Function(module, each).write()
     return str(module)
 
@@ -100,6 +100,9 @@ class _Function:
         )
 
     def _store(self, target: ast.expr, value: Any) -> None:
+        if isinstance(target, ast.Subscript):
+            self.builder.store(self._as(value, NUMBER), self._place(target))
+            return
         assert isinstance(target, ast.Name)
         if target.id not in self.local:
             with self.builder.goto_entry_block():

@@ -57,7 +57,7 @@ class Part:
     def __init__(self, tables: Tables, kinds: list[Kind], place: str) -> None:
         self.kinds, self.place = kinds, place
         self.layouts = [tables.layout(kind.program, kind.members) for kind in kinds]
-        self.conditions = _conditions(tables, kinds, place)
+        self.conditions, self.only = _conditions(tables, kinds, place)
 
     def function(self, head: str, body: Callable[[source.Scope, int], None]) -> str:
         """The text of a kernel; ``body`` writes what it does for one kind."""
@@ -65,10 +65,42 @@ class Part:
         writer.add("\n\n@kernel")
         with writer.block(f"def {head}:"):
             for n, kind in enumerate(self.kinds):
-                scope = source.Scope(writer, kind.program, self.layouts[n], [self.place], {}, {})
                 with writer.block(f"if {self.conditions[n]}:"):
-                    body(scope, kind.size)
+                    body(self._scope(writer, n, {}), kind.size)
         return "\n".join(writer.lines)
+
+    def of_all(self, head: str, body: Callable[[source.Scope, int], None]) -> str:
+        """The text of a kernel that does it for all; sums that are the same for all come first."""
+        writer = source.Writer()
+        writer.add("\n\n@kernel")
+        with writer.block(f"def {head}:"):
+            shared = self._shared(writer)
+            members = sum(len(kind.members) for kind in self.kinds)
+            with writer.block(f"for {self.place} in range({members}):"):
+                for n, kind in enumerate(self.kinds):
+                    with writer.block(f"if {self.only[n]}:"):
+                        body(self._scope(writer, n, shared[n]), kind.size)
+        return "\n".join(writer.lines)
+
+    def _scope(self, writer: source.Writer, n: int, known: dict[str, str]) -> source.Scope:
+        kind, layout = self.kinds[n], self.layouts[n]
+        return source.Scope(writer, kind.program, layout, [self.place], {}, {}, known)
+
+    def _shared(self, writer: source.Writer) -> list[dict[str, str]]:
+        """Of each kind the local names of its rolls that have the same terms for all."""
+        names: dict[int, str] = {}  # by the list of terms
+        found: list[dict[str, str]] = []
+        for n, kind in enumerate(self.kinds):
+            found.append({})
+            for r, roll in enumerate(kind.program.rolls):
+                lists = {id(member.rolls[r]) for member in kind.members.values()}
+                if len(lists) > 1 or any(outer >= 0 for outer in roll.outer):
+                    continue
+                (terms,) = lists
+                if terms not in names:
+                    names[terms] = self._scope(writer, n, {})[f"r{r}"]
+                found[n][f"r{r}"] = names[terms]
+        return found
 
 
 def make(trace: Trace) -> Made:
@@ -84,6 +116,7 @@ def make(trace: Trace) -> Made:
         _HEAD,
         costs.function("cost(q, i, y)", source.value),
         costs.function("cost_gradient(q, i, a, y)", source.own_gradient),
+        costs.of_all("pseudo_gradient(q, y, out)", source.own_gradients),
         costs.function("add_cost_hessian(q, i, a, y, scale, out)", source.own_row),
         bounds.function("constraint(q, l, y)", source.value),
         bounds.function("constraint_gradient(q, l, a, y)", source.shared_gradient),
@@ -101,15 +134,21 @@ def _kinds(analysis: Analysis, nodes: list[Node], own: Any, size: int = 0) -> li
     return list(found.values())
 
 
-def _conditions(tables: Tables, kinds: list[Kind], place: str) -> list[str]:
-    """Under which a number is one of each kind's, if it is none of those before; last "True"."""
+def _conditions(tables: Tables, kinds: list[Kind], place: str) -> tuple[list[str], list[str]]:
+    """Under which a number is one of each kind's: if it is none of those before, and in any case.
+
+    The last one of the former, and of a single kind both, are "True".
+    """
     ends = [max(kind.members) for kind in kinds]
     if all(min(kind.members) > end for kind, end in zip(kinds[1:], ends, strict=False)):
-        return [*(f"{place} <= {end}" for end in ends[:-1]), "True"]
-    which = {member: n for n, kind in enumerate(kinds) for member in kind.members}
-    at = len(tables.q)
-    tables.q += [float(which[member]) for member in sorted(which)]
-    return [*(f"q[{at} + {place}] == {float(n)}" for n in range(len(kinds) - 1)), "True"]
+        only = [f"{min(kind.members)} <= {place} <= {max(kind.members)}" for kind in kinds]
+        found = [f"{place} <= {end}" for end in ends]
+    else:
+        which = {member: n for n, kind in enumerate(kinds) for member in kind.members}
+        at = len(tables.q)
+        tables.q += [float(which[member]) for member in sorted(which)]
+        found = only = [f"q[{at} + {place}] == {float(n)}" for n in range(len(kinds))]
+    return [*found[:-1], "True"], only if len(kinds) > 1 else ["True"]
 
 
 def _module(text: str) -> ModuleType:

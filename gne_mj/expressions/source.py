@@ -59,22 +59,25 @@ class Scope:
         fixed: for each action slot the text of its number where it is known (a slot around it).
         seeds: for each direction ("a", "b") the text of the action, and the slot that is known
             to be it, or None where none is and -1 where only running tells.
+        shared: texts of rolls that are written before, such as sums over all.
     """
 
     def __init__(
         self, writer: Writer, program: Program, layout: Layout, places: list[str],
         fixed: dict[int, str], seeds: dict[str, tuple[str, dict[int, bool]]],
+        shared: dict[str, str],
     ) -> None:  # fmt: skip
         self.writer, self.program, self.layout = writer, program, layout
         self.places, self.fixed, self.seeds = places, fixed, seeds
         self.calculus = calculus(program)
-        self._known: dict[str, str] = {}
+        self.shared = shared
+        self._known: dict[str, str] = dict(shared)
 
     def branch(self, **seeds: tuple[str, dict[int, bool]]) -> "Scope":
         """The same in a branch, with other seeds: what is written there is unknown outside."""
         scope = Scope(self.writer, self.program, self.layout, self.places, self.fixed,
-                      {**self.seeds, **seeds})  # fmt: skip
-        scope._known = {k: v for k, v in self._known.items() if k[0] in "xpcj"}
+                      {**self.seeds, **seeds}, self.shared)  # fmt: skip
+        scope._known |= {k: v for k, v in self._known.items() if k[0] in "xpcj"}
         return scope
 
     def index(self, slot: int) -> str:
@@ -171,7 +174,7 @@ class Scope:
         }
         fixed = {s: self.index(o) for s, o in outer.items()}
         scope = Scope(self.writer, roll.term, self.layout.rolls[r][1], [*self.places, place],
-                      fixed, seeds)  # fmt: skip
+                      fixed, seeds, {})  # fmt: skip
         scope._known = {f"x{s}": self[f"x{o}"] for s, o in outer.items()}
         return scope
 
@@ -292,6 +295,14 @@ def own_gradient(scope: Scope, size: int) -> None:
     """Of ``cost_gradient``: by one of the agent's own ``size`` actions, its first slots."""
     for branch in _own(scope, size):
         _returned(branch)
+
+
+def own_gradients(scope: Scope, size: int) -> None:
+    """Of ``pseudo_gradient``: by all of the agent's own actions."""
+    for own in range(size):
+        known = {s: s == own for s in range(scope.program.slots[0])}
+        branch = scope.branch(a=(scope.index(own), known))
+        scope.writer.add(f"out[{branch.index(own)}] = {_only(branch.tangent('a'))}")
 
 
 def own_row(scope: Scope, size: int) -> None:

@@ -64,6 +64,7 @@ class Analysis:
     def __init__(self) -> None:
         self._terms: dict[int, tuple[Program, Instance]] = {}
         self._sums: dict[int, tuple[list[Node], list[tuple[Program, list[Instance]]]]] = {}
+        self._lists: dict[tuple[int, ...], list[Instance]] = {}
 
     def program(self, node: Node, own: Sequence[int] = ()) -> tuple[Program, Instance]:
         """Of an expression; ``own`` actions have its first slots."""
@@ -102,8 +103,12 @@ class Analysis:
             if len(members) < ALIKE or program.slots[0] == 0 or long:
                 single += [term for term, _ in members]
             else:
-                alike.append((program, [instance for _, instance in members]))
+                alike.append((program, self._once([instance for _, instance in members])))
         return single, alike
+
+    def _once(self, instances: list[Instance]) -> list[Instance]:
+        """The same list of the same terms, by which sums that many write are seen to be one."""
+        return self._lists.setdefault(tuple(map(id, instances)), instances)
 
 
 class _Builder:

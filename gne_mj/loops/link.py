@@ -104,12 +104,14 @@ def action(law: ModuleType, game: ModuleType) -> Any:
 
 def _action(game: ModuleType, law: ModuleType) -> list[Any]:
     source = source_key(law, game)
+    of_all = hasattr(game, "pseudo_gradient") and hasattr(law, "action_of_all")
+    act = law.action_of_all if of_all else law.action
 
     def action(block, y, weights, memory, profile, now, u):
         _ = source
         steps = steps_in(block)
         m = steps.actions
-        return law.action(
+        return act(
             game, problem_in(block), floats_at(y, m), floats_at(weights, steps.constraints),
             floats_at(memory, steps.memory), law_work_at(profile, now, m), floats_at(u, m),
         )  # fmt: skip
