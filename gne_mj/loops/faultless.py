@@ -1,13 +1,14 @@
 """A run without faults: outputs are seen as they are, inputs act as delivered.
 
-A loop is compiled with this module or with :mod:`gne_mj.loops.faults`, so that what a run does
-not use costs nothing.
+A loop is compiled with this module, with :mod:`gne_mj.loops.faultless_apart` or with
+:mod:`gne_mj.loops.faults`, so that what a run does not use costs nothing.
 """
 
 from gne_mj.native import copy, kernel
 
 # Whether the law's action follows from the present state alone, whichever step comes next
 PREDICTION_KNOWN = True
+RECORDED = False  # whether rows have what was seen and what acted
 
 
 @kernel
@@ -42,6 +43,18 @@ def sense(problem, work, y, measurement):
 def sense_state(plant, parts, step, state, known, scratch):
     """The flat state as the law has it: the state, or ``known``, filled."""
     return state
+
+
+@kernel
+def keep_apart(problem, place, at, state):
+    """Agents are where they are."""
+    return True
+
+
+@kernel
+def push_apart(problem, place, at):
+    """Nothing is added to work.commanded."""
+    return True
 
 
 @kernel

@@ -13,6 +13,8 @@ import numpy as np
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import LINKS
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Fault
+from gne_mj.loops.functions import keep_apart as keep_apart
+from gne_mj.loops.functions import push_apart as push_apart
 from gne_mj.native import compiled, copy, kernel
 from gne_mj.numbers import numbers_in
 
@@ -21,6 +23,7 @@ PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
 STEADY, SINE, SQUARE, RANDOM = range(4)  # forms of pushes
 # Whether the law's action follows from the present state alone, whichever step comes next
 PREDICTION_KNOWN = False
+RECORDED = True  # whether rows have what was seen and what acted
 
 _fault_at = numbers_in(Fault)
 

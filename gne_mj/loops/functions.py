@@ -73,12 +73,6 @@ def keep_apart(problem, place, at, state):
 
 
 @kernel
-def foreseen(faults, problem):
-    """Whether the law's action follows from the present state alone, whatever comes next."""
-    return faults.PREDICTION_KNOWN and problem.functions[KEEP_APART] == 0
-
-
-@kernel
 def push_apart(problem, place, at):
     """Add to work.commanded what keeps agents apart; False, with the exit latched, if that is too
     much."""

@@ -307,7 +307,7 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
 
     Args:
         plant: module that predicts, :mod:`gne_mj.plants.zero_order_hold` and its like.
-        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
+        faults: :mod:`gne_mj.loops.faultless` or one of those in its place.
         at: where MuJoCo keeps what, for a plant that asks it.
     """
     source = source_key(plant, faults)

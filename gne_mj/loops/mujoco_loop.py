@@ -42,7 +42,7 @@ class MujocoLoop(ClosedLoop):
         self.plant = plant
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
         self._parameter_block = mujoco_parameter_block(plant, setup, plant.agents, len(memory))
-        self._faulty = faults is not faultless
+        self._faulty = faults.RECORDED
         data, sizes = plant.data, steps_of(self._parameter_block)
         workspace = workspace_of(data.userdata, plant.sizes.workspace, sizes)
         loop = workspace.loop

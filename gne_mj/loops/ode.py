@@ -51,7 +51,7 @@ def measure(channels, state, y):
 
 
 @kernel
-def look(parts, place, at, known, state):
+def look(faults, place, parts, at, known, state):
     """Measure unless outputs are known; False, with the exit latched, if they are outside or agents
     are not kept apart."""
     work = parts.work
@@ -59,7 +59,7 @@ def look(parts, place, at, known, state):
         measure(parts.channels, state, work.y)
         if not inside(parts.problem, at.time, max(at.stage, 0), work.y, work, parts.monitor):
             return False
-    return functions.keep_apart(parts.problem, place, at, state)
+    return faults.keep_apart(parts.problem, place, at, state)
 
 
 @kernel
@@ -72,7 +72,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
     One kernel for all stages keeps loops small: that is most of their speed, and of compile time.
 
     Args:
-        faults: :mod:`gne_mj.loops.faultless` or :mod:`gne_mj.loops.faults`.
+        faults: :mod:`gne_mj.loops.faultless` or one of those in its place.
         place: see :func:`gne_mj.loops.functions.act`.
         parts: of the loop; its input is changed at stage 0.
         at: when; stages but the start, and division.END, are in mode continuous only.
@@ -88,11 +88,11 @@ def control_step(faults, place, parts, at, storage, state, memory):
     known = divided.known if at.stage == 0 else float(division.NOTHING)
     divided.known = division.NOTHING
     instant = clock.mode == CONTINUOUS or at.step % clock.period == 0
-    if not look(parts, place, at, known, state):
+    if not look(faults, place, parts, at, known, state):
         if not instant:
             monitor.exit_between = 1.0
         return False
-    if at.stage == division.END and not functions.foreseen(faults, problem):
+    if at.stage == division.END and not faults.PREDICTION_KNOWN:
         divided.known = division.OUTPUTS
         return True
     if instant and known != division.LAW:
@@ -105,7 +105,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
         else:
             measurement = faults.sense(problem, work, work.y, work.measurement)
             good = explicit_law(problem, at.time, stage, measurement, memory, work, monitor)
-            good = good and functions.push_apart(problem, place, at)
+            good = good and faults.push_apart(problem, place, at)
         if not good:
             return False
         if at.stage == division.END:
@@ -340,7 +340,7 @@ class OdeLoop(ClosedLoop):
         self._agents = agents
         self._parameter_block = ode_parameter_block(setup, agents, len(memory))
         self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
-        self._faulty = faults is not faultless
+        self._faulty = faults.RECORDED
         sizes = steps_of(self._parameter_block)
         self._flat = np.zeros(ode_workspace_length(sizes))
         workspace = workspaces_of(self._flat, sizes)

@@ -13,7 +13,7 @@ from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
 from gne_mj.game_model import Game
-from gne_mj.loops import faultless
+from gne_mj.loops import faultless, faultless_apart
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
 from gne_mj.plants.agent_type import followed_position
@@ -89,7 +89,9 @@ class SystemData:
     @property
     def fault_kernels(self) -> ModuleType:
         """The module of what goes wrong in this system's loops."""
-        return native_faults if self.faults else faultless
+        if self.faults:
+            return native_faults
+        return faultless if self.separation is None else faultless_apart
 
     @property
     def recorded(self) -> int:
