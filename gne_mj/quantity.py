@@ -23,7 +23,8 @@ class Quantity:
         each: "agent" or "constraint", what the entries belong to; empty for one number.
         symbol: its formula in TeX, for figures; may be empty.
         bound: greatest allowed value, one number or (entries,); None if there is none.
-        lower_bound: least allowed value likewise.
+        lower_bound: least allowed value likewise. Entries that have none of the bounds there are
+            (not a number) are not there: their values are no numbers either.
         between: of distances between agents the two of each entry, from 0, shape (entries, 2); -1
             for entries that are none. They are drawn where the agents are.
         outline: corners of the part of the plane that the values say the use of, in order round it,
@@ -51,6 +52,12 @@ class Quantity:
             given = getattr(self, key)
             if given is not None and (np.ndim(given) != 2 or np.shape(given)[1] != 2):
                 raise InvalidInput(key, np.shape(given), "its shape must be (..., 2)")
+
+    def there(self, entries: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Which entries there are, of shape ``entries``."""
+        bounds = list(self.bounds(entries).values())
+        unbounded = np.all(np.isnan(bounds), axis=0) if bounds else np.zeros(entries, dtype=bool)
+        return np.logical_not(unbounded)
 
     @property
     def pairs(self) -> list[list[int]]:

@@ -139,9 +139,13 @@ class FleetTask(control.Task):
         return all(np.all(np.isfinite(part)) for part in parts)
 
     def _derived(self, physics: FleetPhysics) -> dict[str, NDArray[np.float64]]:
-        """What the game derives from its actions, by name."""
-        game, y = self.system.game, physics.output[None]
-        return {each.name: each.at(y, game.entries(each))[0].copy() for each in game.quantities}
+        """What the game derives from its actions, by name, without entries that are not there."""
+        game, y, found = self.system.game, physics.output[None], {}
+        for each in game.quantities:
+            entries = game.entries(each)
+            values = each.at(y, entries)[0]
+            found[each.name] = values[each.there(entries)] if entries else values.copy()
+        return found
 
     def action_spec(self, physics: FleetPhysics) -> specs.BoundedArray:
         """One force for each channel, shape (m,), in the inputs' unit, within their limits.

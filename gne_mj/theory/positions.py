@@ -81,12 +81,13 @@ class Positions:
             return []
         if self.clock.steps(self.clock.control_period) == 1:
             return [
-                "positions keep every shared constraint at every integration step, each of which"
-                f" ends a control period{provided}"
+                "positions keep every shared constraint wherever outputs do so, and so at every"
+                f" integration step, each of which ends a control period{provided}: safety alone,"
+                " where they come to rest is measured"
             ]
         return [
             "positions keep every shared constraint up to the first integration step between two"
-            f" control instants at which outputs do not{provided}"
+            f" control instants at which outputs do not{provided}: safety alone"
         ]
 
     def not_certified(self, held: ZeroOrderHold | None) -> list[str]:

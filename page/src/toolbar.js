@@ -74,6 +74,8 @@ export class Toolbar {
     if (planned.length) parts.push("rings: outputs, where robots head");
     if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
       parts.push("strips: bounded distances");
+    if (planned.some(({ plan }) => plan?.radius.some((radius) => radius !== null)))
+      parts.push("circles: half of the least distance");
     const note = byId("link-note");
     note.textContent = parts.join(" · ");
     note.hidden = parts.length === 0;
