@@ -6,7 +6,6 @@ The functions get NumPy arrays and the game as a Python object, and run in every
 
 import sys
 from collections.abc import Callable
-from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.settings import COUNT
-from gne_mj.errors import InvalidInput, UserCodeError
+from gne_mj.errors import InvalidInput, UserCodeError, written
 from gne_mj.game_model import Game
 from gne_mj.native import kernel
 from gne_mj.plain import call_out, callable_address
@@ -106,10 +105,8 @@ class PlainLaw(Law):
 
 
 def _name(function: Callable[..., Any]) -> str:
-    while isinstance(function, partial):  # with its parameters, or for each agent
-        inner = next((each for each in function.args if callable(each)), function.func)
-        function = inner
-    return str(getattr(function, "__name__", function))
+    own = written(function)
+    return str(getattr(own, "__name__", own))
 
 
 def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:

@@ -139,7 +139,7 @@ class UserCodeError(GneError, RuntimeError):
     def __init__(
         self, function: Callable[..., Any] | CodeType, error: BaseException | str, at: str = ""
     ) -> None:
-        inner = function.func if isinstance(function, partial) else function
+        inner = written(function)
         code = inner if isinstance(inner, CodeType) else getattr(inner, "__code__", None)
         name = getattr(inner, "__name__", repr(inner) if code is None else code.co_name)
         self.where = name
@@ -153,11 +153,22 @@ class UserCodeError(GneError, RuntimeError):
         super().__init__(f"{self.where}: " + " ".join(f"{what} {at}".split()))
 
 
+def written(function: Any) -> Any:
+    """The function that a user wrote, of one with arguments given, or called for each agent."""
+    while isinstance(function, partial):
+        function = next((each for each in function.args if callable(each)), function.func)
+    return function
+
+
 def raised(error: BaseException) -> str:
     """What an exception is and says, for a sentence."""
     if isinstance(error, KeyboardInterrupt):
         return "Ctrl-C ended it"
     name, said = type(error).__name__, str(error)
+    if isinstance(error, AttributeError) and isinstance(error.name, str) and "mean" not in said:
+        known = [each for each in dir(error.obj) if not each.startswith("_")]
+        close = difflib.get_close_matches(error.name, known, n=1)
+        said += f"; did you mean '{close[0]}'?" if close else ""
     return f"{name}: {said}" if said else name
 
 

@@ -26,7 +26,7 @@ from numba import types
 from numba.core import cgutils
 from numpy.typing import NDArray
 
-from gne_mj.errors import InvalidInput, UserCodeError
+from gne_mj.errors import InvalidInput, UserCodeError, nearest
 from gne_mj.linked_game import FUNCTIONS
 from gne_mj.native import intrinsic_or, is_kernel, kernel
 
@@ -253,12 +253,22 @@ def check_arguments(
     parameters: Iterable[str] = (),
 ) -> None:
     """Refuse a user's function that cannot take these arguments, and parameters by name."""
+    signature, given = inspect.signature(function), list(parameters)
+    own = tuple(signature.parameters)[len(arguments) :]
+    for wrong in given:
+        if own and wrong not in signature.parameters and not _takes_any(signature):
+            right = f"its {_call(name, (*arguments, *own))} has no '{wrong}'"
+            raise InvalidInput(key, file, f"{right}; {nearest(wrong, own)}")
     try:
-        inspect.signature(function).bind(*arguments, **dict.fromkeys(parameters))
+        signature.bind(*arguments, **dict.fromkeys(given))
     except TypeError as error:
         raise InvalidInput(
-            key, file, f"it must define {_call(name, (*arguments, *parameters))}: {error}"
+            key, file, f"it must define {_call(name, (*arguments, *given))}: {error}"
         ) from None
+
+
+def _takes_any(signature: inspect.Signature) -> bool:
+    return any(each.kind is each.VAR_KEYWORD for each in signature.parameters.values())
 
 
 def _call(name: str, arguments: tuple[str, ...]) -> str:

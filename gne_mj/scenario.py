@@ -1,5 +1,7 @@
 """Scenario files: TOML in, validated objects out. A scenario defines a run, and holds no code."""
 
+from __future__ import annotations
+
 import json
 import re
 import tomllib

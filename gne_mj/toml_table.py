@@ -93,15 +93,22 @@ class Table(BaseModel):
     def _hint(cls, key: str) -> str:
         """Where a key that is unknown here belongs, or the nearest one that is known here."""
         for choice in ("type", "information"):
-            for other in all_tables() if choice in cls.model_fields else ():
-                if choice in other.model_fields and key in other.model_fields:
-                    (own,) = get_args(cls.model_fields[choice].annotation)
-                    (theirs,) = get_args(other.model_fields[choice].annotation)
-                    example = " (--set 'controller={...}')" if choice == "information" else ""
-                    return (
-                        f"it belongs to {choice} = '{theirs}', not to '{own}'; to change the"
-                        f" {choice} give the whole table{example}"
-                    )
+            if choice not in cls.model_fields:
+                continue
+            (own,) = get_args(cls.model_fields[choice].annotation)
+            others = [
+                tag
+                for other in all_tables()
+                if choice in other.model_fields and key in other.model_fields
+                for tag in get_args(other.model_fields[choice].annotation)
+            ]
+            if others:
+                example = " (--set 'controller={...}')" if choice == "information" else ""
+                theirs = " or ".join(f"'{tag}'" for tag in sorted(set(others) - {"python"}))
+                return (
+                    f"it belongs to {choice} = {theirs}, not to '{own}'; to change the"
+                    f" {choice} give the whole table{example}"
+                )
         return nearest(key, cls.model_fields)
 
 

@@ -306,7 +306,7 @@ def test_mistakes_in_a_law(copied, tmp_path, capsys, monkeypatch, mistake):
         ("game", "game.file=EXAMPLES/game/README.md", "a Python file ending in .py"),
         ("game", "game.parameters.capactiy=3", "unexpected keyword argument 'capactiy'"),
         ("game", "agents.count=5", "must list 5 numbers each"),
-        ("law", "controller.parameters.gain=3", "unexpected keyword argument 'gain'"),
+        ("law", "controller.parameters.gain=3", "tau) has no 'gain'; did you mean 'gains'?"),
         ("law", "controller.mode=sampled", "systems.robots.controller.mode: got 'sampled'"),
         ("robot", "agents.output=travle", "systems.fleet.agents.output: got 'travle', but did you"),
         ("robot", 'agents.output=["a"]', "one name or a list of 4"),

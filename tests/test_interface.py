@@ -203,7 +203,7 @@ def test_constraints_of_which_there_are_fewer_than_agents_are_drawn_too():
     assert np.all(np.isnan(gap[:, 0]))
     (axes,) = run.plot()["players-gap-values"].axes
     assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == [
-        "gap 1", "gap 3", "bound",
+        "gap 1", "gap 3", "bound of\neach gap",
     ]  # fmt: skip
 
 

@@ -1,9 +1,12 @@
 """Many runs of a scenario: swept values times random starts, stored as one dataset."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gne_mj.arguments import answering
 from gne_mj.batches.cluster import connected
 from gne_mj.batches.execute import ahead, execute
 from gne_mj.batches.plan import Plan, make_plan, parse_record
@@ -33,6 +36,7 @@ __all__ = [
 ]
 
 
+@answering
 def run_batch(
     source: str | Path | Mapping[str, Any],
     sweep: Mapping[str, Sequence[Any]] | None = None,
@@ -49,7 +53,7 @@ def run_batch(
     resume: bool = False,
     cluster: str | None = None,
     progress: Callable[[Progress], None] | bool = False,
-) -> "xarray.Dataset":
+) -> xarray.Dataset:
     """Run all combinations of swept values from random starts; returns the dataset, read lazily.
 
     >>> import gne_mj
@@ -102,6 +106,6 @@ def _sweeps(given: Mapping[str, Sequence[Any]]) -> list[Sweep]:
     return sweeps
 
 
-def open_batch(folder: str | Path) -> "xarray.Dataset":
+def open_batch(folder: str | Path) -> xarray.Dataset:
     """The dataset of a batch's folder, read lazily; runs that are missing are not numbers."""
     return Store.open(Path(folder)).dataset()

@@ -1,5 +1,7 @@
 """A game from two Python functions (see docs/expressions.md)."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -48,7 +50,7 @@ class ExpressionGame(Game):
     numbers: Mapping[str, Any] = field(default_factory=dict)
     words: Mapping[str, Any] = field(default_factory=dict)
 
-    def changed(self, **parameters: Any) -> "ExpressionGame":
+    def changed(self, **parameters: Any) -> ExpressionGame:
         """The same game with some of its parameters changed.
 
         Raises:

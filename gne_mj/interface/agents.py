@@ -5,6 +5,8 @@ value that the actuators deliver (for actions of several entries lists of lists)
 All raise InvalidInput, which names the key, the value and what would be right.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +15,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from gne_mj.arguments import answering
 from gne_mj.files import written
 from gne_mj.interface.tables import made
 from gne_mj.plants.integrator import IntegratorAgents
@@ -25,6 +28,7 @@ from gne_mj.toml_table import Table
 from gne_mj.user_files import CustomAgents
 
 
+@answering
 def flexible_robots(
     count: int,
     *,
@@ -60,6 +64,7 @@ def flexible_robots(
     return made(RobotAgents, type="flexible-robot", **locals())
 
 
+@answering
 def planar_robots(
     count: int,
     *,
@@ -96,6 +101,7 @@ def planar_robots(
     return made(PlanarRobotAgents, type="planar-flexible-robot", **locals())
 
 
+@answering
 def integrators(count: int, *, input_limit: ArrayLike | None = None) -> AgentsTable:
     """Agents with y' = u [eq:int].
 
@@ -106,6 +112,7 @@ def integrators(count: int, *, input_limit: ArrayLike | None = None) -> AgentsTa
     return made(IntegratorAgents, type="integrator", **locals())
 
 
+@answering
 def pi_cascades(
     count: int,
     *,
@@ -124,6 +131,7 @@ def pi_cascades(
     return made(PiCascadeAgents, type="pi-cascade", **locals())
 
 
+@answering
 def mjcf_robots(
     count: int,
     file: str | Path | Sequence[str | Path],
@@ -175,6 +183,7 @@ def _path(file: str | Path) -> str:
     return str(path)
 
 
+@answering
 def custom_agents(
     count: int,
     file: str | Path,

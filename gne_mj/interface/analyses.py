@@ -1,8 +1,11 @@
 """What can be told of a set-up without running it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 from gne_mj import game_check
+from gne_mj.arguments import answering
 from gne_mj.errors import InvalidInput, named
 from gne_mj.interface.running import Run
 from gne_mj.progress import if_asked
@@ -14,6 +17,7 @@ from gne_mj.theory import certify as examine
 from gne_mj.theory.guarantees import Guarantees
 
 
+@answering
 def solve(
     source: Source | Run | System,
     *,
@@ -45,6 +49,7 @@ def solve(
         return solve_system(_system(source, system)[0], rhos, tuple(path), tell)
 
 
+@answering
 def certify(
     source: Source | Run | System, *, system: str | None = None, clock: Clock | None = None
 ) -> Guarantees:
@@ -65,6 +70,7 @@ def certify(
     return examine(found, clock or own)
 
 
+@answering
 def check(source: Source | Run, *, system: str | None = None) -> game_check.Report:
     """Compare what a game says twice: derivatives with differences, lists, declarations.
 

@@ -1,10 +1,13 @@
 """Runs side by side, and a small table of how they went."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from gne_mj.arguments import answering
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.interface.running import Run, part_changes, run_scenario
@@ -30,7 +33,7 @@ class Comparison:
     runs: tuple[Run, ...]
 
     @property
-    def table(self) -> "pandas.DataFrame":
+    def table(self) -> pandas.DataFrame:
         """A row for each run, or each system of one: status, margin, settling time, distances.
 
         Times in s, margins -g and distances in the action's unit; not a number where unknown.
@@ -66,6 +69,7 @@ def _row(report: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+@answering
 def compare(
     source: Source,
     vary: Mapping[str, Sequence[Any]],

@@ -4,9 +4,12 @@
 the run's end if that is None. ``edges`` are pairs of agents.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal
 
+from gne_mj.arguments import answering
 from gne_mj.interface.tables import made
 from gne_mj.scenario_tables import faults as tables
 from gne_mj.scenario_tables.faults import FaultTable
@@ -15,6 +18,7 @@ Agents = Sequence[int] | None
 Edges = Sequence[tuple[int, int]] | None
 
 
+@answering
 def push(
     force: float,
     *,
@@ -30,6 +34,7 @@ def push(
     return made(tables.PushTable, type="push", **locals())
 
 
+@answering
 def saturation(
     limit: float, *, agents: Agents = None, start: float = 0.0, end: float | None = None
 ) -> FaultTable:
@@ -37,6 +42,7 @@ def saturation(
     return made(tables.SaturationTable, type="saturation", **locals())
 
 
+@answering
 def noise(
     amplitude: float, *, agents: Agents = None, start: float = 0.0, end: float | None = None
 ) -> FaultTable:
@@ -44,6 +50,7 @@ def noise(
     return made(tables.NoiseTable, type="noise", **locals())
 
 
+@answering
 def bias(
     offset: float, *, agents: Agents = None, start: float = 0.0, end: float | None = None
 ) -> FaultTable:
@@ -51,11 +58,13 @@ def bias(
     return made(tables.BiasTable, type="bias", **locals())
 
 
+@answering
 def sensor_delay(periods: int) -> FaultTable:
     """All sensors read what was so many control periods ago."""
     return made(tables.SensorDelayTable, type="sensor-delay", **locals())
 
 
+@answering
 def message_loss(
     probability: float,
     *,
@@ -68,6 +77,7 @@ def message_loss(
     return made(tables.MessageLossTable, type="message-loss", **locals())
 
 
+@answering
 def message_delay(
     periods: int,
     *,
@@ -80,6 +90,7 @@ def message_delay(
     return made(tables.MessageDelayTable, type="message-delay", **locals())
 
 
+@answering
 def silence(
     *, agents: Agents = None, edges: Edges = None, start: float = 0.0, end: float | None = None
 ) -> FaultTable:
@@ -87,6 +98,7 @@ def silence(
     return made(tables.SilenceTable, type="silence", **locals())
 
 
+@answering
 def estimate_corruption(
     amplitude: float, *, agents: Agents = None, start: float = 0.0
 ) -> FaultTable:

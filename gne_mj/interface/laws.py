@@ -5,11 +5,14 @@ agent keeps to its share of every bound's slack. A ``graph`` is a :class:`gne_mj
 one (then of as many agents as the game has), or edges as pairs of agents numbered from 1.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
 
+from gne_mj.arguments import answering
 from gne_mj.controllers.full_information import FullController
 from gne_mj.controllers.fully_distributed import DistributedController
 from gne_mj.controllers.partial_information import PartialController
@@ -21,6 +24,7 @@ from gne_mj.python_objects import LawFunctions, PythonLaw, keep
 Network = Graph | str | Sequence[tuple[int, int]]
 
 
+@answering
 def full_information(*, mode: str = "continuous", decentralised: bool = False) -> LawTable:
     """Every agent measures all actions [eq:nonlinFIfeedback].
 
@@ -31,6 +35,7 @@ def full_information(*, mode: str = "continuous", decentralised: bool = False) -
     return made(FullController, information="full", **locals())
 
 
+@answering
 def partial_information(
     graph: Network = "ring",
     *,
@@ -51,6 +56,7 @@ def partial_information(
     return made(PartialController, information="partial", **locals())
 
 
+@answering
 def fully_distributed(
     graph: Network = "ring",
     *,

@@ -1,11 +1,14 @@
 """Putting a set-up together, and running it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from gne_mj.arguments import answering
 from gne_mj.controllers import Law
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
@@ -43,6 +46,7 @@ KEYS = {
 }
 
 
+@answering
 def setup(
     source: Source,
     changes: Mapping[str, Any] | None = None,
@@ -95,11 +99,16 @@ def part_changes(source: Source, given: Mapping[str, Any]) -> dict[str, Any]:
     """Parts of a set-up, by their names, as changes of a scenario's keys."""
     found = {KEYS.get(name, name): value for name, value in given.items()}
     agents, law = given.get("agents"), given.get("law")
-    if isinstance(source, Game) and agents is not None and agents.count != source.agents:
+    if not isinstance(agents, Table | Mapping | None):
+        raise InvalidInput("agents", agents, "it must be agents, such as flexible_robots(6)")
+    if isinstance(source, Game) and getattr(agents, "count", source.agents) != source.agents:
         raise InvalidInput("agents", agents, f"the {source.called} has {source.agents} agents")
-    if callable(law) and not isinstance(law, Table | Law):
-        found["controller"] = own_law(law)
-    return found
+    if isinstance(law, Table | Law | Mapping) or law is None:
+        return found
+    if not callable(law):
+        laws = "full_information() or partial_information(graph)"
+        raise InvalidInput("law", law, f"it must be a law, such as {laws}, or a function")
+    return {**found, "controller": own_law(law)}
 
 
 class Run(Trajectory):
@@ -126,7 +135,7 @@ class Run(Trajectory):
         return self.systems[self.scenario.name_of(None)]
 
     @property
-    def data(self) -> "xarray.Dataset":
+    def data(self) -> xarray.Dataset:
         """What the only system recorded."""
         return self[self.scenario.name_of(None)]
 
@@ -135,27 +144,26 @@ class Run(Trajectory):
         """That it ran on."""
         return self.scenario.clock()
 
-    def plot(
-        self, folder: str | Path | None = None, formats: Sequence[str] = ("png",)
-    ) -> "Figures":
+    def plot(self, folder: str | Path | None = None, formats: Sequence[str] = ("png",)) -> Figures:
         """See :func:`gne_mj.plot`."""
         from gne_mj.interface.show import plot
 
         return plot(self, folder, formats)
 
-    def view(self, title: str = "gne-mj replay", *, port: int = 0) -> "Server":
+    def view(self, title: str = "gne-mj replay", *, port: int = 0) -> Server:
         """See :func:`gne_mj.view`."""
         from gne_mj.interface.show import view
 
         return view(self, title, port=port)
 
-    def replay(self) -> "Replay":
+    def replay(self) -> Replay:
         """The replay, for a notebook to show inline: some two megabytes each time."""
         from gne_mj.interface.show import Replay
 
         return Replay(self)
 
 
+@answering
 def run(
     source: Source,
     changes: Mapping[str, Any] | None = None,

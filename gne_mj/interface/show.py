@@ -1,5 +1,7 @@
 """Figures and replays of runs."""
 
+from __future__ import annotations
+
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -7,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gne_mj.arguments import answering
 from gne_mj.files import storing
 from gne_mj.interface.running import run_scenario
 from gne_mj.notebook import replay_html
@@ -27,7 +30,7 @@ class Figures(dict[str, "Figure"]):
     >>> gne_mj.run("velocity-sync").plot()["robots-gaps"].savefig("gaps.pdf")
     """
 
-    def __init__(self, figures: "Mapping[str, Figure]") -> None:
+    def __init__(self, figures: Mapping[str, Figure]) -> None:
         super().__init__(figures)
 
     def __repr__(self) -> str:
@@ -40,7 +43,7 @@ class Figures(dict[str, "Figure"]):
         )
 
 
-def _png(figure: "Figure") -> str:
+def _png(figure: Figure) -> str:
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=DPI)
     return b64encode(stream.getvalue()).decode("ascii")
@@ -63,6 +66,7 @@ class Replay:
         return replay_html(self.trajectory)
 
 
+@answering
 def plot(
     shown: Trajectory | Source,
     folder: str | Path | None = None,
@@ -90,7 +94,8 @@ def plot(
     return figures
 
 
-def view(shown: Trajectory | Source, title: str = "gne-mj replay", *, port: int = 0) -> "Server":
+@answering
+def view(shown: Trajectory | Source, title: str = "gne-mj replay", *, port: int = 0) -> Server:
     """Serve a run's replay on 127.0.0.1 until the server is closed or the process ends.
 
     Open its ``url`` in a browser. ``gne-mj run --view`` shows a run while it is going on.

@@ -14,6 +14,7 @@ from gne_mj.variables import Panel
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINES = 5  # combinations of the other swept values that get a line each
 _RED = "#B00020"
@@ -57,17 +58,27 @@ def save_batch(runs: "xarray.Dataset", file: Path, kind: str = "png") -> None:
             for axes in grid[0]:
                 axes.set_xlabel(key)
                 _mark(axes, runs[key].to_numpy())
-            handles, labels = grid[0, 0].get_legend_handles_labels()
-            if len(labels) > 1:
-                figure.legend(
-                    handles, labels, loc="outside lower center", ncols=min(len(labels), 5)
-                )
-            elif _others(runs, key):
-                figure.supxlabel(f"all values of {', '.join(_others(runs, key))}", fontsize=7.5)
+        if key is not None or len(lines) > 1:
+            _explain(figure, grid[0, 0], _others(runs, key), "lines" if key else "dashes")
         planned = runs.attrs.get("planned", runs.sizes["run"])
         if planned > runs.sizes["run"]:
             figure.suptitle(f"partial: {runs.sizes['run']:,} of {planned:,} runs", fontsize=8.5)
         figure.savefig(file, dpi=200, format=kind)
+
+
+def _explain(figure: "Figure", axes: "Axes", others: list[str], medians: str) -> None:
+    """Below the panels, what is drawn: a legend, or words about all values of the other keys."""
+    words = f"{medians}: medians of the runs; bands: 90% of them; dots: the worst"
+    handles, labels = axes.get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=min(len(labels), 5), title=words,
+            title_fontsize=7.5,
+        )  # fmt: skip
+    elif others and medians == "lines":
+        figure.supxlabel(f"{words}; all values of {', '.join(others)}", fontsize=7.5)
+    else:
+        figure.supxlabel(words, fontsize=7.5)
 
 
 def _others(runs: "xarray.Dataset", key: str | None) -> list[str]:

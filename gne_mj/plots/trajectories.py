@@ -128,18 +128,18 @@ def _drawn(data: "xarray.Dataset", name: str) -> "Figure":
         numbers = names[mine] - 1 if of_agents else np.arange(np.count_nonzero(mine))
         labels = [] if single else [str(each) for each in names[mine]]
         _lines(panel, data["time"].to_numpy(), values[:, mine], numbers, labels)
-        labelled = False
+        words = variable.attrs.get("long_name", name)
+        each = "\neach " if len(numbers) > 1 else " "
+        label: str | None = f"bound of{each}{words.split(',')[0]}"
         for bound in (f"{name}_bound", f"{name}_lower_bound"):
             if bound in data:
-                each = data[bound].to_numpy().reshape(-1)[mine]
-                _bounds(panel, each, "bound" if not labelled else None)
-                labelled = True
+                _bounds(panel, data[bound].to_numpy().reshape(-1)[mine], numbers, label)
+                label = None
         # trajectories hold no symbol of the action
         symbol = variable.attrs.get("symbol", "y_i" if name == "action" else "")
         if along:
             symbol = symbol.replace("_i", f"_{{i,{along}}}")
-        about = variable.attrs.get("long_name", name), symbol, variable.attrs.get("units", "")
-        panel.set_ylabel(axis_label(*about))
+        panel.set_ylabel(axis_label(words, symbol, variable.attrs.get("units", "")))
     _legend(figure, axes[0], data.attrs["agent_name"] if of_agents else None)
     return figure
 
@@ -158,12 +158,14 @@ def _lines(
         axes.plot(time, values[:, index], label=label, **line_style(int(number)))
 
 
-def _bounds(axes: "Axes", bounds: NDArray[np.float64], label: str | None) -> None:
+def _bounds(
+    axes: "Axes", bounds: NDArray[np.float64], numbers: NDArray[np.int64], label: str | None
+) -> None:
     """Each bound once: in black, or in its line's colour where it is one line's of several."""
     values, first, counts = np.unique(bounds, return_index=True, return_counts=True)
-    for value, number, count in zip(values, first, counts, strict=True):
+    for value, at, count in zip(values, first, counts, strict=True):
         own = count == 1 and len(bounds) > 1
-        colour = line_style(int(number))["color"] if own else "black"
+        colour = line_style(int(numbers[at]))["color"] if own else "black"
         axes.axhline(value, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), label=label)
         label = None
     low, high = axes.get_ylim()
