@@ -90,12 +90,23 @@ def test_a_run_counts_what_mujoco_has(name, changes, mode):
         assert summary(report)["contacts"] == "none between agents"
 
 
-def test_divided_steps_are_counted_once():
-    """Mode continuous: as many observations with a contact as there are pieces of steps at most."""
-    run = gm.run("platoon", {**SHORT, **CLOSE, "barrier.rho": 1e-3})
-    report = run.reports["robots"]
-    assert report["division"]["divided_steps"] > 0
-    assert 0 < report["contacts"]["steps"] <= report["steps"] + 1
+def test_mode_continuous_counts_at_the_start_of_steps_and_of_pieces():
+    """As MuJoCo finds them at the recorded states, each put there anew."""
+    scenario = load_scenario("platoon", {**SHORT, **CLOSE})
+    run = gm.run(scenario)
+    report, (system,) = run.reports["robots"], scenario.system_objects()
+    plant = build_fleet(system.agents, H, system.integrator)
+    counts = []
+    for state in run["robots"]["state"].values:
+        plant.reset(state)
+        mujoco.mj_fwdPosition(plant.model, plant.data)
+        counts.append(plant.data.ncon)  # nothing but hulls collides
+    told, between = report["contacts"], report["steps"] - STEPS  # pieces of divided steps
+    assert between > 0
+    assert 0 <= told["steps"] - np.count_nonzero(counts) <= between
+    assert 0 <= told["count"] - sum(counts) <= between * max(counts)
+    first = run["robots"]["time"].values[np.flatnonzero(counts)[0]]
+    assert first - H < told["first"] <= first + 1e-9
 
 
 def test_batches_count_as_single_runs(tmp_path):
