@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import run_metrics
+from gne_mj import kept_apart, run_metrics
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
@@ -21,8 +21,6 @@ from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 
-# Pairs of agents that a sentence names
-MOST_NAMED = 5
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
 
@@ -124,9 +122,8 @@ def certify_run(
     distance = np.max(np.abs(action - middle), axis=1)
     (settled,) = run_metrics.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
-    holding = _holding(system, time, action, status, duration, tolerance)
-    if holding:
-        message += f"; at rest, away from equilibrium: held by the separation of {_pairs(holding)}"
+    holding = kept_apart.holding(system, time, action, (status, duration, tolerance))
+    message += kept_apart.held_text(holding)
     between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
     if between and monitor.exit == watch.INSIDE:
         message += (
@@ -145,7 +142,7 @@ def certify_run(
         actuators=_actuators(system, monitor),
         positions=_positions(system, monitor),
         contacts=_contacts(system, monitor),
-        separation=_separation(system, monitor, holding),
+        separation=kept_apart.report(system, monitor, holding),
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
@@ -226,8 +223,8 @@ def _exit(system: System, monitor: Any) -> tuple[str, str]:
         from gne_mj.plants.native_mujoco import lost_text  # late: MuJoCo is slow to import
 
         return EXITS[code], f"{at} {lost_text(int(value))}"
-    if (pair := _pair(monitor)) is not None:
-        return EXITS[code], _apart_text(system, monitor, pair, at)
+    if (pair := kept_apart.pair_of(monitor)) is not None:
+        return EXITS[code], kept_apart.exit_text(system, monitor, pair, at)
     constraint = game.constraint_names[int(monitor.exit_constraint)]
     if code == watch.STEP_TOO_SMALL:
         return (
@@ -264,7 +261,7 @@ def _exit_report(system: System, monitor: Any) -> dict[str, Any] | None:
     if monitor.exit == watch.INSIDE:
         return None
     constraint = int(monitor.exit_constraint)
-    pair = _pair(monitor)
+    pair = kept_apart.pair_of(monitor)
     known = monitor.exit != watch.DIVERGED and pair is None
     agent = int(monitor.exit_agent) + 1 if pair is None else 0
     return {
@@ -285,7 +282,7 @@ def _concerned(system: System, monitor: Any) -> list[int]:
     """The agents, from 1, that an exit is of: in the constraint, or the one with the estimates."""
     if monitor.exit == watch.DIVERGED:
         return []
-    if (pair := _pair(monitor)) is not None:
+    if (pair := kept_apart.pair_of(monitor)) is not None:
         return sorted({i + 1 for i in pair})
     agent = int(monitor.exit_agent)
     members = system.game.in_constraint[int(monitor.exit_constraint)]
@@ -355,75 +352,6 @@ def _contacts(system: System, monitor: Any) -> dict[str, Any] | None:
         "agents": agents if any_at_all else None,
         "depth": float(monitor.contact_depth),
     }
-
-
-def _separation(
-    system: System, monitor: Any, holding: list[tuple[int, int]]
-) -> dict[str, Any] | None:
-    """How far apart agents that keep apart were, at every integration step."""
-    if system.separation is None or not monitor.apart:
-        return None
-    near = bool(np.isfinite(monitor.least_distance))
-    return {
-        "distance": system.separation.distance,
-        "reach": system.separation.reach,
-        "observed": int(monitor.apart),
-        "too_near": int(monitor.too_near),
-        "least_distance": float(monitor.least_distance) if near else None,
-        "agents": [int(monitor.nearest_first) + 1, int(monitor.nearest_second) + 1]
-        if near
-        else None,
-        "time": float(monitor.least_distance_time) if near else None,
-        "most_pairs": int(monitor.most_pairs),
-        "held_by": [[i + 1, j + 1] for i, j in holding],
-    }
-
-
-def _holding(
-    system: System,
-    time: NDArray[np.float64],
-    action: NDArray[np.float64],
-    status: str,
-    duration: float,
-    tolerance: float,
-) -> list[tuple[int, int]]:
-    """The pairs of agents, from 0, that push each other where a run rests away from equilibrium."""
-    if system.separation is None or status != "completed":
-        return []
-    (still,) = run_metrics.at_rest(time, action[None], duration, tolerance)
-    # at rest positions are where outputs are
-    return system.separation.holding(action[-1], action[-1], system.rho) if still else []
-
-
-def _pairs(pairs: list[tuple[int, int]]) -> str:
-    """In words; those behind the first few are counted."""
-    shown = [f"agents {i + 1} and {j + 1}" for i, j in pairs[:MOST_NAMED]]
-    more = len(pairs) - len(shown)
-    return ", ".join(shown) + (f" and {more} pair{'s' * (more > 1)} more" if more else "")
-
-
-def _pair(monitor: Any) -> tuple[int, int] | None:
-    """The two agents, from 0, that an exit is of; None if it is of something else."""
-    first = int(monitor.exit_agent)
-    too_near = monitor.exit == watch.TOO_NEAR
-    if too_near or (monitor.exit == watch.STEP_TOO_SMALL and first >= 0):
-        return first, int(monitor.exit_constraint)
-    return None
-
-
-def _apart_text(system: System, monitor: Any, pair: tuple[int, int], at: str) -> str:
-    """How two agents did not keep apart, or could not."""
-    assert system.separation is not None
-    who, value = _pairs([pair]), float(monitor.exit_value)
-    least = system.separation.distance
-    if monitor.exit == watch.STEP_TOO_SMALL:
-        return f"1/{PIECES} of the timestep is still too long to keep {who} apart {at}"
-    if value < least:
-        return f"the positions of {who} were {value:.6g} m apart {at}, less than {least:g} m"
-    return (
-        f"where {who} are, {value:.6g} m apart, and where they are going no line keeps {least:g} m"
-        f" between them {at}: their inputs were not those that keep them apart"
-    )
 
 
 def _worst_gap(system: System, monitor: Any) -> dict[str, Any] | None:

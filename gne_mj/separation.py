@@ -100,6 +100,20 @@ class Separation:
         return sorted((pair for pair in sizes if sizes[pair] > least), key=lambda p: -sizes[p])
 
 
+def nearest_distances(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, N) in m how far each agent is from the one nearest to it, of positions (T, m) in m.
+
+    Infinite of one agent alone; not a number where a position is none.
+    """
+    from scipy.spatial import cKDTree  # late: few runs need it
+
+    points = positions.reshape(len(positions), -1, 2)
+    found = np.full(points.shape[:2], np.nan)
+    for row in np.flatnonzero(np.all(np.isfinite(points), axis=(1, 2))):
+        found[row] = cKDTree(points[row]).query(points[row], k=2)[0][:, 1]
+    return found
+
+
 def _distances(
     position: NDArray[np.float64], output: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:

@@ -17,8 +17,9 @@ from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.loops.base import Samples
-from gne_mj.plants.agent_type import has_ode
+from gne_mj.plants.agent_type import followed_position, has_ode
 from gne_mj.quantity import Quantity
+from gne_mj.separation import nearest_distances
 from gne_mj.system.data import SystemData
 
 if TYPE_CHECKING:
@@ -332,6 +333,15 @@ def _is_faulty(system: SystemData) -> bool:
 
 
 # In the order of a dataset; a function yields what game, agent type or law declare of themselves
+def _nearest_distance(rows: Rows) -> Array:
+    return nearest_distances(rows.samples.state[:, :, followed_position(rows.system.agents.kind)])
+
+
+def _least_distances(system: SystemData) -> dict[str, Array]:
+    assert system.separation is not None
+    return {"nearest_distance_lower_bound": np.full(system.game.agents, system.separation.distance)}
+
+
 SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     Variable(
         "action", ("time", AXIS), lambda rows: rows.y,
@@ -369,6 +379,12 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     ),
     _states,
     _quantities,
+    Variable(
+        "nearest_distance", ("time", "agent"), _nearest_distance,
+        there=lambda system: system.separation is not None, unit="m",
+        long_name="distance of the nearest agent", symbol=r"\min_j |q_i - q_j|",
+        bounds=_least_distances, figure=True, page="line",
+    ),
     Variable(
         "constraint", ("time", "constraint"), lambda rows: rows.system.game.constraints(rows.y),
         long_name="constraint, negative inside the set", symbol="g_l",

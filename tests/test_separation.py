@@ -13,7 +13,7 @@ from plain_loops import parts_of
 from separation_reference import Swap, half_plane, nearest_point
 
 import gne_mj as gm
-from gne_mj import certificate
+from gne_mj import kept_apart
 from gne_mj.batches.plan import make_plan
 from gne_mj.batches.sweep import Sweep
 from gne_mj.environment import load_environment
@@ -242,7 +242,7 @@ def four(rng):
         "agents__main_mass": [1.0, 2.0, 0.7, 1.0],
         "initial": {"action": y.reshape(-1, 2).tolist(), "position": q.reshape(-1, 2).tolist()},
     }
-    return table, Swap(place.reshape(-1, 2), 5.0, 0.05, R, REACH, TURN)
+    return table, Swap(place.reshape(-1, 2), 4.0, 0.05, R, REACH, TURN)
 
 
 @pytest.mark.parametrize("engine", ["ode", "mujoco"])
@@ -347,7 +347,7 @@ def test_partial_information_keeps_apart_too():
 
 def test_agents_that_never_come_near_move_as_without_separation():
     away = {"game__desired_place": [[-2, 0], [0, 2], [2, 0]], "agents__count": 3}
-    start = {"initial__action": [[-4, 0], [0, 4], [4, 0]]}
+    start = {"initial__action": [[-3.5, 0], [0, 3.5], [3.5, 0]]}
     found = [
         run_loop(system_of(**away, **start, **more), 0.01, 200)[0]
         for more in ({"separation": None}, {})
@@ -487,7 +487,7 @@ def figures(name):
     run = gm.run(name)
     report, data = run.reports["robots"], run["robots"]
     least, most = (f(data["position"].values, axis=0).tolist() for f in (np.min, np.max))
-    return report, {
+    found = {
         "least_distance": report["separation"]["least_distance"],
         "most_pairs": report["separation"]["most_pairs"],
         "settling_time": report["settling_time"],
@@ -495,17 +495,20 @@ def figures(name):
         "most": most,
         "peak": report["actuators"]["peak"],
     }
+    return report, found, data
 
 
 @pytest.mark.parametrize("name", ["swap", "herd"])
 def test_shipped_scenarios(name):
-    report, found = figures(name)
+    report, found, data = figures(name)
     for key, value in json.loads(GOLDEN.read_text())[name].items():
         assert found[key] == pytest.approx(value, abs=1e-6), key
     assert report["status"] == "converged"
     assert report["contacts"]["count"] == 0
     assert report["separation"]["too_near"] == 0
     assert report["positions"]["outside"] == 0
+    assert np.min(data["nearest_distance"]) == pytest.approx(least_distance(data["state"].values))
+    assert np.all(data["nearest_distance_lower_bound"] == report["separation"]["distance"])
 
 
 def test_numbers_that_make_no_sense_are_refused():
@@ -516,4 +519,4 @@ def test_numbers_that_make_no_sense_are_refused():
 
 def test_sentences_name_the_first_pairs_and_count_the_rest():
     pairs = [(0, k) for k in range(1, 8)]
-    assert certificate._pairs(pairs).endswith("agents 1 and 6 and 2 pairs more")
+    assert kept_apart.pairs_text(pairs).endswith("agents 1 and 6 and 2 pairs more")
