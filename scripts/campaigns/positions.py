@@ -2,12 +2,13 @@
 
 Unequal robots start near bounds in position and output, their appendages flying off. Positions are
 looked at in the recorded states of every integration step, by formulas of this file. Half of the
-runs are in mode continuous, the others in mode implicit with one Euler step a period.
+runs are in mode continuous, the others in mode implicit with one Euler step a period. Robots of
+platoons collide, and those of a part of the formations, which keep apart.
 """
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,15 @@ from gne_mj.loops.division import PIECES
 from gne_mj.plants import position_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.run_metrics import EXITS
+from gne_mj.separation import Separation
 from gne_mj.system import Clock, System
 
 CLOSEST = 1e-6  # of the way to a bound
 SHORTEST = 1e-7  # s, of a step
 LENGTH = 0.54  # m, of a robot in the lane: what a platoon's spacings must exceed
-KINDS, MODES = ("platoon", "formation"), ("continuous", "implicit")
+DISTANCE, REACH = 0.6, 1.2  # m, of robots that keep apart
+TRIES = 40  # draws of a start at which they are so
+KINDS, MODES = ("platoon", "formation", "formation, apart"), ("continuous", "implicit")
 CRASHED, GIVEN_UP = "crashed", EXITS[watch.STEP_TOO_SMALL]
 
 
@@ -46,7 +50,7 @@ class Place:
 
 
 def main() -> int:
-    """Run, print the tables; 1 if a position was outside or robots of a platoon touched."""
+    """Run, print the tables; 1 if a position was outside, or robots that should not touched."""
     given = parser("scripts/check-positions", __doc__, 20_000).parse_args()
     return campaign(given, one, crashed, report, lambda row: bool(broken(row)))
 
@@ -139,6 +143,20 @@ def start(
     return np.column_stack([0.2 * hard * rng.uniform(-1.0, 1.0, m), y, w, q])
 
 
+def start_apart(
+    rng: np.random.Generator, place: Place, agents: Agents, margins: tuple[float, float]
+) -> np.ndarray | None:
+    """The same, so that no two are too near on their ways; None where none was drawn."""
+    rule, found = Separation(DISTANCE, REACH), None
+    for _ in range(TRIES):
+        state = start(rng, place, agents, margins)
+        q, y = state[:, position_robot.POSITION], state[:, position_robot.OUTPUT]
+        if rule.nearest(q, y)[2] > DISTANCE:
+            found = state
+            break
+    return found
+
+
 def step(rng: np.random.Generator, agents: Agents) -> float:
     """Some part of the shortest time constant of the robots by themselves, in s."""
     main, appendage, stiffness, atan, gamma, _, damping, _ = agents.parameters.T
@@ -157,10 +175,16 @@ def one(seed: int, index: int) -> dict[str, Any]:
     """Draw a system and run it: plain numbers and strings."""
     rng = np.random.default_rng([seed, index])
     kind, mode = KINDS[index % 2], MODES[index // 2 % 2]
-    place = {"platoon": platoon, "formation": formation}[kind](rng)
+    place = (platoon if kind == "platoon" else formation)(rng)
     agents = robots(rng, place.game, contacts=kind == "platoon")
     margins = tuple(float(log_uniform(rng, CLOSEST, 0.5)) for _ in range(2))
     state = start(rng, place, agents, margins)
+    separation = None
+    if kind == "formation" and index // 4 % 2:
+        drawn = start_apart(np.random.default_rng([seed, index, 1]), place, agents, margins)
+        if drawn is not None:
+            kind, state, separation = KINDS[2], drawn, Separation(DISTANCE, REACH)
+            agents = replace(agents, contacts=True)
     rho, continuous = float(log_uniform(rng, 3e-3, 1.0)), mode == "continuous"
     h, steps = step(rng, agents), int(rng.integers(100, 400 if continuous else 1200))
     if continuous:  # whose pieces of steps have an end, and the barrier is stiff near a bound
@@ -168,7 +192,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
         h = min(h, max(stiff_step(agents, rho, nearest), SHORTEST))
     system = System(
         "robots", place.game, agents, FullInformation(), rho, state, mode=mode, engine="mujoco",
-        integrator="rk4" if continuous else "euler",
+        integrator="rk4" if continuous else "euler", separation=separation,
     )  # fmt: skip
     loop = system.closed_loop(Clock(h * steps, h, h, h))
     recorded = loop.advance(steps, 1)
