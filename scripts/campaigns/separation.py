@@ -7,7 +7,7 @@ integration step, by a formula of this file. What did not arrive must be told as
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -249,10 +249,9 @@ def search(seed: int, rounds: int) -> int:
             for points in (best.start, best.place)
         )
         gaps = [least_distance(points.reshape(1, -1)) for points in (start, place)]
-        if number and not (gaps[0] > 1.05 * DISTANCE and gaps[1] > best.reach):
+        if not (gaps[0] > 1.05 * DISTANCE and gaps[1] > best.reach):
             continue
-        changed = (start, place) if number else (best.start, best.place)
-        draw = Draw(best.kind, *changed, best.velocity, best.masses, best.reach, False)
+        draw = replace(best, start=start, place=place, continuous=False)
         row = run(draw)
         if row["status"] != "inside" or row["too_near"] or row["contacts"]:
             print(f"broken: {row} {draw}")
