@@ -6,7 +6,9 @@ are given again, and by this that is seen.
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
+from dis import get_instructions
 from functools import partial
 from secrets import token_hex
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -15,6 +17,7 @@ from typing import Any
 import numpy as np
 
 _DIGITS = 8
+_OUTSIDE = ("LOAD_GLOBAL", "LOAD_NAME")
 
 
 def fingerprint(*things: Any) -> str:
@@ -68,13 +71,14 @@ def _of_function(function: FunctionType, known: set[int]) -> Iterator[bytes]:
     code = function.__code__
     yield from _parts((code, function.__defaults__, function.__kwdefaults__), known)
     for cell in function.__closure__ or ():
-        yield from _parts(cell.cell_contents, known)
+        with suppress(ValueError):  # one that has nothing in it yet
+            yield from _parts(cell.cell_contents, known)
     for name in sorted(_names(code)):
         if name in function.__globals__:
             yield from _parts((name, function.__globals__[name]), known)
 
 
 def _names(code: CodeType) -> set[str]:
-    """The names that a function, and what is defined in it, may look for outside."""
-    inner = [_names(each) for each in code.co_consts if isinstance(each, CodeType)]
-    return set(code.co_names).union(*inner)
+    """The names that a function, and what is defined in it, look for outside."""
+    own = {each.argval for each in get_instructions(code) if each.opname in _OUTSIDE}
+    return own.union(*(_names(each) for each in code.co_consts if isinstance(each, CodeType)))

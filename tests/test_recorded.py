@@ -123,6 +123,27 @@ def test_functions_are_known_by_their_code_and_what_they_read():
     assert fingerprint(gm.ring(3)) == fingerprint(gm.ring(3))
 
 
+mean = object()  # which the function below does not read: it has an attribute of that name
+SCALE = 2.0
+
+
+def _with_names(x):
+    return SCALE * x.mean()
+
+
+def test_attributes_are_no_globals_and_cells_may_be_empty():
+    def made():
+        def inner(x):
+            return x + later
+
+        found = fingerprint(inner)
+        later = 1.0
+        return found, later
+
+    assert made()[0] == made()[0]
+    assert fingerprint(_with_names) == fingerprint(_with_names)
+
+
 def test_of_what_nothing_is_known_nothing_is_the_same():
     endless = []
     endless.append(endless)
