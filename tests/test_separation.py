@@ -448,7 +448,8 @@ def test_certificates_promise_safety_and_no_arrival():
     assert not found.lyapunov_claimed
     assert "separation" in str(found)
     found = certify(system_of(**MODES["continuous"]), ticks)
-    assert f"{kept} in continuous time" in found.guaranteed
+    whole = "in continuous time every shared constraint holds for all time"
+    assert found.guaranteed == [whole, f"{kept} in continuous time"]
     assert not found.lyapunov_claimed
     assert not any("tends to" in text for text in found.guaranteed)
     for changes in ({"agents__local_damping": 0.1, **MODES["continuous"]}, MODES["euler"],

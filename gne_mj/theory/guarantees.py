@@ -122,11 +122,11 @@ def certify(system: System, clock: Clock) -> Guarantees:
         positions=None if positions is None else positions.report(),
         separation=None if apart is None else apart.report(),
         lyapunov_claimed=theorem.lyapunov,
-        guaranteed=[
-            *verdict.guaranteed(theorem, held),
-            *([] if positions is None else positions.guaranteed(theorem, held)),
-            *([] if apart is None else apart.guaranteed()),
-        ],
+        guaranteed=verdict.together(
+            verdict.guaranteed(theorem, held),
+            [] if positions is None else positions.guaranteed(theorem, held),
+            [] if apart is None else apart.guaranteed(),
+        ),
         measured=verdict.measured(theorem, pieces),
         not_certified=[
             *verdict.not_certified(theorem, held, pieces),

@@ -54,14 +54,15 @@ class KeptApart:
         """That they keep it, where it is certain."""
         if self.obstacles:
             return []
-        when = (
-            "in continuous time"
-            if self.held is None
-            else "at every integration step, each of which ends a control period, unless its input"
-            " was not found accurately"
-        )
+        kept = f"the positions of any two agents are at least {self.rule.distance:g} m apart"
+        if self.held is None:  # between two renewals half-planes are shared constraints
+            return [
+                "in continuous time every shared constraint holds for all time",
+                f"{kept} in continuous time",
+            ]
         return [
-            f"the positions of any two agents are at least {self.rule.distance:g} m apart {when}"
+            f"{kept} at every integration step, each of which ends a control period, unless its"
+            " input was not found accurately"
         ]
 
     def not_certified(self) -> list[str]:

@@ -7,6 +7,8 @@ from gne_mj.theory.pieces import Pieces
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
+NOTHING = "nothing"
+
 
 def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]:
     """What the theorem gives."""
@@ -40,7 +42,13 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
             "nothing of this run; the same law in continuous time is covered by the theorem"
             f"{as_long}"
         ]
-    return ["nothing"]
+    return [NOTHING]
+
+
+def together(*found: list[str]) -> list[str]:
+    """All sentences of what is guaranteed; that it is nothing only where there is no other."""
+    sentences = [each for some in found for each in some]
+    return [each for each in sentences if each != NOTHING] or [NOTHING]
 
 
 def _limit(theorem: Theorem) -> str:
