@@ -10,6 +10,7 @@ import fleet
 import peer_cbfpy
 import peer_diffrax
 import peer_mjx
+import positions
 import solver
 import twin
 import view
@@ -24,7 +25,7 @@ def main() -> None:
     if options.out and options.out.exists():
         parser.error(f"--out: {options.out} exists already; name another file")
     rows: list[dict[str, str]] = []
-    for group in (batch, fleet, solver, twin, view, peer_mjx, peer_diffrax, peer_cbfpy):
+    for group in (batch, fleet, positions, solver, twin, view, peer_mjx, peer_diffrax, peer_cbfpy):
         rows.extend(group.rows(options.runs))
         if options.out:  # after each group, so that an interruption keeps what was measured
             options.out.write_text(table(rows, options.runs), encoding="utf-8")
