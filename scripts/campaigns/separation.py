@@ -44,6 +44,7 @@ class Draw:
         masses: (N, 2) of main masses and appendages, in kg.
         reach: of the separation, in m.
         continuous: whether in mode continuous.
+        period: control period in s, one Euler step, where it is not.
     """
 
     kind: str
@@ -53,17 +54,23 @@ class Draw:
     masses: np.ndarray
     reach: float
     continuous: bool
+    period: float = 0.01
 
 
 def main() -> int:
     """Run, print the tables; 1 if robots were too near or touched, or a deadlock was not told."""
     options = parser("scripts/check-separation", __doc__, 2200)
     options.add_argument("--search", type=int, help="rounds of a search for a slowest swap of 8")
+    options.add_argument(
+        "--hard", action="store_true",
+        help="mode implicit only: periods of up to 0.1 s, harder kicks, two robots just apart",
+    )  # fmt: skip
     given = options.parse_args()
     if given.search:
         return search(given.seed, given.search)
+    runs = hard_one if given.hard else one
     return campaign(
-        given, one, crashed, report, lambda row: bool(broken(row)) or not row["arrived"]
+        given, runs, crashed, report, lambda row: bool(broken(row)) or not row["arrived"]
     )
 
 
@@ -107,6 +114,20 @@ def drawn(seed: int, index: int) -> Draw:
     return Draw(kind, place, start, velocity, masses, reach, index % 5 == 4)
 
 
+def hardened(draw: Draw, rng: np.random.Generator) -> Draw:
+    """Two robots begin a millionth more than the distance apart; a long period, hard kicks."""
+    start = draw.start.copy()
+    i = int(rng.integers(len(start) - 1))
+    j = i + 1  # linked with it in the herd
+    way = start[j] - start[i]
+    start[j] = start[i] + (1.0 + 1e-6) * DISTANCE * way / np.hypot(*way)
+    if least_distance(start.reshape(1, -1)) <= DISTANCE:  # on top of a third one
+        start = draw.start
+    kick = draw.velocity * rng.choice([1.0, 10.0])
+    period = float(rng.choice([0.02, 0.05, 0.1]))
+    return replace(draw, start=start, velocity=kick, continuous=False, period=period)
+
+
 def turned_herd(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Places of the shipped herd, and where it begins: turned and moved."""
     place = np.array(herd_table().desired_place)
@@ -146,9 +167,9 @@ def system_of(draw: Draw) -> System:
                 separation=Separation(DISTANCE, draw.reach),
             )  # fmt: skip
         except InfeasibleStart:
-            velocity = 0.5 * velocity
-            if np.max(np.abs(velocity)) < 1e-6:
+            if not np.any(velocity):
                 raise
+            velocity = 0.5 * velocity * (np.abs(velocity) > 1e-6)
 
 
 def least_distance(q: np.ndarray) -> float:
@@ -161,7 +182,7 @@ def least_distance(q: np.ndarray) -> float:
 def run(draw: Draw) -> dict[str, Any]:
     """Plain numbers and strings of a run, until robots have arrived for 5 s or time is up."""
     system = system_of(draw)
-    h = 0.005 if draw.continuous else 0.01
+    h = 0.005 if draw.continuous else draw.period
     loop, piece = system.closed_loop(Clock(LONGEST, h, h, h)), round(5.0 / h)
     least, late, monitor = np.inf, 0.0, loop.monitor
     while loop.time < LONGEST - 1e-9 and monitor.exit == watch.INSIDE:
@@ -184,14 +205,23 @@ def run(draw: Draw) -> dict[str, Any]:
 
 def told(draw: Draw) -> str:
     """What a whole run that does not arrive says of itself."""
-    h = 0.005 if draw.continuous else 0.01
+    h = 0.005 if draw.continuous else draw.period
     found = Simulation([system_of(draw)], Clock(LONGEST, h, h, 0.05), tolerance=ARRIVED).run()
     return str(found.reports["robots"]["message"])
 
 
 def one(seed: int, index: int) -> dict[str, Any]:
     """Draw a system and run it."""
-    draw = drawn(seed, index)
+    return judged(index, drawn(seed, index))
+
+
+def hard_one(seed: int, index: int) -> dict[str, Any]:
+    """The same, made harder."""
+    return judged(index, hardened(drawn(seed, index), np.random.default_rng([seed, index, 1])))
+
+
+def judged(index: int, draw: Draw) -> dict[str, Any]:
+    """A run's row, with what it says of itself if it does not arrive."""
     row = {"index": index, **run(draw)}
     if row["status"] == "inside" and not row["arrived"]:
         row["message"] = told(draw)
