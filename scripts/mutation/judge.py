@@ -190,23 +190,22 @@ def _stages(
 
     First those that are known to execute the mutant's function; then those of near files, since a
     cache may hide others, and those that start processes, of which nothing is known. Of machine
-    code nothing is known: all others.
+    code nothing is known: all others. What runs as machine code is tried as plain Python where that
+    is soon done, since then nothing is compiled.
     """
     rank, compiled, done = _Rank(mutant, tree), known["compiled"], set()
-
-    def executing(baseline: Baseline) -> Iterator[list[str]]:
-        own = baseline.executing.get(mutant.file, {}).get(mutant.function, [])
-        return filter(None, rank.nearest_first(own, baseline.seconds))
-
-    if mutant.native:
-        for tests in executing(known["plain"]):
-            yield True, tests
-        if mutant.function:  # where they can execute it they have, as plain Python
-            done = set(known["plain"].seconds)
-    else:
-        for tests in executing(compiled):
-            yield False, tests
-            done |= set(tests)
+    baseline = known["plain"] if mutant.native else compiled
+    own = baseline.executing.get(mutant.file, {}).get(mutant.function, [])
+    first, others = rank.nearest_first(own, baseline.seconds)
+    if first:
+        yield mutant.native, first
+    others = [test for test in others if test in compiled.seconds]
+    if others:
+        yield False, others
+    if not mutant.native:
+        done = set(own)
+    elif mutant.function:  # where they can execute it they have
+        done = set(baseline.seconds)
     left = {test: seconds for test, seconds in compiled.seconds.items() if test not in done}
     near, others = rank.stages(left)
     if done and not mutant.native:
