@@ -15,8 +15,14 @@ Pairs = list[tuple[int, int]]
 MOST_NAMED = 5
 
 
-def report(system: System, monitor: Any, holding: list[tuple[int, int]]) -> dict[str, Any] | None:
-    """How far apart agents that keep apart were, at every integration step."""
+def report(system: System, monitor: Any, pairs: Pairs) -> dict[str, Any] | None:
+    """How far apart agents that keep apart were, at every integration step; None of others.
+
+    Args:
+        system: that was run.
+        monitor: of its loop.
+        pairs: of agents, from 0, that hold each other at its end.
+    """
     if system.separation is None or not monitor.apart:
         return None
     near = bool(np.isfinite(monitor.least_distance))
@@ -31,7 +37,7 @@ def report(system: System, monitor: Any, holding: list[tuple[int, int]]) -> dict
         else None,
         "time": float(monitor.least_distance_time) if near else None,
         "most_pairs": int(monitor.most_pairs),
-        "held_by": [[i + 1, j + 1] for i, j in holding],
+        "held_by": [[i + 1, j + 1] for i, j in pairs],
     }
 
 
@@ -67,7 +73,7 @@ def held_text(pairs: Pairs) -> str:
     return f"; at rest, away from equilibrium: held by the separation of {pairs_text(pairs)}"
 
 
-def pairs_text(pairs: list[tuple[int, int]]) -> str:
+def pairs_text(pairs: Pairs) -> str:
     """In words; those behind the first few are counted."""
     shown = [f"agents {i + 1} and {j + 1}" for i, j in pairs[:MOST_NAMED]]
     more = len(pairs) - len(shown)

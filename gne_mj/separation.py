@@ -5,6 +5,7 @@ That is not convex, and no constraint of a game. It is kept by half-planes that 
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from pydantic import Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.loops.separation import Rule, half_plane, push
-from gne_mj.toml_table import Table
+from gne_mj.toml_table import Table, Unit
 
 REACH, TURN = 2.5, 0.5  # where they are left out: in distances, and in rad
 MOST_TURN = 1.5
@@ -129,15 +130,17 @@ def _distances(
 class SeparationTable(Table):
     """Agents in the plane keep at least a distance from each other."""
 
-    distance: float = Field(gt=0, description="r in m, between the positions of any two agents")
-    reach: float | None = Field(
+    distance: Annotated[float, Unit("m")] = Field(
+        gt=0, description="r, between the positions of any two agents"
+    )
+    reach: Annotated[float | None, Unit("m", "> distance")] = Field(
         None,
         gt=0,
-        description="m, more than the distance, of which it is 2.5 times if left out: pairs that"
-        " are farther apart on their ways are not looked at",
+        description="pairs that are farther apart on their ways are not looked at; 2.5 distances if"
+        " left out",
     )
-    turn: float = Field(
-        TURN, ge=0, le=MOST_TURN, description="rad, how far half-planes turn, so that agents pass"
+    turn: Annotated[float, Unit("rad")] = Field(
+        TURN, ge=0, le=MOST_TURN, description="how far half-planes turn, so that agents pass"
     )
 
     def build(self) -> Separation:

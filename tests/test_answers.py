@@ -2,8 +2,8 @@
 
 import inspect
 
-import numpy as np
 import pytest
+from expression_games import energy
 
 import gne_mj as gm
 from gne_mj.errors import InvalidInput, UserCodeError
@@ -11,22 +11,7 @@ from gne_mj.errors import InvalidInput, UserCodeError
 SHORT = {"duration": 0.2, "timestep": 0.01}
 
 
-def cost(i, y, p):
-    return 0.5 * (y[i] - p.wanted[i]) ** 2 + p.price * y[i] * y.mean()
-
-
-def constraints(y, p):
-    yield "energy", (y**2).sum() <= p.budget
-    for i in range(len(y)):
-        yield f"gap {i + 1}", abs(y[i] - y[i - 1]) <= p.gap
-
-
-def energy(count):
-    wanted = np.linspace(1.0, 3.0, count)
-    return gm.game(count, cost, constraints, wanted=wanted, price=0.2, budget=2.0 * count, gap=2.0)
-
-
-GAME = energy(6)
+GAME, _ = energy(6)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +65,7 @@ def test_a_parameter_that_a_law_does_not_take_is_told_with_those_that_it_does():
 
 
 def test_figures_say_of_what_a_bound_is_and_give_agents_colours_of_their_own():
-    figures = gm.run(energy(12), **SHORT).plot()
+    figures = gm.run(energy(12)[0], **SHORT).plot()
     for name, words in (("energy-value", "bound of energy"), ("gap-values", "bound of\neach gap")):
         (axes,) = figures[f"players-{name}"].axes
         assert axes.get_legend_handles_labels()[1][-1] == words

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from expression_games import energy
 
 import gne_mj as gm
 from gne_mj import python_objects
@@ -19,20 +20,8 @@ from gne_mj.viewer.shown_system import ShownSystem
 SHORT = {"duration": 0.1, "timestep": 0.01}
 
 
-def cost(i, y, p):
-    return 0.5 * (y[i] - p.wanted[i]) ** 2 + p.price * y[i] * y.mean()
-
-
-def constraints(y, p):
-    yield "energy", (y**2).sum() <= p.budget
-    for i in range(len(y)):
-        yield f"gap {i + 1}", abs(y[i] - y[i - 1]) <= p.gap
-
-
-def energy():
-    return gm.game(
-        4, cost, constraints, wanted=[1.0, 1.4, 1.8, 2.2], price=0.2, budget=9.0, gap=2.0
-    )
+def own_game():
+    return energy(4)[0]
 
 
 def action(agent):
@@ -49,7 +38,7 @@ def another_process(monkeypatch):
     "law", [None, gm.partial_information(gm.star(4)), gm.own_law(action, graph="ring")]
 )
 def test_a_run_of_functions_is_shown_where_they_are_not(law, tmp_path, another_process):
-    run = gm.run(energy(), agents=gm.flexible_robots(4), law=law, **SHORT)
+    run = gm.run(own_game(), agents=gm.flexible_robots(4), law=law, **SHORT)
     before = replay_pack(run)
     run.save(tmp_path / "run.zarr")
     another_process()
@@ -72,7 +61,7 @@ def test_a_replay_says_of_a_system_what_the_system_does():
 
 
 def test_results_that_do_not_say_enough_are_refused():
-    old = gm.Trajectory(gm.run(energy(), **SHORT).tree.copy(deep=True))
+    old = gm.Trajectory(gm.run(own_game(), **SHORT).tree.copy(deep=True))
     del old.tree["players"].attrs["structure"]
     with pytest.raises(InvalidInput, match="an older version"):
         replay_pack(old)
@@ -94,9 +83,9 @@ def test_a_batch_of_functions_goes_on_where_they_are_given_again(tmp_path, anoth
     how = {"sweep": {"game.parameters.budget": [8.0, 9.0]}, "runs": 4, "out": tmp_path / "batch",
            "changes": {"simulation.duration": 0.05}, "chunk": 1}  # fmt: skip
     with pytest.raises(_Enough):
-        gm.batch(energy(), progress=_until(3), **how)
+        gm.batch(own_game(), progress=_until(3), **how)
     another_process()
-    runs = gm.batch(energy(), resume=True, **how)
+    runs = gm.batch(own_game(), resume=True, **how)
     assert runs.sizes["run"] == 8
     assert not np.any(np.isnan(runs["least_margin"]))
 
