@@ -382,7 +382,7 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     Variable(
         "nearest_distance", ("time", "agent"), _nearest_distance,
         there=lambda system: system.separation is not None, unit="m",
-        long_name="distance of the nearest agent", symbol=r"\min_j |q_i - q_j|",
+        long_name="nearest distance", symbol="d_i",
         bounds=_least_distances, figure=True, page="line",
     ),
     Variable(
