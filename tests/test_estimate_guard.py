@@ -19,7 +19,7 @@ from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.scenario_tables import Scenario
-from gne_mj.scenario_tables.scenario import SimulationTable
+from gne_mj.scenario_tables.clock import SimulationTable
 from gne_mj.simulation import Simulation
 from gne_mj.system import System
 from gne_mj.system.steps import STABLE, largest_step

@@ -10,7 +10,7 @@ from gne_mj.errors import InvalidInput, named
 from gne_mj.interface.running import Run
 from gne_mj.progress import if_asked
 from gne_mj.scenario import Scenario, Source, load_scenario
-from gne_mj.scenario_tables.scenario import RecordingTable, SimulationTable
+from gne_mj.scenario_tables.clock import RecordingTable, SimulationTable
 from gne_mj.solutions import Solution, solve_system
 from gne_mj.system import Clock, System
 from gne_mj.theory import certify as examine

@@ -4,7 +4,8 @@ Each table has the fields that a user may set, with their units, and a ``build``
 object they describe.
 """
 
-from gne_mj.scenario_tables.scenario import Scenario, SystemTable
+from gne_mj.scenario_tables.scenario import Scenario
+from gne_mj.scenario_tables.system import SystemTable
 from gne_mj.toml_table import union_tags
 
 __all__ = ["Scenario", "SystemTable", "union_tags"]

@@ -15,7 +15,8 @@ from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.loops.base import Present
 from gne_mj.python_objects import PythonGame, keep
-from gne_mj.scenario_tables.scenario import Scenario, SystemTable
+from gne_mj.scenario_tables.scenario import Scenario
+from gne_mj.scenario_tables.system import SystemTable
 from gne_mj.system import System
 from gne_mj.toml_table import Table, union_tags
 
