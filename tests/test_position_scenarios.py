@@ -141,7 +141,7 @@ def test_certificates_say_what_is_promised_of_positions_and_what_is_missing():
         found = certify(weak, one)
         assert found.status == "not certified"
         assert any(
-            f"{damping:g} N s/m of channel 1 must exceed" in text and "= 5 N s/m" in text
+            f"{damping:g} N s/m of agent 1 must exceed" in text and "= 5 N s/m" in text
             for text in found.not_certified
         )
         assert not any("positions" in text for text in found.guaranteed)

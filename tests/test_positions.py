@@ -113,7 +113,9 @@ def test_the_default_damping_and_what_certificates_know_of_it():
         assert bool(position_robot.why_not_passive(table)) is not met
     table = position_robots(UNEQUAL, TAU).parameters.copy()
     table[3, 6] = 0.25
-    assert position_robot.why_not_passive(table).startswith("local_damping 0.25 N s/m of channel 4")
+    for dimension, agent in ((1, 4), (2, 2)):
+        told = position_robot.why_not_passive(table, dimension)
+        assert told.startswith(f"local_damping 0.25 N s/m of agent {agent} must exceed")
 
 
 @pytest.mark.parametrize(("share", "status"), [(1.0, NO_VIOLATION), (0.3, VIOLATED)])

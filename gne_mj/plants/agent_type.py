@@ -131,9 +131,14 @@ def is_passive(kind: ModuleType, parameters: NDArray[np.float64]) -> bool:
     return bool(getattr(kind, "is_passive", lambda _: False)(parameters))
 
 
-def why_not_passive(kind: ModuleType, parameters: NDArray[np.float64]) -> str:
-    """What is missing for that, in words; empty where the type tells no more."""
-    return str(getattr(kind, "why_not_passive", lambda _: "")(parameters))
+def why_not_passive(kind: ModuleType, parameters: NDArray[np.float64], dimension: int) -> str:
+    """What is missing for that, in words; empty where the type tells no more.
+
+    Args:
+        kind, parameters: of the channels.
+        dimension: channels of each agent.
+    """
+    return str(getattr(kind, "why_not_passive", lambda *_: "")(parameters, dimension))
 
 
 def energy_balance(

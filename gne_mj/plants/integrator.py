@@ -11,7 +11,7 @@ place, at which agents start apart), POSITION (the state that is a position whic
 output, :mod:`gne_mj.plants.lookahead`), DERIVED (what follows from its states, as triples of name,
 unit and function), POSITIONS (which states an Euler step moves by the new values of the others)
 with ``physical`` where that is so in other coordinates, ``start`` (the states at the start, of what
-is given) and ``why_not_passive`` (in words).
+is given) and ``why_not_passive`` (in words, of agents with so many channels).
 """
 
 import sys

@@ -62,8 +62,13 @@ def is_passive(parameters: Array) -> bool:
     )
 
 
-def why_not_passive(parameters: Array) -> str:
-    """What is missing, in words; empty if nothing is."""
+def why_not_passive(parameters: Array, dimension: int = 1) -> str:
+    """What is missing, in words; empty if nothing is.
+
+    Args:
+        parameters: (m, ...) of the channels.
+        dimension: channels of each agent.
+    """
     if not flexible_robot.is_passive(parameters[:, :5]):
         return "a spring is not strongly monotone or has no damper"
     short = parameters[:, 6] - least_damping(parameters)
@@ -71,8 +76,8 @@ def why_not_passive(parameters: Array) -> str:
     if short[worst] > 0:
         return ""
     return (
-        f"local_damping {parameters[worst, 6]:.6g} N s/m of channel {worst + 1} must exceed"
-        f" (M + m)/tau + m^2/(4 tau^2 gamma) = {least_damping(parameters)[worst]:.6g} N s/m"
+        f"local_damping {parameters[worst, 6]:.6g} N s/m of agent {worst // dimension + 1} must"
+        f" exceed (M + m)/tau + m^2/(4 tau^2 gamma) = {least_damping(parameters)[worst]:.6g} N s/m"
     )
 
 

@@ -87,7 +87,7 @@ def plants(system: System) -> Assumption:
     names = ", ".join(f"{kind.NAME}s" for kind, _ in kinds)
     if all(is_passive(kind, rows) for kind, rows in kinds):
         return Assumption(label, MET, f"{names} with these parameters are passive")
-    missing = [why_not_passive(kind, rows) for kind, rows in kinds]
+    missing = [why_not_passive(kind, rows, system.agents.dimension) for kind, rows in kinds]
     if any(missing):
         return Assumption(label, FAILS, "; ".join(filter(None, missing)))
     if all(energy_balance(kind, rows) is not None for kind, rows in kinds):
