@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import run_metrics, variables
+from gne_mj import kept_apart, run_metrics, variables
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import followed_position
@@ -176,8 +176,12 @@ def _least_distance(runs: Runs) -> Array:
 
 
 def _held(runs: Runs) -> Array:
-    still = run_metrics.at_rest(runs.time, runs.y, runs.duration, runs.tolerance)
-    return (still & (_status(runs) == "completed")).astype(float)
+    """As a run's own report judges: it rests, and there are pairs that hold it."""
+    holding = [
+        kept_apart.holding(runs.system, runs.time, y, (status, runs.duration, runs.tolerance))
+        for y, status in zip(runs.y, _status(runs), strict=True)
+    ]
+    return np.array([float(bool(pairs)) for pairs in holding])
 
 
 def _of_monitor(name: str, entry: str, **about: Any) -> Variable:

@@ -396,6 +396,21 @@ def test_a_deadlock_is_told_with_the_pair_that_holds():
     )
 
 
+@pytest.mark.parametrize("held", [False, True])
+def test_agents_that_something_else_holds_are_not_told_as_held(held):
+    """Robots far from each other, one of which is pushed off its place all the time; a deadlock."""
+    place, push = (2, {}) if held else (-2, {"type": "push", "agents": [1], "force": 0.5})
+    scenario = swap(
+        agents__count=2, game__desired_place=[[place, 0], [-place, 0]], separation__turn=0.0,
+        initial__action=[[-2, 0], [2, 0]], agents__appendage_mass=0.1,
+        faults=[push] if push else [],
+    )  # fmt: skip
+    run = scenario.simulation_object().run()
+    assert run.status == "completed"
+    assert bool(run.reports["robots"]["separation"]["held_by"]) is held
+    assert all_chunks(make_plan(scenario, starts=0), 1)["held"][1].tolist() == [float(held)]
+
+
 PARTIAL = {"information": "partial", "graph": "ring", "mode": "implicit"}
 
 
