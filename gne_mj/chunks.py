@@ -6,9 +6,10 @@ written twice by Zarr, in each array's folder and consolidated, and must agree. 
 without checksums are read as they are.
 """
 
+import asyncio
 import json
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,11 +35,27 @@ def encodings(dataset: "xarray.Dataset") -> dict[str, dict[str, Any]]:
     return {str(name): {"compressors": compressor()} for name in dataset.variables}
 
 
-def every_chunk() -> AbstractContextManager[Any]:
-    """Within this every chunk is written, and none left out for holding nothing but its fill."""
-    import zarr
+@contextmanager
+def every_chunk() -> Iterator[None]:
+    """Within this every chunk is written, and none left out for holding nothing but its fill.
 
-    return zarr.config.set({"array.write_empty_chunks": True})
+    Zarr writes files beside each other, and one that fails does not stop the others. They have
+    ended when this does, so that whoever removes the folder then has removed all.
+    """
+    import zarr
+    from zarr.core.sync import sync
+
+    with zarr.config.set({"array.write_empty_chunks": True}):
+        try:
+            yield
+        except BaseException:
+            sync(_others_end())
+            raise
+
+
+async def _others_end() -> None:
+    others = asyncio.all_tasks() - {asyncio.current_task()}
+    await asyncio.gather(*others, return_exceptions=True)
 
 
 def disagreement(store: Path) -> str | None:

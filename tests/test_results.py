@@ -1,13 +1,17 @@
 """Result folders: nothing that exists is replaced; full disks, full pipes and signals."""
 
+import errno
+import itertools
 import json
 import os
 import resource
 import signal
 import subprocess
+import time
 from contextlib import contextmanager
 
 import pytest
+import zarr
 from batch_plans import ODE, contents, small
 from commands import COMMAND, environment, gne_here
 
@@ -191,6 +195,23 @@ def test_a_trajectory_that_does_not_fit_leaves_nothing(run_folder, tmp_path):
     trajectory = gne_mj.Trajectory.load(run_folder / "trajectory.zarr")
     with small_disk(100), pytest.raises(StorageError, match="File too large"):
         trajectory.save(tmp_path / "again")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_writes_that_go_on_beside_one_that_fails_leave_nothing(run_folder, tmp_path, monkeypatch):
+    trajectory = gne_mj.Trajectory.load(run_folder / "trajectory.zarr")
+    put, calls = zarr.storage._local._put, itertools.count()
+
+    def slow(path, *arguments, **options):
+        if next(calls) == 20:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        time.sleep(0.02)
+        return put(path, *arguments, **options)
+
+    monkeypatch.setattr(zarr.storage._local, "_put", slow)
+    with pytest.raises(StorageError, match="No space left"):
+        trajectory.save(tmp_path / "again")
+    time.sleep(0.5)
     assert list(tmp_path.iterdir()) == []
 
 
