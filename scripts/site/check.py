@@ -1,0 +1,52 @@
+"""What must hold of the built site: python scripts/site/check.py build/site"""
+
+import re
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+
+# Attributes by which a page asks for something when it is opened; a link only leads somewhere.
+_RESOURCES = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src",
+              "video": "src", "audio": "src", "object": "data", "embed": "src"}  # fmt: skip
+_NO_RESOURCE = {"canonical", "prev", "next"}  # of a <link>
+
+
+class _Page(HTMLParser):
+    """What a page asks for."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.asked: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if tag != "link" or given.get("rel") not in _NO_RESOURCE:
+            self.asked += [given.get(_RESOURCES.get(tag, "")) or ""]
+        self.asked += re.findall(r"url\(([^)]*)\)", given.get("style") or "")
+
+
+def wrong(site: Path) -> Iterator[str]:
+    """What is wrong with the site, in sentences."""
+    pages = sorted(site.rglob("*.html"))
+    if len(pages) < 20:
+        yield f"{site} has {len(pages)} pages"
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        name = page.relative_to(site)
+        for asked in _Page(text).asked:
+            if re.match(r"[\"']?(\w+:)?//", asked):
+                yield f"{name} asks another host: {asked}"
+        if 'class="arithmatex"' in text:
+            yield f"{name} has a formula that was not drawn"
+    for style in site.rglob("*.css"):
+        for asked in re.findall(r"url\(([^)]*)\)|@import", style.read_text(encoding="utf-8")):
+            if re.match(r"[\"']?(\w+:)?//", asked):
+                yield f"{style.relative_to(site)} asks another host: {asked}"
+
+
+if __name__ == "__main__":
+    found = list(wrong(Path(sys.argv[1])))
+    print("\n".join(found), file=sys.stderr)
+    sys.exit(bool(found))
