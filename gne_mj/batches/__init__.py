@@ -11,6 +11,7 @@ from gne_mj.batches.cluster import connected
 from gne_mj.batches.execute import ahead, execute
 from gne_mj.batches.plan import Plan, make_plan, parse_record
 from gne_mj.batches.progress import Progress, of_runs
+from gne_mj.batches.shard import Shard, parse_shard
 from gne_mj.batches.store import Store
 from gne_mj.batches.sweep import Sweep, parse_sweep
 from gne_mj.errors import named
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Plan",
     "Progress",
+    "Shard",
     "Store",
     "Sweep",
     "ahead",
@@ -31,6 +33,7 @@ __all__ = [
     "of_runs",
     "open_batch",
     "parse_record",
+    "parse_shard",
     "parse_sweep",
     "run_batch",
 ]

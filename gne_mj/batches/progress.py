@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.batches.shard import Shard
 from gne_mj.batches.store import Store
 from gne_mj.progress import Tell, say
 from gne_mj.run_metrics import SUCCESSES
@@ -17,7 +18,7 @@ class Progress:
 
     Attributes:
         done: runs that are stored.
-        total: of the batch.
+        total: of the batch, or of a shard of it.
         ended_early: of those done, how many did not run to their end inside their set.
         workers: that a cluster has; None without one.
     """
@@ -33,10 +34,12 @@ class Progress:
         return self.done == self.total
 
     @classmethod
-    def of(cls, store: Store) -> "Progress":
-        """Of what is stored."""
+    def of(cls, store: Store, shard: Shard | None = None) -> "Progress":
+        """Of what is stored; of a shard of it, if one is given."""
         statuses = store.statuses()
-        return cls(int(np.sum(statuses != "")), store.plan.runs, count_early(statuses))
+        if shard is not None:
+            statuses = statuses[shard.runs(store.plan)]
+        return cls(int(np.sum(statuses != "")), len(statuses), count_early(statuses))
 
 
 def count_early(statuses: NDArray[np.str_]) -> int:

@@ -102,22 +102,44 @@ class Store:
         """
         return cls.resume(folder, cls.open(folder).plan)
 
+    @classmethod
+    def begun(cls, folder: Path, plan: Plan) -> "Store":
+        """The store of a plan that several processes begin at once: the first one makes it.
+
+        Raises:
+            InvalidInput, StorageError: as of :meth:`create` and :meth:`resume`.
+        """
+        if not folder.exists():
+            try:
+                return cls.create(folder, plan)
+            except InvalidInput:
+                if not (folder / MANIFEST).exists():  # else another one was first
+                    raise
+        return cls.resume(folder, plan)
+
     @contextmanager
-    def locked(self) -> Iterator[None]:
+    def locked(self, alone: bool = True) -> Iterator[None]:
         """Keep other processes of this machine from writing; ends with the process at the latest.
 
         What a killed process was just writing is removed, since nothing refers to it.
+
+        Args:
+            alone: False lets others write that are not alone either, each its own chunks; what is
+                half-written may then be theirs, and stays.
 
         Raises:
             InvalidInput: another one is writing.
         """
         with (self.folder / MANIFEST).open(encoding="utf-8") as file:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(file, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InvalidInput(
                     "folder", str(self.folder), "another process is running this batch right now"
                 ) from None
+            if not alone:
+                yield
+                return
             self._tidy()
             try:
                 yield

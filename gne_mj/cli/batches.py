@@ -23,7 +23,7 @@ from gne_mj.cli.signals import stopping
 from gne_mj.progress import PREPARING, telling
 
 if TYPE_CHECKING:
-    from gne_mj.batches import Plan, Progress, Store, Sweep
+    from gne_mj.batches import Plan, Progress, Shard, Store, Sweep
     from gne_mj.batches.report import Report
 
 
@@ -70,6 +70,14 @@ CLUSTER = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="Run on the workers of this Dask scheduler."),
 ]
+SHARD = Annotated[
+    str | None,
+    typer.Option(
+        "--shard",
+        metavar="I/N",
+        help="Run every N-th chunk only, beside other processes that run the others into DIR.",
+    ),
+]
 FAIL_ON_EXIT = Annotated[
     bool, typer.Option("--fail-on-exit", help="Exit status 1 if any run ended early.")
 ]
@@ -90,15 +98,25 @@ def batch(
     threads: THREADS = 0,
     resume: RESUME = False,
     cluster: CLUSTER = None,
+    shard: SHARD = None,
     fail_on_exit: FAIL_ON_EXIT = False,
     as_json: JSON = False,
 ) -> None:
     """Run all combinations of swept values from random starts, into one dataset.
 
     Everything ends in DIR: runs.zarr, which xarray alone can open, tables and a figure. A batch
-    that was stopped or killed goes on with --resume, and ends as if it had not been.
+    that was stopped or killed goes on with --resume, and ends as if it had not been. With --shard
+    the same command does both: the first shard makes DIR, and each goes on with its own chunks.
     """
-    from gne_mj.batches import ahead, connected, execute, make_plan, of_runs, parse_record
+    from gne_mj.batches import (
+        ahead,
+        connected,
+        execute,
+        make_plan,
+        of_runs,
+        parse_record,
+        parse_shard,
+    )
     from gne_mj.errors import InvalidInput, named
     from gne_mj.extras import need
 
@@ -110,6 +128,7 @@ def batch(
         )
     own = named(address="cluster", store="folder", target="folder")
     with own, connected(cluster) as client, stopping() as stop:
+        part = None if shard is None else meaning("shard", parse_shard, shard)
         plan = None
         if source is not None:
             plan = make_plan(
@@ -123,19 +142,24 @@ def batch(
                 record=meaning("record", parse_record, record),
                 chunk=chunk,
             )
-        store = _opened(plan, folder, resume)
+        store = _opened(plan, folder, resume, part)
         with telling(PREPARING, quiet=as_json) as tell:
             show = of_runs(tell, ahead(store.plan, threads, cluster), quiet=as_json)
             now = execute(
-                store, threads=threads, cluster=client, progress=show, stopped=stop.is_set
+                store,
+                threads=threads,
+                cluster=client,
+                shard=part,
+                progress=show,
+                stopped=stop.is_set,
             )
-        _tell(store, now, as_json)
+        _tell(store, now, as_json, part)
     if not now.complete and not as_json:
         print(f"\nstopped: {_partial(store, now)}")
     raise typer.Exit(1 if not now.complete or (fail_on_exit and now.ended_early) else 0)
 
 
-def _opened(plan: "Plan | None", folder: Path, resume: bool) -> "Store":
+def _opened(plan: "Plan | None", folder: Path, resume: bool, shard: "Shard | None") -> "Store":
     """The store of a plan, or of a batch that goes on with the plan that it has."""
     from gne_mj.batches import Store
     from gne_mj.errors import InvalidInput, named
@@ -144,6 +168,9 @@ def _opened(plan: "Plan | None", folder: Path, resume: bool) -> "Store":
         if not resume:
             raise InvalidInput("source", None, "a scenario must be named, or `resume`")
         return Store.continued(folder)
+    if shard is not None:
+        with named(plan=""):
+            return Store.begun(folder, plan)
     if folder.exists() and not resume:
         raise InvalidInput(
             "folder",
@@ -155,10 +182,26 @@ def _opened(plan: "Plan | None", folder: Path, resume: bool) -> "Store":
         return begin(folder, plan)
 
 
-def _tell(store: "Store", now: "Progress", as_json: bool) -> None:
-    """What a batch that ended has done, with its tables and figure if there is anything."""
+def _tell(store: "Store", now: "Progress", as_json: bool, shard: "Shard | None") -> None:
+    """What a batch that ended has done, with its tables and figure if there is anything.
+
+    The last one of its shards tells of it all, the others of themselves.
+    """
+    from gne_mj.batches import Progress
     from gne_mj.batches.report import write_report
 
+    if shard is not None:
+        whole = Progress.of(store)
+        if not whole.complete:
+            if as_json:
+                emit(json.dumps({"shard": str(shard), **_counts(now)}))
+            else:
+                print(
+                    f"shard {shard}: {now.done:,} of its {now.total:,} runs are stored,"
+                    f" of the batch {whole.done:,} of {whole.total:,}"
+                )
+            return
+        now = whole
     if now.done:
         _print(store, now, write_report(store, store.folder, replace=True), as_json)
     elif as_json:
