@@ -8,10 +8,11 @@ import gne_mj as gm
 from gne_mj.batches.plan import make_plan
 from gne_mj.errors import InvalidInput
 from gne_mj.loops.contacts import counter
+from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.fleet import compile_model, compose
 from gne_mj.plants.fleet_plant import build_fleet
 from gne_mj.plants.native_contacts import contact_offsets
-from gne_mj.plants.native_mujoco import PLANT_MARK, USERDATA_HEADER, callbacks
+from gne_mj.plants.native_mujoco import PLANT_MARK, USERDATA_HEADER
 from gne_mj.scenario import load_scenario
 from gne_mj.summary import summary
 from gne_mj.theory import certify

@@ -22,8 +22,8 @@ from builders import (
 import reference
 from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.loops import monitor as watch
+from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.mujoco import MujocoPlant
-from gne_mj.plants.native_mujoco import callbacks
 
 DELTA = np.full(5, 3.0)
 
@@ -177,6 +177,18 @@ def test_callbacks_are_restored_and_do_not_nest():
     finally:
         mujoco.set_mjcb_control(None)
         mujoco.set_mjcb_passive(None)
+
+
+def test_mujoco_times_its_stages_before_and_after_a_loop_advances_but_not_meanwhile():
+    loop = robot_system(starts()[0], UNEQUAL, engine="mujoco").closed_loop(clock(0.005, 1.0, 0.05))
+    model, data = loop.plant.model, loop.plant.data
+    step = mujoco.mjtTimer.mjTIMER_STEP
+    loop.advance(2, 10)
+    assert data.timer[step].number >= 20
+    assert data.timer[step].duration == 0.0
+    other = mujoco.MjData(model)
+    mujoco.mj_step(model, other, 20)
+    assert other.timer[step].duration > 0.0
 
 
 def test_other_simulations_are_left_alone_by_installed_callbacks():

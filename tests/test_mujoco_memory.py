@@ -13,7 +13,7 @@ from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.layout import steps_of
 from gne_mj.loops.mujoco_workspace import workspace_of
-from gne_mj.plants.native_mujoco import callbacks
+from gne_mj.plants.callbacks import callbacks
 
 WHOLE = mujoco.mjtState.mjSTATE_INTEGRATION
 H = 0.005

@@ -16,6 +16,7 @@ from gne_mj.native import compiled, source_key
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import raise_pending
 from gne_mj.plants import mjcf_file
+from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import sizes_in
@@ -25,7 +26,6 @@ from gne_mj.plants.native_mujoco import (
     USERDATA_HEADER,
     Offsets,
     call_state,
-    callbacks,
     check_warnings,
     field,
     offsets,

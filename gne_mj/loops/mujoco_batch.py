@@ -20,7 +20,8 @@ from gne_mj.loops.mujoco_loop import observe
 from gne_mj.loops.mujoco_workspace import put_start, workspace_of
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.parameter_block import ParameterBlock
-from gne_mj.plants.native_mujoco import callbacks, offsets
+from gne_mj.plants.callbacks import callbacks
+from gne_mj.plants.native_mujoco import offsets
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant

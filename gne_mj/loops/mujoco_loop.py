@@ -15,7 +15,8 @@ from gne_mj.loops.mujoco import build, machine_of, workspace_for_states
 from gne_mj.loops.mujoco_workspace import mujoco_parameter_block, put_start, workspace_of
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.recorder import Recorder
-from gne_mj.plants.native_mujoco import LOOP_MARK, USERDATA_HEADER, callbacks, offsets
+from gne_mj.plants.callbacks import callbacks
+from gne_mj.plants.native_mujoco import LOOP_MARK, USERDATA_HEADER, offsets
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant

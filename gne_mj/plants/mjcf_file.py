@@ -16,7 +16,7 @@ import numpy as np
 
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.c_layout import arrays
-from gne_mj.plants.native_mujoco import quiet
+from gne_mj.plants.callbacks import quiet
 
 # Options that a scenario gives, and MJCF's words for others
 CLOCK = ("timestep", "integrator")

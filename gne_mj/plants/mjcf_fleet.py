@@ -13,6 +13,7 @@ from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_actuator import make_force
@@ -32,11 +33,9 @@ from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
     PLANT_MARK,
     USERDATA_HEADER,
-    callbacks,
     check_warnings,
     offsets,
     passive_callback,
-    quiet,
     step_address,
 )
 from gne_mj.records import by_name

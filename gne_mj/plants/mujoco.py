@@ -14,12 +14,12 @@ from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
 from gne_mj.parameter_block import ParameterBlock, floats, integers
 from gne_mj.plants import flexible_robot
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.fleet import HULL, compile_model, compose, element_names
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
     USERDATA_HEADER,
-    callbacks,
     field,
     offsets,
     passive_callback,

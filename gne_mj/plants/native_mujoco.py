@@ -9,9 +9,6 @@ left alone.
 """
 
 import ctypes
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -30,10 +27,6 @@ from gne_mj.plants.c_layout import arrays, block_of, unknown_layout, word_of
 
 CALLBACK = types.void(types.voidptr, types.voidptr)
 ACTIVATION = types.float64(types.voidptr, types.voidptr, types.int32)
-_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-_DYNAMICS = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
-_WARNING = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
-
 
 _BITS = mujoco.mjtState
 # What a step of MuJoCo moves, so that putting it back is as if the step had not been taken
@@ -270,13 +263,18 @@ def state_functions() -> tuple[int, int, int]:
 
 
 @cache
-def step_address(function: str = "mj_step") -> int:
-    """Address of mj_step, or of another function (model, data), in the library in use."""
+def library() -> ctypes.CDLL:
+    """The MuJoCo library in use."""
     folder = Path(mujoco.__file__).parent
     for path in sorted([*folder.glob("libmujoco.*"), *folder.glob("mujoco.dll")]):
-        library = ctypes.CDLL(str(path))
-        return ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0
+        return ctypes.CDLL(str(path))
     raise EngineError(f"the MuJoCo library is not in the package's folder {folder}")
+
+
+@cache
+def step_address(function: str = "mj_step") -> int:
+    """Address of mj_step, or of another function (model, data), in the library in use."""
+    return ctypes.cast(getattr(library(), function), ctypes.c_void_p).value or 0
 
 
 @kernel
@@ -327,28 +325,6 @@ def passive_callback(at: Offsets, fleet: ModuleType) -> Any:
     return callback(CALLBACK, passive)
 
 
-@cache
-def _silence() -> Any:
-    def ignore(message):
-        pass
-
-    return callback(types.void(types.voidptr), ignore)
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """MuJoCo's warnings go nowhere meanwhile: not to stderr, nor to a file in the working folder.
-
-    What they say of a simulation is in the monitor, and in :func:`check_warnings`.
-    """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(_WARNING(_silence().address))
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
 # MuJoCo's warnings that what follows is not the model's motion; what else it warns of shows in runs
 LOST = {
     int(mujoco.mjtWarning.mjWARN_INERTIA): "met an inertia that is nearly singular, took another",
@@ -391,42 +367,3 @@ def check_warnings(data: mujoco.MjData) -> None:
     for kind in LOST:
         if data.warning[kind].number and np.all(np.isfinite(data.qvel)):
             raise EngineError(f"by {data.time:.6g} s {lost_text(kind)}")
-
-
-_installed = threading.Lock()
-
-
-@contextmanager
-def callbacks(
-    *, control: Any = None, passive: Any = None, activation: Any = None
-) -> Iterator[None]:
-    """Install C callbacks (numba ``cfunc`` objects) for a while; always restores what was there.
-
-    MuJoCo is :func:`quiet` meanwhile.
-
-    Raises:
-        EngineError: callbacks are global to the process, and ours are installed already.
-    """
-    if not _installed.acquire(blocking=False):
-        raise EngineError(
-            "MuJoCo's callbacks are global to the process and already in use by another"
-            " simulation that is stepping right now: step one at a time"
-        )
-    try:
-        before = (
-            mujoco.get_mjcb_control(),
-            mujoco.get_mjcb_passive(),
-            mujoco.get_mjcb_act_dyn(),
-        )
-        try:
-            mujoco.set_mjcb_control(control and _FUNCTION(control.address))
-            mujoco.set_mjcb_passive(passive and _FUNCTION(passive.address))
-            mujoco.set_mjcb_act_dyn(activation and _DYNAMICS(activation.address))
-            with quiet():
-                yield
-        finally:
-            mujoco.set_mjcb_control(before[0])
-            mujoco.set_mjcb_passive(before[1])
-            mujoco.set_mjcb_act_dyn(before[2])
-    finally:
-        _installed.release()
