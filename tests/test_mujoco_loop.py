@@ -138,6 +138,20 @@ def test_open_loop_under_random_forces():
         assert relative_error(plants[0].state, plants[1].state) < 1e-8
 
 
+@pytest.mark.parametrize("integrator", ["rk4", "euler"])
+def test_what_no_step_needs_changes_no_bit(integrator):
+    agents, state = robot_system(starts()[2], UNEQUAL).agents, starts()[2]
+    plants = [MujocoPlant(agents, 0.004, integrator, decorated=kept) for kept in (True, False)]
+    forces = np.random.default_rng(3).normal(0.0, 5.0, (100, 5))
+    for plant in plants:
+        plant.reset(state)
+        for force in forces:
+            plant.step(force)
+    assert np.array_equal(plants[0].state, plants[1].state)
+    assert plants[1].model.nbody < plants[0].model.nbody
+    assert plants[1].model.nsensor == plants[1].model.ngeom == 0
+
+
 def test_momentum_is_conserved_without_input():
     state = random_robot_state(np.random.default_rng(3), DELTA)
     agents = robot_system(state, UNEQUAL).agents

@@ -43,7 +43,7 @@ class Structure:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco_batch import MujocoBatch
 
-            self._plant = system.mujoco_plant(clock, decorated=False)
+            self._plant = system.mujoco_plant(clock)
             # Mode implicit looks ahead in a second mjData, of which a plant has one.
             alone = not has_ode(system.agents.kind) and system.equation is not None
             self.loop = MujocoBatch(

@@ -100,7 +100,8 @@ def build_fleet(
         integrator: "rk4" or "euler".
         userdata: room to leave in ``userdata`` behind what the fleet needs itself.
         memory: room for a law's memory in ``act``.
-        decorated: keep what is for the eye only; files of a user's own are kept as they are.
+        decorated: keep what no step needs, see :func:`gne_mj.plants.fleet.compose`; files of a
+            user's own are kept as they are.
 
     Raises:
         InvalidInput: agents that have no bodies, or numbers or files that make none.

@@ -166,7 +166,7 @@ class MujocoPlant(FleetPlant):
             between sibling bodies, and are not offered.
         userdata: room to leave in ``userdata`` behind what this plant needs itself.
         memory: room for a law's memory in ``act``.
-        decorated: keep what is for the eye only.
+        decorated: keep what no step needs, see :func:`gne_mj.plants.fleet.compose`.
 
     Attributes:
         kernels: the module that says how a loop reads and drives the fleet.

@@ -67,10 +67,9 @@ class Assembly(SystemData):
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco_loop import MujocoLoop
-            from gne_mj.plants.fleet import MANY
 
             if plant is None:
-                plant = self.mujoco_plant(clock, decorated=self.agents.count <= MANY)
+                plant = self.mujoco_plant(clock)
                 mode_of(self).try_plant(self, plant, clock)
             else:
                 plant.model.opt.timestep = plant.timestep = clock.timestep
@@ -168,12 +167,11 @@ class Assembly(SystemData):
             separation=0 if self.separation is None else neighbours_length(self.game.agents),
         )
 
-    def mujoco_plant(self, clock: Clock, *, decorated: bool = True) -> "FleetPlant":
+    def mujoco_plant(self, clock: Clock) -> "FleetPlant":
         """The fleet, reset to the start, with room for this system's loop.
 
-        Args:
-            clock: how to step.
-            decorated: keep what is for the eye only; MJCF robots keep all in any case.
+        Flexible robots are without decoration, which no step needs: whoever draws them has a model
+        of its own (:mod:`gne_mj.viewer.fleet`). MJCF robots keep all that is in their files.
         """
         from gne_mj.loops.mujoco_workspace import entries_needed
         from gne_mj.plants.fleet_plant import build_fleet
@@ -184,7 +182,7 @@ class Assembly(SystemData):
         )
         plant = build_fleet(
             self.agents, clock.timestep, self.integrator, userdata=userdata, memory=memory,
-            decorated=decorated,
+            decorated=False,
         )  # fmt: skip
         plant.reset(self.state)
         if mode.measures_stages(self) and not plant.measures_every_stage:

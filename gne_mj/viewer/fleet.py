@@ -116,15 +116,16 @@ class Fleet:
         return None
 
 
-def fleet_of(system: SystemData, clock: Clock, plant: FleetPlant | None = None) -> Fleet | None:
+def fleet_of(system: SystemData, clock: Clock) -> Fleet | None:
     """The fleet of a system, or None if its agents have no bodies.
+
+    Its model is its own: what a loop steps is not made for the eye.
 
     Args:
         system: whose robots.
         clock: how it steps.
-        plant: the robots, if they are in MuJoCo already.
     """
-    plant = plant or _plant(system, clock)
+    plant = _plant(system, clock)
     if plant is None:
         return None
     try:

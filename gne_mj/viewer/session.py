@@ -67,8 +67,7 @@ class Session:
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
         shown_systems = [
-            ShownSystem(run.system, self.simulation.clock, getattr(run.loop, "plant", None))
-            for run in self.simulation.runs.values()
+            ShownSystem(run.system, self.simulation.clock) for run in self.simulation.runs.values()
         ]
         self._scene = Scene(shown_systems, title, self.simulation.clock.duration)
         self._pushes = pushes_of(shown_systems)

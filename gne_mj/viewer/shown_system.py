@@ -12,7 +12,6 @@ from gne_mj.faults import for_native
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
 from gne_mj.plants.agent_type import followed_position
-from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, mode_of
 from gne_mj.system.data import SystemData
@@ -29,15 +28,14 @@ class ShownSystem:
     Args:
         system: what is shown.
         clock: how it steps.
-        plant: its fleet, if there is one already; it is only looked at.
 
     Attributes:
         fleet: its robots; None for agents without bodies.
     """
 
-    def __init__(self, system: SystemData, clock: Clock, plant: FleetPlant | None = None) -> None:
+    def __init__(self, system: SystemData, clock: Clock) -> None:
         self.system, self.clock = system, clock
-        self.fleet = fleet_of(system, clock, plant)
+        self.fleet = fleet_of(system, clock)
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the system; constant while it runs."""
