@@ -6,9 +6,10 @@ of :mod:`gne_mj.interior_point`.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from threading import Lock
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
@@ -17,25 +18,23 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from gne_mj import interior_point as method
-from gne_mj import lines
+from gne_mj.cores import cores
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
 from gne_mj.game_model import Game
-from gne_mj.interior_point import Path
+from gne_mj.numbers import flat
+from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import forgive_pending, raise_pending
-from gne_mj.primal_dual import Free, Iterate, NewtonScratch
+from gne_mj.records import arrays
+from gne_mj.solver_memory import SolverMemory, draw_lines, solver_memory
 
 TOLERANCE = 1e-12
-# The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
-# order of lambda_l s_l counts, so that it may be off by half.
-TO_ZERO = Path(0.0, 1e-12, TOLERANCE, 0.5, True)
 # Multiplications for each step of Newton's method, roughly: some seconds
 MOST_WORK = 1e10
-# Random lines for each entry of an action of several, on which a best response is looked for
-RANDOM_LINES = 4
+# Best responses that one call finds, and games of so many agents are shared among processors
+PIECE, MANY = 64, 256
 
 
-@dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(NamedTuple):
     """A profile with what shows that it is an equilibrium.
 
     Attributes:
@@ -89,7 +88,7 @@ def penalised_equilibrium(
     if not 0.0 < rho < np.inf:
         raise InvalidInput("rho", rho, "it must be positive and finite")
     first = max(start.rho, rho) if isinstance(start, Equilibrium) else 0.0
-    return _solver(game).follow(start, Path(first, rho, tolerance, tolerance, False))
+    return _solver(game).follow(start, first, rho, tolerance)
 
 
 def path(game: Game, rhos: Iterable[float], start: Start) -> Iterator[Equilibrium]:
@@ -112,7 +111,7 @@ def variational_equilibrium(game: Game, start: Start) -> Equilibrium:
     equilibrium the path starts at that one's rho. Raises as :func:`penalised_equilibrium` does.
     """
     rho = start.rho if isinstance(start, Equilibrium) else 0.0
-    return _solver(game).follow(start, TO_ZERO._replace(rho=rho))
+    return _solver(game).follow(start, rho, 0.0, TOLERANCE)
 
 
 def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
@@ -125,7 +124,7 @@ def best_response(game: Game, agent: int, y: ArrayLike) -> Equilibrium:
     convex in y_i a better one may exist. The multipliers are those of the agent's own problem, zero
     for constraints that do not contain its action.
     """
-    return _solver(game).respond(y, agent)[0]
+    return _solver(game).respond(y, agent)
 
 
 def measured_epsilon(
@@ -140,12 +139,7 @@ def measured_epsilon(
     y_i, with p_i the constraints that contain y_i, and so at most p * rho [lemma:epsilon].
     ``responded`` is called after every agent's.
     """
-    solver, costs = _solver(game), game.costs(y)
-    least = np.empty(game.agents)
-    for i in range(game.agents):
-        least[i] = solver.respond(y, i)[1]
-        responded()
-    return np.maximum(costs - least, 0.0)
+    return np.maximum(game.costs(y) - _solver(game).least_costs(y, responded), 0.0)
 
 
 def middle(game: Game, y: ArrayLike) -> NDArray[np.float64]:
@@ -171,54 +165,38 @@ class EquilibriumSolver:
     """
 
     def __init__(self, game: Game) -> None:
-        m, p = game.actions, game.constraints_count
-        self._data = game.data
         self._game, self._name = proxy(game), game.called  # which may be forgotten before this is
-        self._holes = game.constraint_class is None
         self._native = method.build()
+        self._run = self._native.run
         self._lock = Lock()
-        self._report = np.zeros(method.COUNT)
-        position, self._half_band = order(game)
-        if not m * float(self._half_band) ** 2 <= MOST_WORK:
+        self._order = position, half_band = order(game)
+        self._half_band = half_band
+        if not game.actions * float(half_band) ** 2 <= MOST_WORK:
             raise InvalidInput(
                 "game.agents",
                 game.agents,
-                f"the {game.called} couples up to {self._half_band} actions with each other,"
+                f"the {game.called} couples up to {half_band} actions with each other,"
                 " which is too much work for its equilibria",
             )
-        agents, constraints = np.arange(game.agents), np.arange(p)
-        agents.flags.writeable = constraints.flags.writeable = False
-        self._everyone = Free(agents, constraints, position)
-        self._nobody = Free(agents, constraints, np.full(m, -1))
-        self._point = Iterate(np.zeros(m), np.zeros(p), np.zeros(p))
-        self._direction, self._found = np.zeros(m), np.zeros(lines.COUNT)
-        entries = len(game.actions_in_constraints[1])
-        self._work = NewtonScratch(
-            trial=Iterate(np.zeros(m), np.zeros(p), np.zeros(p)),
-            g=np.zeros(p),
-            size=np.zeros(p),
-            unit=np.zeros(m),
-            share=np.zeros(p),
-            row=np.zeros(p + 1, dtype=np.int64),
-            column=np.zeros(entries, dtype=np.int64),
-            owned=np.zeros(entries, dtype=np.bool_),
-            jacobian=np.zeros(entries),
-            stationarity=np.zeros(m),
-            terms=np.zeros(m),
-            step=np.zeros(m),
-            step_slack=np.zeros(p),
-            step_multipliers=np.zeros(p),
-            hessian_row=np.zeros(m),
-            band=np.zeros((m, 3 * self._half_band + 1)),
-            pivots=np.zeros(m, dtype=np.int64),
-        )
+        position.flags.writeable = False
+        self._spare: list[_Place] = []  # for threads
+        self._place = self._new_place(game)
+        memory, self._address = self._place.memory, self._place.block.address
+        self._y, self._multipliers = memory.point.y, memory.point.multipliers
+        self._shape, self._report = self._y.shape, flat(memory.report)
 
-    def follow(self, start: Start, path: Path) -> Equilibrium:
+    def _new_place(self, game: Game) -> "_Place":
+        memory = solver_memory(game, *self._order, self._native.entry.address)
+        return _Place(memory, ParameterBlock(arrays(memory)))
+
+    def follow(self, start: Start, rho: float, last_rho: float, tolerance: float) -> Equilibrium:
         """The end of a path of penalised equilibria.
 
         Args:
             start: where to begin, best near the path's first equilibrium.
-            path: from which rho to which, and how accurately.
+            rho: of the first, at most, 0 for one that suits the costs.
+            last_rho: of the last; 0 for the limit.
+            tolerance: see :func:`penalised_equilibrium`.
 
         Raises:
             InfeasibleStart: ``start`` is not strictly inside.
@@ -227,141 +205,142 @@ class EquilibriumSolver:
         known = isinstance(start, Equilibrium)
         y = self._profile(start.action if isinstance(start, Equilibrium) else start)
         with self._lock:
-            self._point.y[:] = y
+            self._y[:] = y
             if isinstance(start, Equilibrium):
-                self._point.multipliers[:] = start.multipliers
-            ended = self._native.run(
-                self._data, self._everyone, self._half_band, path, known, self._point, self._work,
-                self._report,
-            )  # fmt: skip
+                self._multipliers[:] = start.multipliers
+            ended = self._run(self._address, -1, known, rho, last_rho, tolerance)
             if ended != method.CONVERGED:
-                self._fail(ended, y)
+                report = self._place.memory.report
+                self._fail(ended, y, self._y, int(report.iterations), float(report.error))
             forgive_pending()
-            return self._result(self._point.y.copy(), self._point.multipliers.copy())
+            return _equilibrium(self._y.copy(), self._multipliers.copy(), self._report)
 
-    def respond(self, y: ArrayLike, agent: int) -> tuple[Equilibrium, float]:
-        """The best response of one agent, which minimises alone, from y and nothing else; its cost.
+    def respond(self, y: ArrayLike, agent: int) -> Equilibrium:
+        """The best response of one agent, which minimises alone, from y and nothing else.
 
         Raises:
             InfeasibleStart: y is not strictly inside.
             SolverError: no minimiser was found.
         """
-        y = self._profile(y)
-        best, least, failure = None, np.inf, None
-        starts, single = self._lowest(y, agent)
-        own = int(self._data.own_pointer[agent + 1] - self._data.own_pointer[agent])
-        for start, cost in [(y, np.inf), *starts]:
-            # By the lemma a response is only so far from the least cost of its own valley.
-            if single and best is not None and cost > least - 2.0 * own * best.rho:
-                continue
-            # A barrier that outweighs what there is to gain might lead back out of the valley.
-            gain = least - cost if best is not None else 0.0
-            try:
-                found = self._respond(start, agent, max(gain, 0.0) / own if own else 0.0)
-            except SolverError as error:
-                failure = failure or error
-                continue
-            reached = self.cost(agent, found.action)
-            if best is None or reached < least:
-                best, least = found, reached
-        if best is None:
-            assert failure is not None
-            raise failure
-        return best, least
-
-    def _lowest(
-        self, y: NDArray[np.float64], agent: int
-    ) -> tuple[list[tuple[NDArray[np.float64], float]], bool]:
-        """Where an agent's cost is least on lines through y, and that; if there is one line only.
-
-        The lines go along its entries, and if they are several in random directions too.
-        """
-        data = self._data
-        first, last = int(data.offsets[agent]), int(data.offsets[agent + 1])
-        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
-        directions = np.eye(last - first)
-        if last - first > 1:
-            shape = (RANDOM_LINES * (last - first), last - first)
-            random = np.random.default_rng(agent).normal(size=shape)
-            directions = np.concatenate([directions, random])
-        starts = []
-        for direction in directions:
-            with self._lock:
-                self._direction[first:last] = direction
-                self._native.lowest(
-                    data, agent, own, self._holes, y, self._direction, self._work.trial.y,
-                    self._found,
-                )  # fmt: skip
-                self._direction[first:last] = 0.0
-                cost, place = self._found.tolist()
-            if place != 0.0:
-                start = y.copy()
-                start[first:last] += place * direction
-                starts.append((start, cost))
-        return starts, last - first == 1
-
-    def _respond(self, y: NDArray[np.float64], agent: int, rho: float) -> Equilibrium:
-        """What an agent's own path from y leads to, from a rho at most (0 for any)."""
-        data, point, position = self._data, self._point, self._nobody.position
-        own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
-        alone = Free(self._nobody.agents[agent : agent + 1], own, position)
-        block = slice(data.offsets[agent], data.offsets[agent + 1])
+        data, action = self._place.memory.data, self._profile(y).copy()
         with self._lock:
-            position.fill(-1)
-            position[block] = np.arange(block.stop - block.start)
-            point.y[:] = y
-            ended = self._native.run(
-                data, alone, self._half_band, TO_ZERO._replace(rho=rho), False, point, self._work,
-                self._report,
-            )  # fmt: skip
-            if ended != method.CONVERGED:
-                self._fail(ended, y)
-            forgive_pending()
-            multipliers = np.zeros(len(point.multipliers))
-            multipliers[own] = point.multipliers[: len(own)]
-            return self._result(point.y.copy(), multipliers)
+            self._respond(self._place, action, agent, agent + 1, np.empty(len(data.everyone)))
+            best = self._place.memory.best
+            own = data.own_index[data.own_pointer[agent] : data.own_pointer[agent + 1]]
+            multipliers = np.zeros(len(best.multipliers))
+            multipliers[own] = best.multipliers[: len(own)]
+            block = slice(data.offsets[agent], data.offsets[agent + 1])
+            action[block] = best.y[block]
+            return _equilibrium(action, multipliers, flat(self._place.memory.best_report))
+
+    def least_costs(self, y: ArrayLike, responded: Callable[[], None]) -> NDArray[np.float64]:
+        """What each agent's cost is at its best response to y, (N,); raises as ``respond`` does."""
+        y, agents = self._profile(y), self._game.agents
+        # A plain Python function is asked by one thread, and its errors are its agent's.
+        piece = PIECE if self._game.written.native else 1
+        threads = cores() if agents >= MANY and piece > 1 else 1
+        costs = np.empty(agents)
+        with self._lock:
+            while len(self._spare) < threads - 1:
+                self._spare.append(self._new_place(self._game))
+            places = [self._place, *self._spare[: threads - 1]]
+
+            def find(first: int) -> int:
+                last, place = min(first + piece, agents), places.pop()
+                try:
+                    self._respond(place, y, first, last, costs)
+                finally:
+                    places.append(place)
+                return last - first
+
+            with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+                for done in (pool.map if pool else map)(find, range(0, agents, piece)):
+                    for _ in range(done):
+                        responded()
+        return costs
+
+    def _respond(
+        self, place: "_Place", y: NDArray[np.float64], first: int, last: int,
+        costs: NDArray[np.float64],
+    ) -> None:  # fmt: skip
+        """Let some agents respond to y, and fill their entries of costs (N,)."""
+        memory = place.memory
+        memory.start[:] = y
+        if not memory.lines.any():
+            draw_lines(memory)
+        while first < last:
+            first = self._native.respond(place.block.address, first, last, costs)
+            if first < last:  # an attempt of this agent has found nothing
+                response = memory.response
+                ended, steps = int(response.ended), int(response.iterations)
+                if not response.found or not self._is_lack_of_progress(ended, memory.failed):
+                    self._fail(ended, y, memory.failed, steps, float(response.error))
+                first += 1
+        forgive_pending()
+
+    def _is_lack_of_progress(self, ended: int, y: NDArray[np.float64]) -> bool:
+        """Whether the method alone is why an attempt ended, no function of the game's.
+
+        Raises:
+            UserCodeError, InvalidInput: a function is.
+        """
+        raise_pending()
+        if ended != method.OUTSIDE:
+            self._game.check_numbers(y)
+        return ended != method.OUTSIDE
 
     def middle(self, y: ArrayLike) -> NDArray[np.float64]:
         """A profile well inside, from one strictly inside."""
-        moved = self._profile(y).copy()
+        moved = self._profile(y)
         with self._lock:
-            self._native.to_middle(self._data, moved, self._direction, self._work.trial.y)
+            self._y[:] = moved
+            self._native.to_middle(self._address)
+            moved = self._y.copy()
         forgive_pending()
         return moved
 
-    def cost(self, agent: int, y: NDArray[np.float64]) -> float:
-        """J_i(y); y of shape (m,)."""
-        return float(self._native.cost(self._data, agent, y))
-
     def _profile(self, y: ArrayLike) -> NDArray[np.float64]:
-        profile = np.ascontiguousarray(y, dtype=np.float64)
-        if profile.shape != self._point.y.shape:
-            raise ValueError(f"y must have shape {self._point.y.shape}, not {profile.shape}")
+        profile = np.asarray(y, dtype=np.float64)
+        if profile.shape != self._shape:
+            raise ValueError(f"y must have shape {self._shape}, not {profile.shape}")
         return profile
 
-    def _result(self, action: NDArray[np.float64], multipliers: NDArray[np.float64]) -> Equilibrium:
-        iterations, _, residual, complementarity, rho = self._report.tolist()
-        return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
-
-    def _fail(self, ended: int, y: NDArray[np.float64]) -> NoReturn:
+    def _fail(
+        self, ended: int, start: NDArray[np.float64], y: NDArray[np.float64], iterations: int,
+        error: float,
+    ) -> NoReturn:  # fmt: skip
+        """Raise why a path from ``start`` has ended at y."""
         raise_pending()
         if ended == method.OUTSIDE:
-            own = self._game.written  # as Python can call it
+            own, data = self._game.written, self._place.memory.data  # as Python can call it
             constraint, q = own.functions["constraint"], own.parameters
-            g = np.array([constraint(q, k, y) for k in range(len(self._point.slack))])
-            g += self._data.tightening
+            g = np.array([constraint(q, k, start) for k in range(len(data.tightening))])
+            g += data.tightening
             worst = int(np.argmax(np.where(np.isnan(g), np.inf, g)))
             raise InfeasibleStart(
                 self._game.name, "start", self._game.constraint_names[worst], float(g[worst])
             )
-        self._game.check_numbers(self._point.y)
+        self._game.check_numbers(y)
         reason = {
             method.SINGULAR: f"the derivative of F + dphi is singular in the {self._name}",
             method.NO_WAY_ON: f"Newton's method found no way on in the {self._name}",
             method.TOO_MANY: f"the equilibrium of the {self._name} was not found",
         }[ended]
-        iterations, error = int(self._report[method.ITERATIONS]), float(self._report[method.ERROR])
         raise SolverError(reason, error, iterations)
+
+
+class _Place(NamedTuple):
+    """Memory for one thread, and how native code reaches it."""
+
+    memory: SolverMemory
+    block: ParameterBlock
+
+
+def _equilibrium(
+    action: NDArray[np.float64], multipliers: NDArray[np.float64], report: NDArray[np.float64]
+) -> Equilibrium:
+    iterations, _, residual, complementarity, rho = report.tolist()
+    return Equilibrium(action, multipliers, rho, residual, complementarity, int(iterations))
 
 
 def order(game: Game) -> tuple[NDArray[np.int64], int]:

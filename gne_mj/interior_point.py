@@ -21,10 +21,10 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
-from gne_mj import game_functions as games
-from gne_mj import lines, scales
-from gne_mj.native import compiled, copy, kernel, source_key
+from gne_mj import best_response, lines, scales
+from gne_mj.native import call_integer, callback, compiled, copy, kernel, source_key
 from gne_mj.primal_dual import (
     accept,
     evaluate,
@@ -36,12 +36,15 @@ from gne_mj.primal_dual import (
     move,
     newton,
 )
+from gne_mj.solver_memory import FOLLOW, free_in, memory_in, sizes_in
+
+_whole, _real = types.int64, types.float64
 
 # How an iteration ended
 CONVERGED, OUTSIDE, SINGULAR, NO_WAY_ON, TOO_MANY = range(5)
-# Entries of a report
-ITERATIONS, ERROR, STATIONARITY, COMPLEMENTARITY, RHO, COUNT = range(6)
-
+# The end of the path to rho -> 0, as a share of the costs' size (gne_mj.scales). There only the
+# order of lambda_l s_l counts, so that it may be off by half.
+LOWEST, HALF = 1e-12, 0.5
 LARGEST_COUNT = 300
 ACCEPTED = 100.0  # tolerances, where rounding ends the progress before
 TO_BOUNDARY = 0.005  # share of a slack or multiplier that one step leaves at least
@@ -167,7 +170,7 @@ def begin(data, free, count, b, path, known, point, work):
     for k in range(constraints):
         point.multipliers[k] = rho / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
-            if work.owned[entry]:
+            if work.owned[entry] != 0:
                 r = free.position[work.column[entry]]
                 work.stationarity[r] += point.multipliers[k] * work.jacobian[entry]
                 work.terms[r] += point.multipliers[k] * abs(work.jacobian[entry])
@@ -184,8 +187,9 @@ def centre(data, free, rho, point, work):
 
 
 @kernel
-def follow(data, free, half_band, path, known, point, work, report):
+def follow(memory, free, half_band, path, known):
     """Follow the path to path.last_rho, from point's y; the point becomes its end."""
+    data, point, work, report = memory.data, memory.point, memory.work, memory.report
     count, constraints = free_actions(data, free), len(free.constraints)
     b = min(half_band, max(count - 1, 0))
     find_entries(data, free, work)
@@ -206,8 +210,8 @@ def follow(data, free, half_band, path, known, point, work, report):
             if lower < rho:
                 highest, rho, off = 0.0, lower, spread(constraints, lower, point, work)
             error = max(residual, off * (path.tolerance / path.spread))
-            report[ITERATIONS], report[STATIONARITY], report[RHO] = iteration, residual, rho
-            report[ERROR], report[COMPLEMENTARITY] = error, complementarity(constraints, point)
+            report.iterations, report.stationarity, report.rho = iteration, residual, rho
+            report.error, report.complementarity = error, complementarity(constraints, point)
             if rho <= last:
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 near_enough = is_near_enough(path, residual, off, distance, still)
@@ -305,32 +309,55 @@ def search_along(data, free, search, share, point, work):
 
 @cache
 def build() -> SimpleNamespace:
-    """The native functions for all games, compiled at their first call."""
+    """The native functions for all games, compiled at their first call.
+
+    Each is given the address of a solver's memory (:mod:`gne_mj.solver_memory`).
+    """
     source = source_key()
 
-    @compiled
-    def run(data, free, half_band, path, known, point, work, report):
-        """``follow`` from point's y, and its multipliers if those are ``known``."""
+    def along(block, agent, known, rho, last_rho, tolerance):
         _ = source
-        copy(point.y, work.trial.y)
-        return follow(data, free, half_band, path, known, point, work, report)
+        sizes = sizes_in(block)
+        memory = memory_in(block, sizes.actions)
+        path = Path(rho, last_rho, tolerance, tolerance, False)
+        if last_rho == 0.0:
+            path = Path(rho, LOWEST, tolerance, HALF, True)
+        copy(memory.point.y, memory.work.trial.y)
+        free = free_in(memory, agent)
+        return follow(memory, free, sizes.half_band, path, known != 0)
+
+    entry = callback(_whole(_whole, _whole, _whole, _real, _real, _real), along)
 
     @compiled
-    def cost(data, i, y):
-        """J_i(y)."""
+    def run(block, agent, known, rho, last_rho, tolerance):
+        """``follow`` from point.y, and its multipliers if those are ``known``, to last_rho or 0."""
         _ = source
-        return games.cost(data, i, y)
+        memory = memory_in(block, sizes_in(block).actions)
+        return call_integer(
+            memory.functions[FOLLOW], (block, agent, known, rho, last_rho, tolerance)
+        )
 
     @compiled
-    def lowest(data, i, own, holes, y, direction, trial, found):
-        """``lines.lowest``."""
+    def respond(block, first, last, costs):
+        """Best responses of some agents to ``start``; the first with a failure, ``last`` if none.
+
+        costs (N,) is filled with what they reach; ``best`` is the last one's.
+        """
         _ = source
-        lines.lowest(data, i, own, holes, y, direction, trial, found)
+        sizes = sizes_in(block)
+        memory = memory_in(block, sizes.actions)
+        for i in range(first, last):
+            best_response.respond(block, memory, sizes.holes != 0, i)
+            costs[i] = memory.response.cost
+            if memory.response.failures > 0.0:
+                return i
+        return last
 
     @compiled
-    def to_middle(data, y, direction, trial):
-        """``lines.to_middle``."""
+    def to_middle(block):
+        """``lines.to_middle`` of point.y."""
         _ = source
-        lines.to_middle(data, y, direction, trial)
+        memory = memory_in(block, sizes_in(block).actions)
+        lines.to_middle(memory.data, memory.point.y, memory.direction, memory.work.trial.y)
 
-    return SimpleNamespace(run=run, cost=cost, lowest=lowest, to_middle=to_middle)
+    return SimpleNamespace(entry=entry, run=run, respond=respond, to_middle=to_middle)

@@ -17,7 +17,6 @@ from gne_mj.native import copy, kernel
 FIRST, FARTHEST, POINTS, STRIDE = 1e-6, 1e6, 32, 1.1
 HALVINGS = 50
 SWEEPS = 10  # over all actions, on the way to the middle
-COST, PLACE, COUNT = range(3)  # entries of what was found on a line
 
 
 @kernel
@@ -63,20 +62,21 @@ def compare(data, i, y, direction, t, trial, found):
     """Keep the place t on the line if the cost is less there."""
     place(data, i, y, direction, t, trial)
     value = games.cost(data, i, trial)
-    if value < found[COST]:
-        found[COST], found[PLACE] = value, t
+    if value < found.line_cost:
+        found.line_cost, found.line_place = value, t
 
 
 @kernel
 def lowest(data, i, own, holes, y, direction, trial, found):
-    """Fill ``found`` with agent i's least cost on the line and where it is; y is inside.
+    """Fill found.line_cost and line_place with agent i's least cost on the line and where; y is
+    inside.
 
     Where the set may have ``holes``, the parts of the line beyond them count too.
     """
     length = scales.largest(y)
     length = length if length > 0.0 else 1.0
     copy(y, trial)
-    found[COST], found[PLACE] = games.cost(data, i, y), 0.0
+    found.line_cost, found.line_place = games.cost(data, i, y), 0.0
     for side in range(2):
         sign = 1.0 - 2.0 * side
         last = end(data, i, own, y, direction, sign, length, trial)

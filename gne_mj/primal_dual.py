@@ -11,7 +11,7 @@ couples actions of agents that meet in a cost or a constraint, and is stored as 
 little. A private constraint is in the rows of its owners only, and keeps its slack all the same.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -27,39 +27,45 @@ SHIFT, HIGHER, SHIFTS, FAR = 1e-12, 1e3, 5, 1e6
 class Free(NamedTuple):
     """Whose actions are unknown."""
 
-    agents: np.ndarray  # the free agents
-    constraints: np.ndarray  # the constraints that contain an action of theirs
-    position: np.ndarray  # (m,) a free action's row in Newton's matrix, -1 if it is held
+    agents: Annotated[np.ndarray, "n", int]  # the free agents
+    # the constraints that contain an action of theirs
+    constraints: Annotated[np.ndarray, "n", int]
+    # a free action's row in Newton's matrix, -1 if it is held
+    position: Annotated[np.ndarray, "m", int]
 
 
 class Iterate(NamedTuple):
     """A start, and then the result. q is the number of constraints."""
 
-    y: np.ndarray  # (m,)
-    slack: np.ndarray  # (q,) s > 0
-    multipliers: np.ndarray  # (q,) lambda > 0
+    y: Annotated[np.ndarray, "m"]
+    slack: Annotated[np.ndarray, "q"]  # s > 0
+    multipliers: Annotated[np.ndarray, "q"]  # lambda > 0
 
 
 class NewtonScratch(NamedTuple):
     """Arrays that the method works on; n is the number of free actions."""
 
     trial: Iterate
-    g: np.ndarray  # (q,)
-    size: np.ndarray  # (q,) size of the terms in g whose rounding shows in it
-    row: np.ndarray  # (q + 1,) where each constraint's entries begin in the next two
-    column: np.ndarray  # the free actions in one constraint after the other
-    owned: np.ndarray  # whether the constraint is one of that action's agent
-    jacobian: np.ndarray  # dg_l/dy_a for them
-    stationarity: np.ndarray  # (n,) F + sum_l lambda_l dg_l
-    terms: np.ndarray  # (n,) sum of the magnitudes of its terms
-    unit: np.ndarray  # (n,) size of each row's terms
-    share: np.ndarray  # (q,) lambda_l s_l is to be this share of rho
-    step: np.ndarray  # (n,)
-    step_slack: np.ndarray  # (q,)
-    step_multipliers: np.ndarray  # (q,)
-    hessian_row: np.ndarray  # (m,) zero between uses
-    band: np.ndarray  # (n, 3 b + 1)
-    pivots: np.ndarray  # (n,)
+    g: Annotated[np.ndarray, "q"]
+    size: Annotated[np.ndarray, "q"]  # size of the terms in g whose rounding shows in it
+    # where each constraint's entries begin in the next two
+    row: Annotated[np.ndarray, "q + 1", int]
+    # the free actions in one constraint after the other
+    column: Annotated[np.ndarray, "entries", int]
+    owned: Annotated[np.ndarray, "entries", int]  # 1 if the constraint is that action's agent's own
+    jacobian: Annotated[np.ndarray, "entries"]  # dg_l/dy_a for them
+    stationarity: Annotated[np.ndarray, "m"]  # F + sum_l lambda_l dg_l, the first n entries
+    terms: Annotated[np.ndarray, "m"]  # sum of the magnitudes of its terms, likewise
+    unit: Annotated[np.ndarray, "m"]  # size of each row's terms, likewise
+    # 0 where a constraint is declared to have no second derivatives, by its number in the game
+    curved: Annotated[np.ndarray, "q", int]
+    share: Annotated[np.ndarray, "q"]  # lambda_l s_l is to be this share of rho
+    step: Annotated[np.ndarray, "m"]  # n entries
+    step_slack: Annotated[np.ndarray, "q"]
+    step_multipliers: Annotated[np.ndarray, "q"]
+    hessian_row: Annotated[np.ndarray, "m"]  # zero between uses
+    band: Annotated[np.ndarray, "m, n // m"]  # n rows of 3 b + 1 entries or more
+    pivots: Annotated[np.ndarray, "m", int]  # n entries
 
 
 @kernel
@@ -83,7 +89,7 @@ def find_entries(data, free, work):
         for member in range(data.member_pointer[l], data.member_pointer[l + 1]):
             j = data.member_index[member]
             if free.position[at[j]] >= 0:
-                owned = owns(data, j, l)
+                owned = 1 if owns(data, j, l) else 0
                 for a in range(at[j], at[j + 1]):
                     work.column[entry] = a
                     work.owned[entry] = owned
@@ -120,7 +126,7 @@ def evaluate(data, free, point, work):
             a = work.column[entry]
             slope = work.jacobian[entry]
             size += abs(slope * point.y[a])
-            if work.owned[entry]:
+            if work.owned[entry] != 0:
                 r = free.position[a]
                 work.stationarity[r] += point.multipliers[k] * slope
                 work.terms[r] += point.multipliers[k] * abs(slope)
@@ -143,15 +149,16 @@ def assemble(data, free, count, length, shift, point, b, work):
         weight = point.multipliers[k]
         ratio = weight / point.slack[k]
         for entry in range(work.row[k], work.row[k + 1]):
-            if not work.owned[entry]:
+            if work.owned[entry] == 0:
                 continue
             a = work.column[entry]
             r = position[a]
             slope = ratio * work.jacobian[entry]
             for other in range(work.row[k], work.row[k + 1]):
-                c = work.column[other]
-                second = weight * games.constraint_hessian(data, l, a, c, point.y)
-                band[r, position[c] - r + b] += second + slope * work.jacobian[other]
+                c, term = work.column[other], slope * work.jacobian[other]
+                if work.curved[l] != 0:
+                    term += weight * games.constraint_hessian(data, l, a, c, point.y)
+                band[r, position[c] - r + b] += term
     return size
 
 
@@ -198,7 +205,7 @@ def solve(free, count, rho, length, point, b, work):
         change = (work.share[k] * rho + point.multipliers[k] * work.g[k]) / point.slack[k]
         work.step_multipliers[k] = change
         for entry in range(work.row[k], work.row[k + 1]):
-            if work.owned[entry]:
+            if work.owned[entry] != 0:
                 work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
     return longest_entry(count, work.step) <= FAR * length

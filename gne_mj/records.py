@@ -154,9 +154,11 @@ def fresh(record: Any, **names: Any) -> Any:
     for field in fields(record).values():
         if _are_numbers(field):
             made.append(numbers(field))
-        else:
+        elif isinstance(field, Field):
             item = np.int64 if field.whole else np.float64
             made.append(np.zeros(field.evaluated(names), dtype=item))
+        else:
+            made.append(fresh(field, **names))
     return record(*made)
 
 

@@ -102,7 +102,7 @@ def balance(count, constraints, free, highest, work):
         work.step[r] = 0.0
     for k in range(constraints):
         for entry in range(work.row[k], work.row[k + 1]):
-            if work.owned[entry]:
+            if work.owned[entry] != 0:
                 work.step[free.position[work.column[entry]]] -= work.jacobian[entry] / work.g[k]
     for r in range(count):
         barrier += work.step[r] ** 2
@@ -155,7 +155,7 @@ def sharpen(constraints, free, tolerance, length, point, work):
         for entry in range(work.row[k], work.row[k + 1]):
             slope = abs(work.jacobian[entry])
             r = free.position[work.column[entry]]
-            if slope > 0.0 and work.owned[entry]:
+            if slope > 0.0 and work.owned[entry] != 0:
                 push = max(push, point.multipliers[k] * slope / max(work.unit[r], work.terms[r]))
             size += slope * length
         if size == 0.0:

@@ -1,6 +1,5 @@
 """Run a store's missing chunks, here or on a Dask cluster."""
 
-import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -11,17 +10,13 @@ from gne_mj.batches.progress import Progress, count_early
 from gne_mj.batches.shard import Shard
 from gne_mj.batches.store import Store
 from gne_mj.bounds import check_count
+from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 
 if TYPE_CHECKING:
     from distributed import Client
 
 MOST_THREADS = 1024
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def ahead(plan: Plan, threads: int, cluster: str | None) -> str:
