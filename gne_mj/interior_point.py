@@ -29,7 +29,6 @@ from gne_mj.primal_dual import (
     accept,
     evaluate,
     find_entries,
-    free_actions,
     inside,
     longest,
     longest_entry,
@@ -190,9 +189,8 @@ def centre(data, free, rho, point, work):
 def follow(memory, free, half_band, path, known):
     """Follow the path to path.last_rho, from point's y; the point becomes its end."""
     data, point, work, report = memory.data, memory.point, memory.work, memory.report
-    count, constraints = free_actions(data, free), len(free.constraints)
+    count, constraints = find_entries(data, free, work), len(free.constraints)
     b = min(half_band, max(count - 1, 0))
-    find_entries(data, free, work)
     rho, highest, length, size = begin(data, free, count, b, path, known, point, work)
     if rho == 0.0:
         return OUTSIDE

@@ -81,7 +81,8 @@ def owns(data, j, l):
 
 @kernel
 def find_entries(data, free, work):
-    """Fill row, column and owned: where the constraints' derivatives are that a step needs."""
+    """Fill row, column and owned: where the derivatives are that a step needs; how many actions
+    move."""
     at, entry = data.offsets, 0
     for k in range(len(free.constraints)):
         l = free.constraints[k]
@@ -95,6 +96,11 @@ def find_entries(data, free, work):
                     work.owned[entry] = owned
                     entry += 1
     work.row[len(free.constraints)] = entry
+    count = 0
+    for member in range(len(free.agents)):
+        i = free.agents[member]
+        count += at[i + 1] - at[i]
+    return count
 
 
 @kernel
@@ -247,13 +253,3 @@ def accept(data, free, point, trial):
     for k in range(len(free.constraints)):
         point.slack[k] = trial.slack[k]
         point.multipliers[k] = trial.multipliers[k]
-
-
-@kernel
-def free_actions(data, free):
-    """How many actions move."""
-    count = 0
-    for entry in range(len(free.agents)):
-        i = free.agents[entry]
-        count += data.offsets[i + 1] - data.offsets[i]
-    return count
