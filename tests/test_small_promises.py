@@ -10,7 +10,7 @@ from own_games import boxed, plain_game
 
 from gne_mj import certificate
 from gne_mj.batches import execute
-from gne_mj.batches.execute import cores
+from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
 from gne_mj.games import edges
