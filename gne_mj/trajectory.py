@@ -151,7 +151,8 @@ class Trajectory:
 
         Args:
             parts: by the systems' names.
-            seed, source: of the run.
+            seed: of the run.
+            source: its scenario, as JSON.
             wall_time: real time in s that it took.
             interventions: what the user did meanwhile, each with its time in s.
         """

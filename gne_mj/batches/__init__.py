@@ -64,10 +64,11 @@ def run_batch(
     >>> runs = gne_mj.batch("velocity-sync", sweep, runs=100, out="results/rho")
 
     Args:
-        source, changes: see :func:`gne_mj.load_scenario`.
+        source: see :func:`gne_mj.load_scenario`.
         sweep: dotted keys, each with its values.
         out: folder to write.
         runs: random interior starts of each combination; 0 for the scenario's own start.
+        changes: dotted keys to new values.
         system: which; may be left out if there is only one.
         record: "summaries", "all" samples too, or every so many-th of them.
         seed: from which all starts' seeds follow.

@@ -328,8 +328,11 @@ def make_plan(
     """A plan from a scenario; see :class:`Plan` for the options.
 
     Args:
-        source, changes: see :func:`gne_mj.scenario.load_scenario`.
+        source: see :func:`gne_mj.load_scenario`.
+        changes: likewise.
         system: which; may be left out if there is only one.
+        sweeps: what varies.
+        **options: as of :class:`Plan`.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.

@@ -27,9 +27,10 @@ def load_environment(
     """A dm_env environment of a scenario's fleet.
 
     Args:
-        scenario, changes: as :func:`gne_mj.load_scenario` has them.
+        scenario: as :func:`gne_mj.load_scenario` has it.
+        changes: likewise.
         system: which of the scenario's systems; may be left out if there is only one.
-        options: as :func:`environment_of` has them.
+        **options: as :func:`environment_of` has them.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.

@@ -98,11 +98,15 @@ def game(
         constraints: ``constraints(y, p)`` yields comparisons, each alone or behind its name:
             ``yield "energy", (y**2).sum() <= p.budget``; :func:`private` and :func:`band` declare
             what they are. May be left out where actions have bounds.
-        lower, upper: bounds of the actions, one number for all, one an agent, or one an entry;
-            -inf and inf for none. They become constraints, drawn as bounds of the actions.
+        lower: least actions, one number for all, one an agent, or one an entry; -inf for none.
+            They become constraints, drawn as bounds of the actions.
+        upper: greatest ones, likewise; inf for none.
         dimension: m_i, one number for all or one each.
         name: what the game is called; "own game" if left out.
-        action_name, action_unit, agent_name, axes: as of :class:`gne_mj.game_model.Game`.
+        action_name: as of :class:`gne_mj.Game`.
+        action_unit: likewise.
+        agent_name: likewise.
+        axes: likewise.
         **parameters: numbers, or arrays of them; anything else, and what :func:`fixed` holds, is
             given to the functions as it is.
 

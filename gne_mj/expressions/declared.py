@@ -44,7 +44,8 @@ def band(value: Any, target: Any, width: Any) -> Band:
     equality's own multiplier, of either sign; as the width falls to 0 it tends to the exact one.
 
     Args:
-        value, target: expressions, numbers or arrays.
+        value: an expression.
+        target: what it is to equal, an expression, number or array.
         width: positive number, in their unit.
     """
     return Band(abs(value - target) <= width)

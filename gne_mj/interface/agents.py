@@ -153,7 +153,6 @@ def mjcf_robots(
         lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
         local_damping: d in N s/m, then: the force is u - d v.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
-        contacts: whether main masses collide in MuJoCo; contacts are counted then.
         input_limit: in N or N m.
     """
     each = [file] if isinstance(file, str | Path) else list(file)

@@ -188,9 +188,10 @@ def run(
     >>> gne_mj.run("velocity-sync", {"barrier.rho": 0.02}).status
     >>> gne_mj.run(game, agents=gne_mj.flexible_robots(6), rho=0.02, duration=10.0).plot()
 
+    What is not told here is as :func:`gne_mj.setup` has it.
+
     Args:
-        source, changes, agents, law, rho, start, duration, timestep, control_period,
-        sample_period, engine, integrator, faults, tolerance, seed: see :func:`gne_mj.setup`.
+        source: a game, a shipped scenario's name, a file ending in .toml, or a scenario.
         progress: True to tell on stderr how long it takes and how far it is, as the command does;
             or what is called now and then with the simulated time in s.
 

@@ -152,7 +152,8 @@ def search_push(system: System, clock: Clock, progress: Tell = nothing) -> PushS
     several periods, or once from some time on; the scenario's own faults stay.
 
     Args:
-        system, clock: what is run.
+        system: what is run.
+        clock: of its runs.
         progress: called before every pattern, with how many runs are expected.
     """
     best, pattern, runs, tried = np.inf, None, 0, 0.0

@@ -1,11 +1,13 @@
 """What must hold of the built site: python scripts/site/check.py build/site"""
 
+import importlib
 import re
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 # Attributes by which a page asks for something when it is opened; a link only leads somewhere.
 _RESOURCES = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src",
               "video": "src", "audio": "src", "object": "data", "embed": "src"}  # fmt: skip
@@ -40,10 +42,31 @@ def wrong(site: Path) -> Iterator[str]:
                 yield f"{name} asks another host: {asked}"
         if 'class="arithmatex"' in text:
             yield f"{name} has a formula that was not drawn"
+    yield from _not_shown(site)
     for style in site.rglob("*.css"):
         for asked in re.findall(r"url\(([^)]*)\)|@import", style.read_text(encoding="utf-8")):
             if re.match(r"[\"']?(\w+:)?//", asked):
                 yield f"{style.relative_to(site)} asks another host: {asked}"
+
+
+def _not_shown(site: Path) -> Iterator[str]:
+    """Public names without an entry, keys without their cells, scenarios without their replay."""
+    import gne_mj
+    from gne_mj.scenario import shipped
+
+    entries = (site / "reference/python.html").read_text(encoding="utf-8")
+    for name in gne_mj.__all__:
+        if f'id="gne_mj.{name}"' not in entries and name != "__version__":
+            yield f"gne_mj.{name} has no entry in reference/python.md"
+    modules = (ROOT / "docs/reference/modules.md").read_text(encoding="utf-8")
+    entries = (site / "reference/modules.html").read_text(encoding="utf-8")
+    for module in re.findall(r"(?m)^## .*: `([\w.]+)`", modules):
+        for name in getattr(importlib.import_module(module), "__all__", ()):
+            if f'id="{module}.{name}"' not in entries and not name.isupper():
+                yield f"{module}.{name} has no entry in reference/modules.md"
+    for name in shipped():
+        if not (site / f"gallery/{name}/replay.html").exists():
+            yield f"the gallery does not show {name}"
 
 
 if __name__ == "__main__":

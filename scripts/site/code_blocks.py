@@ -75,7 +75,7 @@ def blocks_of(page: str) -> list[Block]:
 
 
 def exceptions() -> dict[str, list[dict[str, str]]]:
-    """Tables ``shorter``, ``not_run`` and ``first`` of code_blocks.toml."""
+    """Tables ``shorter``, ``first``, ``told_by`` and ``not_run`` of code_blocks.toml."""
     return tomllib.loads(EXCEPTIONS.read_text(encoding="utf-8"))
 
 
@@ -102,7 +102,7 @@ def stale() -> Iterator[str]:
     for each in exceptions()["shorter"]:
         if not any(each["page"] == b.page and each["text"] in b.text for b in everything):
             yield f"{each['page']}: no block has {each['text']!r}"
-    for each in exceptions()["not_run"]:
+    for each in exceptions()["not_run"] + exceptions()["told_by"]:
         here = [b.text.splitlines()[0] for b in everything if b.page == each["page"]]
         if not any(each["begins"] in first for first in here):
             yield f"{each['page']}: no block begins with {each['begins']!r}"
@@ -130,6 +130,7 @@ class Page:
             elif block.kind == "keys":
                 check_keys(block.text)
             elif block.kind == "compare":
+                self.told(block)
                 self.compare(block.text)
             elif block.language == "sh":
                 self.shell(block.text)
@@ -153,7 +154,8 @@ class Page:
             if line is not None and not _SERVER.match(line):
                 waiting.append(line)
                 continue
-            self.bash("".join(waiting))
+            if waiting:
+                self.bash("".join(waiting))
             waiting = []
             if line is not None:
                 serve(line)
@@ -165,6 +167,12 @@ class Page:
         )
         self.printed += done.stdout + done.stderr
         assert done.returncode == 0, f"{text}\n{self.printed}"
+
+    def told(self, block: Block) -> None:
+        """What prints a block, where no block of the page does."""
+        for each in exceptions()["told_by"]:
+            if each["page"] == self.page and each["begins"] in block.text:
+                self.bash(f"({each['run'].strip()}) || true")
 
     def compare(self, shown: str) -> None:
         """What is shown has to be among what was printed, line by line."""
