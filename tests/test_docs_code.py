@@ -1,13 +1,16 @@
 """Code in the documents is run by scripts/check-docs; here: that nothing escapes it."""
 
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "scripts/site"))
-import code_blocks  # noqa: E402
+_SPEC = spec_from_file_location("code_blocks", ROOT / "scripts/site/code_blocks.py")
+code_blocks = module_from_spec(_SPEC)
+sys.modules["code_blocks"] = code_blocks
+_SPEC.loader.exec_module(code_blocks)
 
 BLOCKS = [block for page in code_blocks.pages() for block in code_blocks.blocks_of(page)]
 

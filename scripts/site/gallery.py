@@ -22,7 +22,8 @@ def show(name: str, folder: Path) -> None:
         run = gm.run(name)
         run.plot(new)
         (new / "run.txt").write_text(f"{run}\n", encoding="utf-8")
-        (new / "certificate.txt").write_text(f"{gm.certify(run)}\n", encoding="utf-8")
+        certified = "\n".join(str(gm.certify(run, system=each)) for each in run.systems)
+        (new / "certificate.txt").write_text(f"{certified}\n", encoding="utf-8")
         write_html(run, new / "replay.html", name)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import roles
 import shown
 import sources
-from commands import commands_page
+from command_page import commands_page
 from mathml import with_mathml
 from mkdocs.structure.files import File, Files, InclusionLevel
 
