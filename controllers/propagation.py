@@ -10,7 +10,6 @@ Laplacian: work and memory grow with edges times agents.
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy.special import ive
 
 from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
@@ -71,6 +70,8 @@ def propagator(graph: Graph, duration: float) -> Propagator:
 
 def _series(half: float) -> np.ndarray:
     """Coefficients of exp(-half (1 + x)) in T_0(x), T_1(x), ... on [-1, 1]."""
+    from scipy.special import ive  # slow to load, and for laws with estimates only
+
     terms = np.arange(30 + int(12 * half**0.5))  # they fall like exp(-k^2 / (2 half))
     size = 2.0 * ive(terms, half)
     size[0] *= 0.5

@@ -6,7 +6,6 @@ written twice by Zarr, in each array's folder and consolidated, and must agree. 
 without checksums are read as they are.
 """
 
-import asyncio
 import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -54,6 +53,8 @@ def every_chunk() -> Iterator[None]:
 
 
 async def _others_end() -> None:
+    import asyncio  # slow to load, and for what writes only
+
     others = asyncio.all_tasks() - {asyncio.current_task()}
     await asyncio.gather(*others, return_exceptions=True)
 

@@ -8,20 +8,20 @@ of :mod:`gne_mj.interior_point`.
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from itertools import pairwise
 from threading import Lock
 from typing import NamedTuple, NoReturn
 from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from gne_mj import interior_point as method
 from gne_mj.cores import cores
 from gne_mj.errors import InfeasibleStart, InvalidInput, SolverError
-from gne_mj.game_model import Game
+from gne_mj.game_model import Game, compressed
 from gne_mj.numbers import flat
+from gne_mj.ordering import reverse_cuthill_mckee
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import forgive_pending, raise_pending
 from gne_mj.records import arrays
@@ -348,19 +348,31 @@ def order(game: Game) -> tuple[NDArray[np.int64], int]:
 
     Two agents are coupled if one is in the other's cost or both are in one constraint.
     """
-    data, n = game.data, game.agents
-    costs = _incidence(data.cost_pointer, data.cost_index, n)
-    members = _incidence(data.member_pointer, data.member_index, n)
-    coupled = csr_array(costs + costs.T + members.T @ members)
-    sequence = reverse_cuthill_mckee(coupled, symmetric_mode=True)
-    sizes = np.diff(data.offsets)
-    first = np.empty(n, dtype=np.int64)  # row of each agent's first action
+    coupled = compressed(_coupled(game))
+    sequence = reverse_cuthill_mckee(*coupled)
+    sizes = np.diff(game.data.offsets)
+    first = np.empty(game.agents, dtype=np.int64)  # row of each agent's first action
     first[sequence] = np.cumsum(sizes[sequence]) - sizes[sequence]
     position = first[game.agent_of_action] + np.arange(game.actions)
-    position -= data.offsets[game.agent_of_action]
-    row, column = coupled.nonzero()
+    position -= game.data.offsets[game.agent_of_action]
+    row, column = np.repeat(np.arange(game.agents), np.diff(coupled[0])), coupled[1]
     return position, int(np.max(first[row] + sizes[row] - 1 - first[column], initial=0))
 
 
-def _incidence(pointer: NDArray[np.int64], index: NDArray[np.int64], columns: int) -> csr_array:
-    return csr_array((np.ones(len(index)), index, pointer), shape=(len(pointer) - 1, columns))
+def _coupled(game: Game) -> list[list[int]]:
+    """Of each agent those it is coupled with, itself among them where it is in any function."""
+    data = game.data
+    rows: list[set[int]] = [set() for _ in range(game.agents)]
+    for i, cost in enumerate(_groups(data.cost_pointer, data.cost_index)):
+        rows[i].update(cost)
+        for j in cost:
+            rows[j].add(i)
+    for members in set(_groups(data.member_pointer, data.member_index)):
+        for i in members:
+            rows[i].update(members)
+    return [sorted(row) for row in rows]
+
+
+def _groups(pointer: NDArray[np.int64], index: NDArray[np.int64]) -> list[tuple[int, ...]]:
+    entries = index.tolist()
+    return [tuple(entries[a:b]) for a, b in pairwise(pointer.tolist())]

@@ -311,9 +311,9 @@ class Game:
             np.array(self.parameters, dtype=np.float64),
             np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64),
             self.agent_of_action.astype(np.int64),
-            *_compress(ordered),
-            *_compress(self.in_constraint),
-            *_compress(own),
+            *compressed(ordered),
+            *compressed(self.in_constraint),
+            *compressed(own),
             self.margins.copy(),
             np.arange(self.agents),
             np.arange(self.constraints_count),
@@ -329,7 +329,7 @@ class Game:
         at = self.data.offsets
         rows = [[a for i in agents for a in range(at[i], at[i + 1])]
                 for agents in self.in_constraint]  # fmt: skip
-        return _compress(rows)
+        return compressed(rows)
 
     @property
     def called(self) -> str:
@@ -442,6 +442,7 @@ class Game:
         return out
 
 
-def _compress(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def compressed(rows: Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each of some lists begins, with the last one's end, and the lists end to end."""
     pointer = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
     return pointer, np.array([entry for row in rows for entry in row], dtype=np.int64)

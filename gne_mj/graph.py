@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.csgraph import laplacian as csgraph_laplacian
-from scipy.sparse.linalg import eigsh
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.bounds import MOST_EDGES, check_count
 from gne_mj.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Up to this many agents eigenvalues come from dense matrices
 _DENSE = 300
@@ -51,13 +51,13 @@ class Graph:
                 raise InvalidInput("edges", [i + 1, j + 1], "an edge joins two agents")
             unique.add((min(i, j), max(i, j)))
         object.__setattr__(self, "edges", tuple(sorted(unique)))
-        parts, label = connected_components(self.adjacency, directed=False)
-        if parts > 1:
-            apart = [int(i) + 1 for i in np.flatnonzero(label != label[0])]
+        part = parts(self.data.neighbour, self._hearer, self.agents)
+        if np.any(part > 0):
+            apart = [int(i) + 1 for i in np.flatnonzero(part > 0)]
             shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
             raise InvalidInput(
                 "edges",
-                f"{len(self.edges)} edges in {parts} parts",
+                f"{len(self.edges)} edges in {len(set(part.tolist()))} parts",
                 f"the graph must be connected; agent 1 cannot reach"
                 f" agent{'s' if len(apart) > 1 else ''} {shown}",
             )
@@ -67,28 +67,22 @@ class Graph:
         return f"<Graph of {self.agents} agents, {len(self.edges)} edges{connectivity}>"
 
     @cached_property
-    def adjacency(self) -> csr_array:
-        """Adjacency matrix, shape (N, N), sparse."""
-        if not self.edges:
-            return csr_array((self.agents, self.agents), dtype=float)
-        i, j = np.array(self.edges, dtype=np.int64).T
-        ones = np.ones(2 * len(i))
-        pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
-        matrix = csr_array((ones, pairs), shape=(self.agents, self.agents))
-        matrix.sort_indices()
-        return matrix
-
-    @cached_property
     def laplacian(self) -> np.ndarray:
         """L = D - A, shape (N, N), dense and read-only."""
-        matrix = self.sparse_laplacian.toarray()
+        matrix = np.diag(np.diff(self.data.pointer).astype(np.float64))
+        matrix[self._hearer, self.data.neighbour] = -1.0
         matrix.flags.writeable = False
         return matrix
 
     @cached_property
-    def sparse_laplacian(self) -> csr_array:
+    def sparse_laplacian(self) -> "csr_array":
         """L = D - A, shape (N, N), sparse."""
-        return csgraph_laplacian(self.adjacency).tocsr()
+        from scipy.sparse import csr_array  # slow to load, and for many agents only
+
+        agents, (pointer, neighbour) = np.arange(self.agents), self.data
+        at = np.concatenate([self._hearer, agents]), np.concatenate([neighbour, agents])
+        values = np.concatenate([np.full(len(neighbour), -1.0), np.diff(pointer)])
+        return csr_array((values, at), shape=(self.agents, self.agents))
 
     @cached_property
     def algebraic_connectivity(self) -> float:
@@ -97,6 +91,8 @@ class Graph:
             return 0.0
         if self.agents <= _DENSE:
             return float(np.linalg.eigvalsh(self.laplacian)[1])
+        from scipy.sparse.linalg import eigsh
+
         # Inverse iteration about a point below zero, where L is regular.
         near = eigsh(self.sparse_laplacian.tocsc(), k=2, sigma=-1e-4, return_eigenvectors=False)
         return float(np.max(near))
@@ -108,6 +104,8 @@ class Graph:
             return 0.0
         if self.agents <= _DENSE:
             return float(np.linalg.eigvalsh(self.laplacian)[-1])
+        from scipy.sparse.linalg import eigsh
+
         # A ring's or line's greatest eigenvalues crowd: full accuracy takes half a minute there.
         start = np.random.default_rng(0).normal(size=self.agents)
         largest = eigsh(
@@ -118,8 +116,35 @@ class Graph:
     @cached_property
     def data(self) -> GraphData:
         """Neighbour lists for native code."""
-        adjacency = self.adjacency
-        return GraphData(adjacency.indptr.astype(np.int64), adjacency.indices.astype(np.int64))
+        pairs = np.array(self.edges, dtype=np.int64).reshape(-1, 2)
+        hearer, heard = np.concatenate([pairs, pairs[:, ::-1]]).T
+        order = np.lexsort((heard, hearer))
+        degrees = np.bincount(hearer, minlength=self.agents)
+        return GraphData(np.concatenate([[0], np.cumsum(degrees)]), heard[order])
+
+    @property
+    def _hearer(self) -> NDArray[np.int64]:
+        """Who hears each of the neighbours of `data`."""
+        return np.repeat(np.arange(self.agents), np.diff(self.data.pointer))
+
+
+def parts(first: ArrayLike, second: ArrayLike, count: int) -> NDArray[np.int64]:
+    """The connected parts of ``count`` vertices, each named by its least vertex, shape (count,).
+
+    Args:
+        first, second: the ends of the edges, numbered from 0.
+    """
+    ends = np.asarray(first, dtype=np.int64), np.asarray(second, dtype=np.int64)
+    part = np.arange(count)
+    while True:
+        least = np.minimum(*(part[end] for end in ends))
+        joined = part.copy()
+        for end in ends:
+            np.minimum.at(joined, part[end], least)
+        joined = joined[joined]
+        if np.array_equal(joined, part):
+            return part
+        part = joined
 
 
 def line(agents: int) -> Graph:

@@ -24,6 +24,9 @@ LEAVING = (
     "--set", "recording.period=0.2", "--set", "simulation.duration=2",
     "--set", "controller.mode=sampled", "--set", "simulation.control_period=0.4",
 )  # fmt: skip
+# What only some commands need, a tenth of a second or more each
+STORING = {"xarray", "zarr", "pandas", "matplotlib", "asyncio"}
+NUMERICAL = {"scipy.linalg", "scipy.sparse", "scipy.special", "scipy.optimize", "scipy.spatial"}
 HEAVY = {"numba", "mujoco", "xarray", "matplotlib", "scipy", "zarr", "dm_control"}
 
 
@@ -62,15 +65,34 @@ except SystemExit as ended:
             assert name in done.stdout
 
 
-def test_a_run_loads_no_optimisers():
-    code = (
-        "import sys, gne_mj; gne_mj.run('velocity-sync', {'simulation.duration': 0.1}).report();"
-        " print({'scipy.optimize', 'matplotlib'} & set(sys.modules))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "set()\n"
+@pytest.mark.parametrize(
+    ("command", "unneeded"),
+    [
+        (("run", "velocity-sync", *SHORT), STORING | NUMERICAL),
+        (("solve", "osnr"), STORING | NUMERICAL | {"mujoco"}),
+        (("certify", "velocity-sync"), STORING | {"scipy.special", "scipy.optimize"}),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else "",
+)
+def test_a_command_loads_only_what_it_needs(command, unneeded):
+    code = f"""
+import sys
+sys.argv = ["gne-mj", *{command!r}, "--json"]
+from gne_mj.cli import main
+try:
+    main()
+finally:
+    print(sorted({unneeded!r} & set(sys.modules)), file=sys.stderr)
+"""
+    program = [sys.executable, "-c", code]
+    for _ in range(2):  # the first one may have to compile, for which numba loads all it has
+        done = subprocess.run(
+            program, env=environment(), capture_output=True, text=True, check=True
+        )
+        loaded = done.stderr.splitlines()[-1]
+        if loaded == "[]":
+            break
+    assert loaded == "[]"
 
 
 def test_no_command_shows_the_help():

@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 import reference
 from gne_mj import graph as graphs
@@ -33,6 +35,15 @@ def test_random_trees_with_extra_edges(count, random):
     for i in range(count):
         heard = graph.data.neighbour[graph.data.pointer[i] : graph.data.pointer[i + 1]]
         assert set(heard) == set(np.flatnonzero(graph.laplacian[i] < 0))
+
+
+@given(st.integers(1, 40), st.integers(0, 60), st.integers(0, 2**32 - 1))
+def test_parts_are_the_connected_components(count, edges, seed):
+    first, second = np.random.default_rng(seed).integers(0, count, (2, edges))
+    matrix = csr_array((np.ones(edges), (first, second)), shape=(count, count))
+    _, label = connected_components(matrix, directed=False)
+    part = graphs.parts(first, second, count)
+    assert np.array_equal(part, [np.flatnonzero(label == own)[0] for own in label])
 
 
 def test_refusals():

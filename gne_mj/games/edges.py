@@ -5,8 +5,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from gne_mj import graph as graphs
 from gne_mj.errors import InvalidInput
@@ -83,12 +81,6 @@ def neighbours(pairs: Pairs, agents: int) -> list[list[int]]:
     return found
 
 
-def symmetric(first: ArrayLike, second: ArrayLike, values: ArrayLike, vertices: int) -> csr_array:
-    """The pairs' values as a sparse matrix, at (first, second) only."""
-    at = (np.asarray(first, dtype=np.int64), np.asarray(second, dtype=np.int64))
-    return csr_array((np.asarray(values), at), shape=(vertices, vertices))
-
-
 def leaders(key: str, pairs: Pairs, weight: NDArray[np.float64]) -> NDArray[np.int64]:
     """Agents of positive weight, of which each connected part must have one.
 
@@ -97,9 +89,7 @@ def leaders(key: str, pairs: Pairs, weight: NDArray[np.float64]) -> NDArray[np.i
         pairs: the edges.
         weight: (N,), of which those that are positive make leaders.
     """
-    graph = symmetric([i for i, _ in pairs], [j for _, j in pairs], np.ones(len(pairs)),
-                      len(weight))  # fmt: skip
-    _, part = connected_components(graph, directed=False)
+    part = graphs.parts([i for i, _ in pairs], [j for _, j in pairs], len(weight))
     led = np.isin(part, part[weight > 0])
     if not np.all(led):
         apart = [int(i) + 1 for i in np.flatnonzero(part == part[np.argmin(led)])]

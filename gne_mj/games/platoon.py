@@ -27,7 +27,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.linalg import eigvalsh_tridiagonal
 
 from gne_mj.bounds import MOST_AGENTS, check_count
 from gne_mj.errors import InvalidInput
@@ -130,6 +129,8 @@ def _bounds(
 
 def _check_monotone(own: Array, weight: Array, given: ArrayLike) -> None:
     """Refuse weights of spacings (N - 1,) and places (N,) without a strongly monotone F."""
+    from scipy.linalg import eigvalsh_tridiagonal  # slow to load, and for this game only
+
     size = max(np.max(weight), np.max(own, initial=0.0), 1e-300)
     diagonal = 2.0 * (np.concatenate([[0.0], own]) / size + weight / size)
     least = diagonal[0]

@@ -19,7 +19,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.sparse.csgraph import dijkstra
 
 from gne_mj.bounds import MOST_ACTIONS, check_count
 from gne_mj.errors import InvalidInput
@@ -145,7 +144,10 @@ def _box(
     agents: int,
 ) -> Box:
     """No agent is farther from v_0 than the shortest way there over edges of length delta."""
-    lengths = graph.symmetric(first, second, bounds, agents + 1)
+    from scipy.sparse import csr_array  # slow to load, and for this game only
+    from scipy.sparse.csgraph import dijkstra
+
+    lengths = csr_array((bounds, (first, second)), shape=(agents + 1, agents + 1))
     reach = dijkstra(lengths, directed=False, indices=agents)[:agents, None]
     return (reference - reach).ravel(), (reference + reach).ravel()
 

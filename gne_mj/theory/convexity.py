@@ -12,14 +12,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from gne_mj.errors import UserCodeError
 from gne_mj.game_model import Box, Game
 from gne_mj.system import System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.constants import EXACT, Slopes, profiles
-from gne_mj.theory.spectra import positive_definite
+from gne_mj.theory.spectra import gram, positive_definite
 
 Array = NDArray[np.float64]
 
@@ -178,10 +177,10 @@ def strictly_convex_barrier(system: System) -> bool:
     for y in _samples(game, system.start, most=_FEW):
         slopes = game.constraint_jacobian(y)
         sizes = np.linalg.norm(slopes, axis=1)
-        unit = csr_array(slopes / np.where(sizes > 0.0, sizes, 1.0)[:, None])
+        unit = slopes / np.where(sizes > 0.0, sizes, 1.0)[:, None]
         curved = game.weighted_constraint_hessian(y, np.ones(game.constraints_count))
         size = float(np.max(np.abs(curved)))
-        span += (unit.T @ unit).toarray() + (curved / size if size > 0.0 else 0.0)
+        span += gram(unit) + (curved / size if size > 0.0 else 0.0)
     floor = (1e-12 if game.has_constraint_hessian else 1e-7) * np.max(np.abs(span))
     span[np.diag_indices(game.actions)] -= floor
     return positive_definite(span)

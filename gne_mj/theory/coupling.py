@@ -14,16 +14,17 @@ has at least. That it is positive definite is sufficient for V to fall.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigvalsh, helmert
-from scipy.sparse import block_diag, csr_array
-from scipy.sparse.linalg import eigsh
 
 from gne_mj.graph import Graph
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.spectra import positive_definite
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 
@@ -127,6 +128,9 @@ def least_coupling(
     Returns:
         infinity if no c suffices.
     """
+    from scipy.linalg import cho_factor, cho_solve  # slow to load, and for certificates only
+    from scipy.sparse import csr_array
+
     if loss is None:
         loss = np.zeros_like(slope)
     agent, column = _entries(slope, loss, owner)
@@ -159,8 +163,10 @@ def _second_term(
     owner: NDArray[np.int64],
     agent: NDArray[np.int64],
     column: NDArray[np.int64],
-) -> csr_array:
+) -> "csr_array":
     """sum_r (e_r s_r' + s_r e_r')/2 - w_r w_r' in the owners' entries of **y**, symmetric."""
+    from scipy.sparse import csr_array
+
     rows, columns, values = [], [], []
     for i in range(int(owner[-1]) + 1):
         mine = np.flatnonzero(agent == i)
@@ -177,8 +183,13 @@ def _second_term(
     return csr_array(entries, shape=shape)
 
 
-def _disagreements(graph: Graph, agent: NDArray[np.int64], column: NDArray[np.int64]) -> csr_array:
+def _disagreements(
+    graph: Graph, agent: NDArray[np.int64], column: NDArray[np.int64]
+) -> "csr_array":
     """The bases V_r side by side, (entries, entries - m)."""
+    from scipy.linalg import helmert
+    from scipy.sparse import block_diag, csr_array
+
     # The pseudo-inverse but for a constant, which differences do not see
     inverse = np.linalg.inv(graph.laplacian + 1.0 / graph.agents)
     bases = []
@@ -191,6 +202,9 @@ def _disagreements(graph: Graph, agent: NDArray[np.int64], column: NDArray[np.in
 
 def _greatest(matrix: NDArray[np.float64]) -> float:
     """The greatest eigenvalue of a symmetric matrix, rounded up where it is found by iteration."""
+    from scipy.linalg import eigvalsh
+    from scipy.sparse.linalg import eigsh
+
     size = len(matrix)
     if size > _DENSE:
         start = np.random.default_rng(0).normal(size=size)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from gne_mj.plants.agent_type import by_type, energy_balance
 from gne_mj.plants.agents import Agents
@@ -119,6 +118,8 @@ def alpha(dissipation: Array, output: int, beta: float) -> float:
 
 def decay_rate(storage: Array, dissipation: Array, output: int, beta: float) -> float:
     """The greatest s with D + beta C'C >= s P/2 in all channels: then dV/dt <= -s V."""
+    from scipy.linalg import eigh  # slow to load, and for certificates only
+
     raised = _raised(dissipation, output, beta)
     return float(
         min(eigh(d, 0.5 * p, eigvals_only=True)[0] for d, p in zip(raised, storage, strict=True))
