@@ -86,7 +86,9 @@ class Schedule:
 class BarrierTable(Table):
     """phi = -rho sum_l log(-g_l) [eq:logbarrier]"""
 
-    rho: float = Field(0.1, gt=0, description="the penalty; at the start, if it has a schedule")
+    rho: Annotated[float, Unit("the costs'")] = Field(
+        0.1, gt=0, description="the penalty; at the start, if it has a schedule"
+    )
     schedule: Annotated[Annotated[str, SCHEDULES] | None, Fills("kind")] = Field(
         None, description="how rho falls in time; constant if left out"
     )

@@ -1,5 +1,6 @@
 """The page of all keys is what the tables say."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -49,7 +50,19 @@ def test_a_type_is_told_in_words():
 
     rows = keys._rows(Made).splitlines()[2:]
     assert rows == [
-        "| `one` | list of lists of numbers |  |  |  |  |",
-        "| `pairs` | list of pairs of whole numbers |  | `[[1, 2]]` |  |  |",
-        "| `names` | table |  |  |  |  |",
+        "| `one` | list of lists of numbers | 1 | left out | any |  |",
+        "| `pairs` | list of pairs of whole numbers | 1 | `[[1, 2]]` | any |  |",
+        "| `names` | table |  | left out |  |  |",
     ]
+
+
+def test_every_key_has_a_default_and_every_number_a_unit_and_a_range():
+    rows = re.findall(r"(?m)^\| `\w+` \| .*\|$", keys.page())
+    assert len(rows) > 150
+    for row in rows:
+        _, _, kind, unit, default, within, *_ = (
+            each.strip() for each in re.split(r"(?<!\\)\|", row)
+        )
+        assert default, row
+        if "number" in kind and not kind.startswith("`"):
+            assert "" not in (unit, within), row

@@ -140,7 +140,9 @@ class CournotTable(GameTable):
     demand_intercept: float | None = Field(
         None, description="D, price of an empty market; 60 N if left out"
     )
-    lower_bound: PerAgent = Field(7.0, description="least quantity of each firm")
+    lower_bound: Annotated[PerAgent, Unit("", "< upper_bound")] = Field(
+        7.0, description="least quantity of each firm"
+    )
     upper_bound: Annotated[PerAgent, Unit("", "> lower_bound")] = Field(
         100.0, description="greatest quantity of each firm"
     )

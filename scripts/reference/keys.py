@@ -17,7 +17,9 @@ HEAD = """# All keys of a scenario
 
 `scripts/keys` writes this page from the tables that read scenarios; what is changed here is lost.
 
-What is not said to be given may be left out. *One or a list*: one number for all agents, or a list
+What is not said to be given may be left out; where "left out" is the default, what then holds is
+told beside it. The unit 1 is that of numbers without one, as weights and counts; "any" is any
+finite number. *One or a list*: one number for all agents, or a list
 with one for each; of actions with several entries also one list for all, or a list of lists. The
 action's unit is the game's; the input's is N or N m for robots, else the action's per second.
 `gne-mj run --set KEY=VALUE` changes any of these by its dotted name, in which `systems.NAME.` may
@@ -66,10 +68,17 @@ def _rows(table: type[Table]) -> str:
         if key in ("type", "information"):
             continue
         unit = next((each for each in field.metadata if isinstance(each, Unit)), Unit(""))
-        cells = [f"`{key}`", _kind(field), unit.name, _default(field),
-                 unit.range or _range(field), field.description or ""]  # fmt: skip
+        number = _is_number(field)
+        measured, within = unit.name or "1" * number, unit.range or _range(field) or "any" * number
+        cells = [f"`{key}`", _kind(field), measured, _default(field), within,
+                 field.description or ""]  # fmt: skip
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n" if len(lines) > 2 else "It has no keys of its own.\n"
+
+
+def _is_number(field: FieldInfo) -> bool:
+    """Whether a key has numbers, and no names that stand for them."""
+    return "number" in _kind(field) and not _kind(field).startswith("`")
 
 
 def _kind(field: FieldInfo) -> str:
@@ -110,7 +119,7 @@ def _default(field: FieldInfo) -> str:
         return "must be given"
     value = field.default
     if value is None or isinstance(value, Table) or value in ({}, []):
-        return ""
+        return "left out"
     return f"`{json.dumps(value)}`"
 
 
