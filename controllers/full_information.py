@@ -16,6 +16,8 @@ from gne_mj.game_model import Game
 from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS
 
+LANES = True  # numbers or lanes
+
 
 @dataclass(frozen=True, eq=False)
 class FullInformation(Law):

@@ -43,6 +43,8 @@ from gne_mj.native import copy, kernel
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
 
+LANES = True  # numbers or lanes
+
 
 @dataclass(frozen=True, eq=False)
 class PartialInformation(Law):

@@ -81,12 +81,11 @@ def flat(values: Any) -> NDArray[Any]:
 
 
 class _Place(types.Type):
-    """The address of some numbers."""
+    """The address of some numbers, of the type that the array they lie in has."""
 
-    def __init__(self, record: type[Numbers]) -> None:
-        self.names = names_of(record)
-        self.item = types.int64 if are_whole(record) else types.float64
-        super().__init__(name=f"Numbers({record.__module__}.{record.__qualname__})")
+    def __init__(self, record: type[Numbers], item: types.Type) -> None:
+        self.names, self.item = names_of(record), item
+        super().__init__(name=f"Numbers({record.__module__}.{record.__qualname__}, {item})")
 
 
 @register_model(_Place)
@@ -123,7 +122,7 @@ def _set(context: Any, builder: Any, signature: Any, arguments: Any, name: str) 
 @cache
 def numbers_in(record: type[Numbers]) -> Callable[..., Any]:
     """The kernel ``found(flat, at)``: numbers that begin at an entry of a flat array, by name."""
-    kind, count, dtype = _Place(record), len(names_of(record)), dtype_in(record)  # type: ignore[arg-type]
+    count, dtype = len(names_of(record)), dtype_in(record)  # type: ignore[arg-type]
 
     def found(flat, at):
         return flat[at : at + count].view(dtype)[0]
@@ -134,7 +133,7 @@ def numbers_in(record: type[Numbers]) -> Callable[..., Any]:
             array = make_array(flat)(context, builder, arguments[0])
             return builder.gep(array.data, [arguments[1]])
 
-        return kind(flat, types.intp), codegen
+        return _Place(record, flat.dtype)(flat, types.intp), codegen
 
     @overload(found, jit_options=KERNEL)
     def _found(flat, at):

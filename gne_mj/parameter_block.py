@@ -25,7 +25,11 @@ class ParameterBlock:
 
     Attributes:
         arrays: as they were given.
+        modules: those of the run's kernels, where lanes can go through all of them
+            (:mod:`gne_mj.loops.lane_batch`).
     """
+
+    modules: Any = None
 
     def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
         for array in arrays:

@@ -8,6 +8,7 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from gne_mj.loops.batch import BatchLoop, EachLoop
+from gne_mj.loops.lane_batch import modules_for
 from gne_mj.loops.layout import Setup, ode_parameter_block
 from gne_mj.loops.ode_batch import OdeBatch
 from gne_mj.parameter_block import ParameterBlock
@@ -56,7 +57,11 @@ class Structure:
             return None
         memory = len(system.loop_memory)
         if self._plant is None:
-            return ode_parameter_block(setup, system.agents, memory)
+            block = ode_parameter_block(setup, system.agents, memory)
+            block.modules = modules_for(
+                system.agents.kind, system.law.kernels, system.game.kernels, setup
+            )
+            return block
         from gne_mj.loops.mujoco_workspace import mujoco_parameter_block
 
         return mujoco_parameter_block(self._plant, setup, system.agents, memory)

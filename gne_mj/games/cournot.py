@@ -27,6 +27,8 @@ from gne_mj.native import kernel
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import PerAgent, Unit
 
+LANES = True  # numbers or lanes
+
 
 def cournot_game(
     agents: int,

@@ -26,6 +26,8 @@ from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import Unit
 
+LANES = True  # numbers or lanes
+
 
 def osnr_game(
     price: Sequence[float],

@@ -23,6 +23,8 @@ from gne_mj.quantity import Quantity
 from gne_mj.registry import GAMES
 from gne_mj.toml_table import PerAgent, Unit, per_agent
 
+LANES = True  # numbers or lanes
+
 
 def velocity_game(
     agents: int,

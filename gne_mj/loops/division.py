@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.controllers.settings import GUARDED
+from gne_mj.lanes import where
 from gne_mj.loops import monitor as watch
 from gne_mj.native import copy, kernel
 from gne_mj.numbers import Numbers
@@ -135,7 +136,7 @@ def ordinary(count, problem, work, stages):
     for k in range(len(g)):
         start = stages.g[k]
         good &= abs(g[k] - start) <= -LITTLE * (start + tightening[k])
-    if count == 1 or not good:
+    if count == 1:
         return good
     y, tiny = stages.y, TINY * stages.size[0]
     first, second, third, fourth = y[:m], y[m : 2 * m], y[2 * m : 3 * m], y[3 * m :]
@@ -154,30 +155,33 @@ def stiffness(problem, stages, m, k):
         for r in range(data.offsets[i], data.offsets[i + 1]):
             bend = max(bend, abs(y[2 * m + r] - y[m + r]))
             turn = max(turn, abs(y[3 * m + r] - 2.0 * y[2 * m + r] + y[r]))
-    if not bend > ROUNDING * stages.size[0]:
-        return 0.0
-    return min(turn / bend, STIFFEST)
+    return where(bend > ROUNDING * stages.size[0], min(turn / bend, STIFFEST), 0.0)
 
 
 @kernel
-def error_of(count, h, problem, work, stages, k):
-    """The error of slack k in a piece of h seconds over what is allowed of it."""
+def euler_error(h, problem, work, stages, k):
+    """The error of slack k in a piece of h seconds of Euler's method over what is allowed of it."""
+    division, p, start = work.division, len(work.g), stages.g[k]
+    if division.rated == 0.0 or division.level >= FINEST:
+        return 0.0
+    slack = -start - problem.data.tightening[k]
+    error = 0.5 * abs(work.g[k] - start - h * stages.g[p + k])
+    return error / (OF_SLACK_EULER * slack)
+
+
+@kernel
+def error_of(problem, work, stages, finest, k):
+    """The same of Runge-Kutta 4; ``finest`` says whether the piece is a finest one."""
     m, p, start = len(work.y), len(work.g), stages.g[k]
     slack = -start - problem.data.tightening[k]
-    finest = work.division.level >= FINEST
-    if count == 1:
-        if work.division.rated == 0.0 or finest:
-            return 0.0
-        error = 0.5 * abs(work.g[k] - start - h * stages.g[p + k])
-        return error / (OF_SLACK_EULER * slack)
     z = stiffness(problem, stages, m, k)
     change = abs(work.g[k] - start)
     part = change / max(slack, slack + start - work.g[k])
     error = abs(stages.g[2 * p + k] - stages.g[p + k]) * z * z * z / 30.0
     error += slack * z * part * part * part * part / 50.0
-    if finest:
-        return error / min(OF_SLACK_AT_LAST * slack, OF_SIZE_AT_LAST * stages.size[1 + k])
-    return error / min(OF_SLACK * slack, OF_SIZE * stages.size[1 + k])
+    of_slack = where(finest, OF_SLACK_AT_LAST, OF_SLACK)
+    of_size = where(finest, OF_SIZE_AT_LAST, OF_SIZE)
+    return error / min(of_slack * slack, of_size * stages.size[1 + k])
 
 
 @kernel
@@ -208,7 +212,10 @@ def judge(count, h, problem, work):
         return -1
     finest = division.level >= FINEST
     for k in range(p):
-        error = error_of(count, h, problem, work, stages, k)
+        if count == 1:
+            error = euler_error(h, problem, work, stages, k)
+        else:
+            error = error_of(problem, work, stages, finest, k)
         use, gain = use_of(count, problem, work, stages, k)
         if not error <= 1.0 or not gain <= GAIN or not (use <= USE or finest):
             return k

@@ -56,14 +56,15 @@ class Run(NamedTuple):
     h: Annotated[np.ndarray, "1"]  # length of a step in s
 
 
-def _place(name: str) -> int:
+def place_in_block(name: str) -> int:
+    """The index in a parameter block of a field's first array."""
     return PLANT_BLOCK + place(Run, name)
 
 
-STEPS, H = _place("steps"), _place("h")
+STEPS, H = place_in_block("steps"), place_in_block("h")
 steps_in = in_numbers(Steps, STEPS)  # of a parameter block, by its address
-_problem = in_parameter_block(Problem, _place("problem"))
-_channels = in_parameter_block(Channels, _place("channels"))
+_problem = in_parameter_block(Problem, place_in_block("problem"))
+_channels = in_parameter_block(Channels, place_in_block("channels"))
 
 
 class LoopClock(NamedTuple):

@@ -1,15 +1,20 @@
 """Batches of ODE agents: a compiled loop over runs, on threads."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from types import ModuleType
 
 import numpy as np
 
-from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
+from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin
+from gne_mj.loops.lane_batch import LaneLoop, Modules
+from gne_mj.loops.layout import Steps
 from gne_mj.loops.ode import build, ode_workspace_length, workspaces_of
 from gne_mj.native import call_integer, compiled
+from gne_mj.parameter_block import ParameterBlock
 
-PIECE = 8  # runs that a thread takes at a time
+PIECE, MANY = 8, 256  # runs that a thread takes at a time; and at most, where lanes go through them
+LEAST = 50_000  # steps of all runs for which a loop of lanes is compiled; results are the same
 STRIDE = 20_000  # steps of each of them between looks at the user's wishes
 
 
@@ -37,33 +42,59 @@ class OdeBatch(BatchLoop):
     ) -> None:
         self._advance = build(faults)
         self._faulty, self._threads = faulty, threads
+        self._workers = ThreadPoolExecutor(threads)
+        self._loops: dict[Modules, LaneLoop] = {}
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
         parameter_blocks, sizes, recorder, monitors = begin(cases, span, self._faulty)
-        addresses = np.array(
-            [parameter_block.address for parameter_block in parameter_blocks], dtype=np.int64
+        known = {block: block.address for block in set(parameter_blocks)}
+        addresses = np.array([known[block] for block in parameter_blocks], dtype=np.int64)
+        starts = np.concatenate(
+            [
+                np.stack([case.state for case in cases]).reshape(len(cases), -1),
+                np.stack([case.memory for case in cases]),
+            ],
+            axis=1,
         )
-        starts = np.stack([np.concatenate([c.state.ravel(), c.memory]) for c in cases])
-        length = ode_workspace_length(sizes)
+        length, rows = ode_workspace_length(sizes), recorder.addresses
+        in_lanes = None
+        if len(cases) * span.steps >= LEAST and not self._faulty:
+            in_lanes = self._in_lanes(parameter_blocks[0], sizes)
+        size = PIECE
+        if in_lanes is not None:
+            size = min(MANY, PIECE * -(-len(cases) // (PIECE * self._threads)))
 
         def piece(first: int) -> bool:
-            part = slice(first, first + PIECE)
+            part = slice(first, first + size)
             flat = np.zeros((len(addresses[part]), length))
             workspaces = workspaces_of(flat, sizes)
-            workspaces.loop.recorder = recorder.addresses[part]
+            workspaces.loop.recorder = rows[part]
             workspaces.vectors.state = starts[part]
             at = flat.ctypes.data + 8 * length * np.arange(len(flat))
-            for done in range(0, span.steps, STRIDE):
-                if stopped():
+            own = parameter_blocks[part]
+            if in_lanes is not None and in_lanes.fits(own):
+                if not in_lanes.move(own, addresses[part], at, span.steps, stopped):
                     return False
-                steps = min(STRIDE, span.steps - done)
-                _advance_each(self._advance.address, addresses[part], at, steps)
+            else:
+                for done in range(0, span.steps, STRIDE):
+                    if stopped():
+                        return False
+                    steps = min(STRIDE, span.steps - done)
+                    _advance_each(self._advance.address, addresses[part], at, steps)
             recorder.heads.first[part] = span.last
             _advance_each(self._advance.address, addresses[part], at, 0)
             monitors[part] = workspaces.loop.monitor
             return True
 
-        with workers(self._threads) as pool:
-            done = list(pool.map(piece, range(0, len(cases), PIECE)))
+        done = list(self._workers.map(piece, range(0, len(cases), size)))
         return Outcome(recorder.all(), monitors) if all(done) else None
+
+    def _in_lanes(self, block: ParameterBlock, sizes: Steps) -> LaneLoop | None:
+        """What moves runs with the first one's kernels in lanes, if anything does."""
+        modules = block.modules
+        if modules is None:
+            return None
+        if modules not in self._loops:
+            self._loops[modules] = LaneLoop(modules, sizes, int(self._advance.address))
+        return self._loops[modules]

@@ -28,7 +28,7 @@ class Head(Numbers):
 HEADER = len(names_of(Head))  # the same as two pairs of a parameter block
 WORDS = HEADER + 2 * count(Samples)
 
-_head_in, _columns_in = numbers_in(Head), columns_in(Samples, HEADER // 2)
+head_in, columns_in_block = numbers_in(Head), columns_in(Samples, HEADER // 2)
 
 
 @kernel
@@ -49,12 +49,12 @@ def record(block, faults, parts, step, now):
         step: which.
         now: :class:`gne_mj.loops.base.Present`, all flat, as at the step's start.
     """
-    head = _head_in(integers_at(block, HEADER), 0)
+    head = head_in(integers_at(block, HEADER), 0)
     behind, rows = step - head.first, head.rows
     row = behind // head.every
     if behind < 0 or behind % head.every != 0 or row >= rows:
         return
-    columns = _columns_in(block)
+    columns = columns_in_block(block)
     write(columns.state, rows, row, now.state)
     write(columns.input, rows, row, parts.u)
     write(columns.memory, rows, row, now.memory)

@@ -15,8 +15,10 @@ Channel parameters q = [M, m, stiffness, atan_coefficient, gamma].
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.elementary import arctangent, logarithm
 from gne_mj.native import kernel
 
+LANES = True  # numbers or lanes
 NAME = "flexible robot"
 PARAMETERS = ("main_mass", "appendage_mass", "stiffness", "atan_coefficient", "damping")
 STATES = (
@@ -60,7 +62,7 @@ def energy_balance(parameters: NDArray[np.float64]) -> tuple[NDArray[np.float64]
 @kernel
 def shared(q, x):
     """What both the rate and V need: the extension's arctangent."""
-    return np.arctan(x[0])
+    return arctangent(x[0])
 
 
 @kernel
@@ -72,7 +74,7 @@ def spring_force(q, x, arctangent):
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'; u in N."""
-    rate_given(q, x, u, np.arctan(x[0]), out)
+    rate_given(q, x, u, arctangent(x[0]), out)
 
 
 @kernel
@@ -88,7 +90,7 @@ def rate_given(q, x, u, arctangent, out):
 @kernel
 def euler_step(q, x, u, h, out):
     """One semi-implicit Euler step, as MuJoCo's: velocities first, positions with the new ones."""
-    force = spring_force(q, x, np.arctan(x[0]))
+    force = spring_force(q, x, arctangent(x[0]))
     velocity = x[1] + h * (u - force) / q[0]
     appendage = x[2] + h * force / q[1]
     out[0] = x[0] + h * (velocity - appendage)
@@ -127,7 +129,7 @@ def equilibrium(q, y, out):
 @kernel
 def storage(q, x, equilibrium_state):
     """V^{x*}(x): since psi(0) = 0 at rest, the energy of the deviation."""
-    return storage_given(q, x, equilibrium_state, np.arctan(x[0]))
+    return storage_given(q, x, equilibrium_state, arctangent(x[0]))
 
 
 @kernel
@@ -135,7 +137,7 @@ def storage_given(q, x, equilibrium_state, arctangent):
     """The same where the extension's arctangent is at hand."""
     extension = x[0]
     spring = 0.5 * q[2] * extension * extension + q[3] * (
-        extension * arctangent - 0.5 * np.log(1.0 + extension * extension)
+        extension * arctangent - 0.5 * logarithm(1.0 + extension * extension)
     )
     main, appendage = x[1] - equilibrium_state[1], x[2] - equilibrium_state[2]
     return spring + 0.5 * q[0] * main * main + 0.5 * q[1] * appendage * appendage

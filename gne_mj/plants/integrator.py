@@ -26,6 +26,7 @@ from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import Sizes, dimension_of
 
+LANES = True  # numbers or lanes
 NAME = "integrator"
 PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)

@@ -21,6 +21,7 @@ from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import PerAgent, Sizes, Unit, dimension_of
 
+LANES = True  # numbers or lanes
 NAME = "PI cascade"
 PARAMETERS = ("decay_rate", "integral_gain")
 STATES = (("action", ""), ("integral", ""))
