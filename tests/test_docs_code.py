@@ -3,6 +3,7 @@
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
@@ -38,7 +39,7 @@ def test_no_exception_is_stale():
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: f"{block.page}")
 def test_python_compiles(block):
     if block.language == "python":
-        compile(block.text, block.page, "exec")
+        compile(dedent(block.text), block.page, "exec")
 
 
 def test_a_failing_block_fails_its_page(tmp_path, monkeypatch):

@@ -163,7 +163,7 @@ class Page:
     def bash(self, text: str) -> None:
         """A script, whose first failure ends it."""
         done = subprocess.run(
-            ["bash", "-e", "-c", text], capture_output=True, text=True, timeout=300, check=False
+            ["bash", "-e", "-c", text], capture_output=True, text=True, timeout=1200, check=False
         )
         self.printed += done.stdout + done.stderr
         assert done.returncode == 0, f"{text}\n{self.printed}"
@@ -196,7 +196,7 @@ def serve(line: str) -> None:
     else:
         raise AssertionError(f"{line}\n{told}")
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    process.communicate(timeout=600)
 
 
 def check_keys(text: str) -> None:

@@ -1,12 +1,15 @@
-"""Writes docs/figures/concept-*.svg, the figures of docs/concepts.md."""
+"""Writes docs/figures/concept-*.svg and start-*.svg: figures of docs/concepts.md and index.md."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 import gne_mj as gm
+from gne_mj.cli.templates import TEMPLATES
 from gne_mj.equilibrium import path, variational_equilibrium
 from gne_mj.plots.style import COLOURS, line_style, styled, subplots
 
@@ -109,6 +112,17 @@ def sampled(axes: Any) -> None:
     axes.legend()
 
 
+def start() -> None:
+    """The game that `gne-mj new game mine` writes."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for end, text in TEMPLATES["game"].items():
+            (folder / f"mine{end}").write_text(text.replace("NAME", "mine"), encoding="utf-8")
+        gm.run(folder / "mine.toml").plot(folder, ("svg",))
+        for what in ("actions", "budget-value"):
+            shutil.copy(folder / f"robots-{what}.svg", FOLDER / f"start-{what}.svg")
+
+
 def two_boats() -> gm.Game:
     """J_i = (y_i - wanted_i)^2 / 2 with y_1 + y_2 <= 2."""
     return gm.game(
@@ -126,6 +140,7 @@ DRAWN: dict[str, Callable[[Any], None]] = {
 }  # fmt: skip
 
 if __name__ == "__main__":
+    start()
     for name, draw in DRAWN.items():
         with styled():
             figure, axes = subplots(1, 1, 4.6, 2.9)
