@@ -152,6 +152,18 @@ def test_a_run_of_a_batch_is_run_alone(tmp_path, capsys):
         (["batch", "velocity-sync", "--runs", "-1", "--out", "{tmp}/x"], "--runs: got -1"),
         (["batch", "velocity-sync", "--spread", "1", "--out", "{tmp}/x"], "--spread: got 1"),
         (["batch", "velocity-sync", "--threads", "-1", "--out", "{tmp}/x"], "--threads: got -1"),
+        (
+            ["batch", "velocity-sync", "--check-in-mujoco", "2", "--out", "{tmp}/x"],
+            "--check-in-mujoco: got '2', but it must be a share",
+        ),
+        (
+            ["batch", "velocity-sync", "--check-in-mujoco", "1%", "--out", "{tmp}/x"],
+            "--check-in-mujoco: got 0.01, but it is for plant.engine = 'ode'",
+        ),
+        (
+            ["batch", "osnr", "--check-in-mujoco", "1%", "--out", "{tmp}/x"],
+            "--check-in-mujoco: got 0.01, but these runs are not for MuJoCo",
+        ),
         (["batch", "velocity-sync", "--record", "some", "--out", "{tmp}/x"], "--record: got 'some"),
         (
             ["batch", "velocity-sync", "--cluster", "tcp://127.0.0.1:9", "--out", "{tmp}/x"],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gne_mj.arguments import answering
 from gne_mj.batches.cluster import connected
 from gne_mj.batches.execute import ahead, execute
-from gne_mj.batches.plan import Plan, make_plan, parse_record
+from gne_mj.batches.plan import Plan, make_plan, parse_record, parse_share
 from gne_mj.batches.progress import Progress, of_runs
 from gne_mj.batches.shard import Shard, parse_shard
 from gne_mj.batches.store import Store
@@ -34,6 +34,7 @@ __all__ = [
     "open_batch",
     "parse_record",
     "parse_shard",
+    "parse_share",
     "parse_sweep",
     "run_batch",
 ]
@@ -52,6 +53,7 @@ def run_batch(
     seed: int = 0,
     spread: float = 0.9,
     chunk: int = 0,
+    check_in_mujoco: float | str = 0.0,
     threads: int = 0,
     resume: bool = False,
     cluster: str | None = None,
@@ -74,6 +76,8 @@ def run_batch(
         seed: from which all starts' seeds follow.
         spread: how far towards the boundary random starts lie, between 0 and 1.
         chunk: runs that are stored together; chosen if 0.
+        check_in_mujoco: the share of runs, on engine "ode", that are made in MuJoCo too, as 0.01 or
+            "1%"; the seed says which, and the dataset has how far each is from its twin.
         threads: native threads; 0 for one a processor.
         resume: go on with what an earlier call has begun there, if there is such a folder.
         cluster: address of a Dask scheduler to run on.
@@ -90,6 +94,7 @@ def run_batch(
         plan = make_plan(
             source, changes, system=system, sweeps=_sweeps(sweep or {}), starts=runs, seed=seed,
             spread=spread, record=parse_record(record), chunk=chunk,
+            check_in_mujoco=_share(check_in_mujoco),
         )  # fmt: skip
         with connected(cluster) as client, if_asked(progress) as tell:
             begin = Store.resume if resume and Path(out).exists() else Store.create
@@ -100,6 +105,11 @@ def run_batch(
                 shown = progress
             execute(store, threads=threads, cluster=client, progress=shown)
         return store.dataset()
+
+
+def _share(given: float | str) -> float:
+    with named(given="check_in_mujoco"):
+        return parse_share(given)
 
 
 def _sweeps(given: Mapping[str, Sequence[Any]]) -> list[Sweep]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.batches.engine_check import differences, the_same_in_mujoco, unchecked
 from gne_mj.batches.plan import Combination, Plan
 from gne_mj.batches.structure import Structure, key_of
 from gne_mj.batches.summary import (
@@ -20,7 +21,7 @@ from gne_mj.batches.summary import (
 )
 from gne_mj.errors import InfeasibleStart, part_of
 from gne_mj.loops.base import ClosedLoop
-from gne_mj.loops.batch import Case
+from gne_mj.loops.batch import Case, Outcome
 from gne_mj.loops.layout import Setup
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
@@ -52,7 +53,7 @@ class Runner:
 
     def __init__(self, plan: Plan, threads: int) -> None:
         self.plan, self.threads = plan, threads
-        self._prepared: OrderedDict[int, _Prepared] = OrderedDict()
+        self._prepared: OrderedDict[tuple[int, bool], _Prepared] = OrderedDict()
         self._structures: OrderedDict[Hashable, Structure] = OrderedDict()
 
     def run(self, chunk: int, stopped: Callable[[], bool] = lambda: False) -> Labelled | None:
@@ -87,8 +88,8 @@ class Runner:
             if outcome is None:
                 return None
         done, parts = 0, {}
-        for (prepared, _), own in zip(entries, cases, strict=True):
-            inside = np.array([case is not None for case in own])
+        for (prepared, starts), own in zip(entries, cases, strict=True):
+            inside, part = np.array([case is not None for case in own]), None
             columns = [refused_columns(int(np.sum(~inside)))]
             if outcome is not None and np.any(inside):
                 runs = slice(done, done + int(np.sum(inside)))
@@ -98,8 +99,46 @@ class Runner:
                 with combination.scenario.naming(self.plan.name), part_of("system"):
                     columns.insert(0, columns_of(combination, span, part, self.plan.record))
             order = np.argsort(np.argsort(~inside, kind="stable"), kind="stable")
-            parts[prepared.combination.number] = rearranged(join(columns), order)
+            kept = rearranged(join(columns), order)
+            if self.plan.check_in_mujoco:
+                found = self._checked(prepared, starts, (inside, part), stopped)
+                if found is None:
+                    return None
+                kept |= found
+            parts[prepared.combination.number] = kept
         return parts
+
+    def _checked(
+        self,
+        prepared: _Prepared,
+        starts: list[int],
+        twins: tuple[NDArray[np.bool_], Outcome | None],
+        stopped: Callable[[], bool],
+    ) -> Labelled | None:
+        """How far runs are from the same in MuJoCo; not a number of those that are not made there.
+
+        Args:
+            prepared: their combination.
+            starts: theirs.
+            twins: (starts,) which began, and what these showed.
+            stopped: as of :meth:`run`; then the result is None.
+        """
+        kept, (began, outcome) = unchecked(len(starts)), twins
+        combination = prepared.combination
+        runs = combination.number * self.plan.each + np.array(starts)
+        chosen = np.flatnonzero(np.isin(runs, self.plan.checked) & began)
+        if not len(chosen) or outcome is None:
+            return kept
+        other = self._prepare(combination.number, in_mujoco=True)
+        cases = [case for case in self._cases(other, [starts[k] for k in chosen]) if case]
+        shown = self._structure(other).loop.run(cases, span_of(combination), stopped)
+        raise_pending()
+        if shown is None:
+            return None
+        same = outcome.part(np.cumsum(began)[chosen] - 1)
+        for name, values in zip(kept, differences(combination, same, shown), strict=True):
+            kept[name][1][chosen] = values
+        return kept
 
     def _entries(self, chunk: int) -> Iterator[tuple[_Prepared, list[int]]]:
         """The combinations of a chunk, each with its starts in it."""
@@ -109,19 +148,23 @@ class Runner:
             runs = range(max(first, number * each), min(end, (number + 1) * each))
             yield self._prepare(number), [run - number * each for run in runs]
 
-    def _prepare(self, number: int) -> _Prepared:
-        if number not in self._prepared:
+    def _prepare(self, number: int, *, in_mujoco: bool = False) -> _Prepared:
+        """A combination, or the same in MuJoCo."""
+        name = number, in_mujoco
+        if name not in self._prepared:
             combination = self.plan.combination(number)
+            if in_mujoco:
+                combination = the_same_in_mujoco(combination)
             prepared = _Prepared(combination)
             system = combination.system
             if system is not None:
                 with combination.scenario.naming(system.name), part_of("system", "clock"):
                     setup = system.setup(combination.clock)
                 prepared = _Prepared(combination, key_of(system, combination.clock, setup), setup)
-            self._prepared[number] = prepared
+            self._prepared[name] = prepared
             while len(self._prepared) > _COMBINATIONS:
                 self._prepared.popitem(last=False)
-        return self._prepared[number]
+        return self._prepared[name]
 
     def _structure(self, prepared: _Prepared) -> Structure:
         key, combination = prepared.key, prepared.combination

@@ -7,6 +7,7 @@ same noise, so that combinations are compared on equal terms.
 
 import hashlib
 import json
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ _NOT_SWEPT = {
 }
 _CHUNK_RUNS = 256
 _CHUNK_BYTES = 2**27  # of rows in memory
+_CHECK = 1  # which random numbers say what is checked
 _LEAST_CHUNKS = 16  # of a small batch, so that its progress is seen and little is lost
 
 
@@ -70,6 +72,8 @@ class Plan:
         spread: how far towards the boundary random starts lie, between 0 and 1.
         record: every which sample is kept; 0 for summaries only.
         chunk: runs that are stored together; chosen if 0.
+        check_in_mujoco: the share of runs, on engine "ode", that are made in MuJoCo too; from 0
+            to 1.
     """
 
     scenario: Mapping[str, Any]
@@ -79,6 +83,7 @@ class Plan:
     spread: float = 0.9
     record: int = 0
     chunk: int = 0
+    check_in_mujoco: float = 0.0
 
     def __post_init__(self) -> None:
         for key in ("starts", "seed", "record", "chunk"):
@@ -87,6 +92,9 @@ class Plan:
             raise InvalidInput("seed", self.seed, "it must not exceed 2^53")
         if not isinstance(self.spread, int | float) or not 0.0 < self.spread < 1.0:
             raise InvalidInput("spread", self.spread, "it must lie between 0 and 1, without them")
+        share = self.check_in_mujoco
+        if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
+            raise InvalidInput("check_in_mujoco", share, "it must lie between 0 and 1")
         self._check_sweeps()
         if self.runs > MOST_RUNS:
             raise InvalidInput("starts", self.runs, f"a batch has {MOST_RUNS} runs at most")
@@ -180,6 +188,13 @@ class Plan:
             return np.array([self.scenario["simulation"]["seed"]])
         words = np.random.SeedSequence(self.seed).generate_state(self.each, np.uint64)
         return (words >> np.uint64(11)).astype(np.int64)
+
+    @cached_property
+    def checked(self) -> NDArray[np.int64]:
+        """The runs, by number, that are made in MuJoCo too: so many, drawn by the seed."""
+        count = math.ceil(self.check_in_mujoco * self.runs)
+        draw = np.random.default_rng([self.seed, _CHECK])
+        return np.sort(draw.choice(self.runs, count, replace=False, shuffle=False))
 
     def of_run(self, run: int) -> tuple[int, int]:
         """A run's combination and start."""
@@ -299,6 +314,7 @@ class Plan:
             "spread": self.spread,
             "record": self.record,
             "chunk": self.chunk,
+            **({"check_in_mujoco": self.check_in_mujoco} if self.check_in_mujoco else {}),
             "files": _digests(self.scenario),
             "versions": versions(),
         }
@@ -314,6 +330,7 @@ class Plan:
             spread=manifest["spread"],
             record=manifest["record"],
             chunk=manifest["chunk"],
+            check_in_mujoco=manifest.get("check_in_mujoco", 0.0),
         )
 
 
@@ -360,6 +377,22 @@ def parse_record(given: str | int) -> int:
     if isinstance(given, int) and not isinstance(given, bool) and given > 0:
         return given
     raise InvalidInput("given", given, "it must be 'summaries', 'all' or a whole number from 1")
+
+
+def parse_share(given: str | float) -> float:
+    """A share of runs: a number from 0 to 1, or a percentage such as "1%".
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    text = str(given).strip()
+    try:
+        share = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        share = math.nan
+    if isinstance(given, bool) or not 0.0 <= share <= 1.0:
+        raise InvalidInput("given", given, "it must be a share from 0 to 1, or from 0% to 100%")
+    return share
 
 
 def _whole(key: str, given: Any) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gne_mj import plots
 from gne_mj.batch_variables import figures
+from gne_mj.batches.engine_check import STATES, SUMMARIES
 from gne_mj.batches.integrity import reading
 from gne_mj.batches.store import RUNS, Store
 from gne_mj.errors import InvalidInput
@@ -28,11 +29,14 @@ class Report:
         runs: what is one number (or word) a run, of the runs that are stored.
         table: one row for each combination, see :func:`combinations`.
         paths: of the files.
+        check: how far runs in MuJoCo are from their twins, see :func:`check_of`; None where that
+            was not asked for.
     """
 
     runs: "xarray.Dataset"
     table: "pandas.DataFrame"
     paths: tuple[Path, ...]
+    check: dict[str, Any] | None
 
 
 def write_report(
@@ -66,7 +70,7 @@ def write_report(
         with written("target", target / f"summary.{kind}", replace=True) as path:
             plots.save_batch(runs, path, kind)
         paths.append(target / f"summary.{kind}")
-    return Report(runs, table, tuple(paths))
+    return Report(runs, table, tuple(paths), check_of(runs))
 
 
 def figures_of(store: Store) -> "xarray.Dataset":
@@ -84,6 +88,40 @@ def figures_of(store: Store) -> "xarray.Dataset":
         runs = kept.load()
     runs.attrs["planned"] = store.plan.runs
     return runs.isel(run=np.flatnonzero(runs["status"].notnull().to_numpy()))
+
+
+def check_of(runs: "xarray.Dataset") -> dict[str, Any] | None:
+    """How far runs that were made in MuJoCo too are from their twins; None if none were to be.
+
+    Returns:
+        runs: how many, of those that are stored; ended_differently: of these, those that ended
+        early in one engine only; and of the others the greatest state_difference and
+        summary_difference, each with its run (null where there is none).
+    """
+    if STATES not in runs:
+        return None
+    states, figures = runs[STATES].to_numpy(), runs[SUMMARIES].to_numpy()
+    unlike = np.isinf(states) | np.isinf(figures)
+    found: dict[str, Any] = {
+        "runs": int(np.sum(~np.isnan(states))), "ended_differently": int(np.sum(unlike)),
+    }  # fmt: skip
+    for key, values in (("state_difference", states), ("summary_difference", figures)):
+        known = np.flatnonzero(np.isfinite(values))
+        worst = known[np.argmax(values[known])] if len(known) else None
+        found[key] = None if worst is None else float(values[worst])
+        found[f"{key}_run"] = None if worst is None else int(runs["run"].to_numpy()[worst])
+    return found
+
+
+def checked(check: dict[str, Any]) -> str:
+    """That in one line."""
+    words = f"checked in MuJoCo: {check['runs']:,} runs"
+    if check["state_difference"] is not None:
+        words += f"; states differ by {check['state_difference']:.2g} at most, summaries by"
+        words += f" {check['summary_difference']:.2g}"
+    if check["ended_differently"]:
+        words += f"; {check['ended_differently']:,} ended differently"
+    return words
 
 
 def combinations(runs: "xarray.Dataset") -> "pandas.DataFrame":

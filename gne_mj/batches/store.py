@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gne_mj import chunks
 from gne_mj.batch_variables import declared_figures
+from gne_mj.batches.engine_check import check_plan, unchecked
 from gne_mj.batches.integrity import AGAIN, broken, kept_of_runs, lost_chunks, read_statuses
 from gne_mj.batches.plan import FORMAT, Combination, Plan
 from gne_mj.batches.summary import columns_of, join, kept, span_of, times
@@ -55,6 +56,7 @@ class Store:
             InvalidInput: the folder exists, or combinations have no common layout.
             StorageError: it cannot be written, as on a full disk.
         """
+        check_plan(plan)
         if os.path.lexists(folder):
             raise InvalidInput("folder", str(folder), "it exists already; name one that does not")
         with storing("folder", folder):
@@ -358,7 +360,7 @@ def _schema(plan: Plan) -> tuple[Combination, Labelled]:
                     ", ".join(sweep.key for sweep in plan.sweeps),
                     f"'{name}' must have the same shape in all combinations",
                 )
-    return first, join(list(known.values()))
+    return first, join(list(known.values())) | (unchecked(1) if plan.check_in_mujoco else {})
 
 
 def _check_layout(first: Combination, other: Combination) -> None:

@@ -63,6 +63,15 @@ SPREAD = Annotated[
     float,
     typer.Option("--spread", help="How far towards the boundary starts lie, between 0 and 1."),
 ]
+CHECK = Annotated[
+    str,
+    typer.Option(
+        "--check-in-mujoco",
+        metavar="SHARE",
+        help="Make this share of the runs, as 1%, in MuJoCo too, and tell how far they are apart;"
+        " for engine 'ode'.",
+    ),
+]
 CHUNK = Annotated[int, typer.Option("--chunk", help="Runs that are stored together; 0: chosen.")]
 THREADS = Annotated[int, typer.Option("--threads", help="Native threads; 0 for one a processor.")]
 RESUME = Annotated[bool, typer.Option("--resume", help="Go on with what is in DIR already.")]
@@ -95,6 +104,7 @@ def batch(
     seed: SEED = 0,
     spread: SPREAD = 0.9,
     chunk: CHUNK = 0,
+    check_in_mujoco: CHECK = "0",
     threads: THREADS = 0,
     resume: RESUME = False,
     cluster: CLUSTER = None,
@@ -116,12 +126,13 @@ def batch(
         of_runs,
         parse_record,
         parse_shard,
+        parse_share,
     )
     from gne_mj.errors import InvalidInput, named
     from gne_mj.extras import need
 
     need("plots", "a batch's figure")
-    changed = bool(sweeps or set_ or system or starts or seed or chunk)
+    changed = bool(sweeps or set_ or system or starts or seed or chunk or check_in_mujoco != "0")
     if source is None and (changed or record != "summaries" or spread != 0.9):
         raise InvalidInput(
             "source", None, "a scenario must be named, unless `resume` `folder` DIR is all there is"
@@ -141,6 +152,7 @@ def batch(
                 spread=spread,
                 record=meaning("record", parse_record, record),
                 chunk=chunk,
+                check_in_mujoco=meaning("check_in_mujoco", parse_share, check_in_mujoco),
             )
         store = _opened(plan, folder, resume, part)
         with telling(PREPARING, quiet=as_json) as tell:
@@ -256,18 +268,21 @@ def _partial(store: "Store", now: "Progress") -> str:
 
 
 def _print(store: "Store", now: "Progress", report: "Report", as_json: bool) -> None:
-    from gne_mj.batches.report import summary
+    from gne_mj.batches.report import checked, summary
 
     if as_json:
         statuses = report.runs["status"].to_series().value_counts()
         words: dict[str, Any] = {
             **_counts(now),
             "statuses": {str(name): int(count) for name, count in statuses.items()},
+            **({"check_in_mujoco": report.check} if report.check else {}),
             "combinations": json.loads(report.table.to_json(orient="records")),
         }
         emit(json.dumps(words, indent=2))
         return
     print("\n".join(summary(report.table, list(report.runs.attrs["swept"]))))
+    if report.check:
+        print(f"\n{checked(report.check)}")
     print(f"\nruns        {store.folder / 'runs.zarr'}")
     for path in report.paths:
         print(f"{'figure' if path.stem == 'summary' else 'table':11} {path}")

@@ -79,7 +79,7 @@ class Outcome:
     samples: Samples
     monitors: Any
 
-    def part(self, runs: slice) -> "Outcome":
+    def part(self, runs: slice | NDArray[np.int64]) -> "Outcome":
         """Of some runs only."""
         return Outcome(Samples(*(column[runs] for column in self.samples)), self.monitors[runs])
 
