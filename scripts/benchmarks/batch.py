@@ -18,7 +18,8 @@ from gne_mj.batches.chunk import Runner
 from gne_mj.loops.batch import Span
 from gne_mj.plants.fleet import compile_model, compose
 
-RUNS, STEPS, H = 4096, 100, 0.01
+RUNS, STEPS, H = 1024, 100, 0.01
+FEWER = 512  # runs, where two engines or numbers of threads are compared
 INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
 
 
@@ -107,7 +108,7 @@ def _bare(turns: int) -> list[dict[str, str]]:
 
 
 def _threads(turns: int) -> list[dict[str, str]]:
-    runs = 1024
+    runs = FEWER
     found = []
     for engine, name in (("mujoco", "MuJoCo"), ("ode", "ODE twin")):
         one, two = Ours(runs, 1, engine), Ours(runs, 2, engine)
@@ -129,7 +130,7 @@ def _threads(turns: int) -> list[dict[str, str]]:
 
 
 def _twins(turns: int) -> list[dict[str, str]]:
-    runs = 1024
+    runs = FEWER
     mujoco_, ode = Ours(runs, 2), Ours(runs, 2, "ode")
     last = [each.loop.run(each.cases, Span(STEPS, STEPS), lambda: False) for each in (mujoco_, ode)]
     apart = np.max(np.abs(last[0].samples.state - last[1].samples.state))

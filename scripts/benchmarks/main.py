@@ -1,70 +1,66 @@
-"""Run every benchmark and write one Markdown table of ratios."""
+"""Measure what is compared, as ratios, in turns in one process; keep and compare what was found.
+
+A table in Markdown, and the same as JSON beside it. What is kept is in docs/benchmarks, one file a
+machine and version, of which docs/benchmarks.md shows the last one written.
+"""
 
 import argparse
-import platform
-from importlib.metadata import version
+import importlib
+import sys
+import time
 from pathlib import Path
 
-import batch
-import fleet
-import peer_cbfpy
-import peer_diffrax
-import peer_mjx
-import positions
-import solver
-import twin
-import view
+import comparison
+import history
+
+# What is measured, and where; those of :mod:`peer_common` come last
+GROUPS = {
+    "startup": "startup", "batch": "batch", "fleet": "fleet", "positions": "positions",
+    "growth": "growth", "solver": "solver", "twin": "twin", "view": "view", "mjx": "peer_mjx",
+    "diffrax": "peer_diffrax", "cbfpy": "peer_cbfpy",
+}  # fmt: skip
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def main() -> None:
-    """Parse the arguments, measure, and print or write the table."""
+    """Parse the arguments and measure or compare."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=25, help="turns of which the median counts")
-    parser.add_argument("--out", type=Path, help="Markdown file to write; printed if left out")
+    parser.add_argument("--runs", type=int, default=20, help="turns of which the median counts")
+    parser.add_argument(
+        "--only", nargs="+", choices=GROUPS, metavar="GROUP", help=f"of {', '.join(GROUPS)}"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.md", help="where to; printed if left out")
+    parser.add_argument(
+        "--keep", action="store_true", help="keep the rows in docs/benchmarks and the page"
+    )
+    parser.add_argument(
+        "--compare", nargs=2, type=Path, metavar=("BEFORE", "AFTER"),
+        help="measure nothing; name rows of two JSON files that became worse: exit status 1",
+    )  # fmt: skip
     options = parser.parse_args()
+    if options.compare:
+        sys.exit(comparison.tell(*map(history.read, options.compare)))
     if options.out and options.out.exists():
         parser.error(f"--out: {options.out} exists already; name another file")
-    rows: list[dict[str, str]] = []
-    for group in (batch, fleet, positions, solver, twin, view, peer_mjx, peer_diffrax, peer_cbfpy):
-        rows.extend(group.rows(options.runs))
-        if options.out:  # after each group, so that an interruption keeps what was measured
-            options.out.write_text(table(rows, options.runs), encoding="utf-8")
+    measured = _measured(options.only or list(GROUPS), options.runs, options.out)
+    if options.keep:
+        history.keep(measured, DOCS)
     if not options.out:
-        print(table(rows, options.runs))
+        print(history.table(measured))
 
 
-def table(rows: list[dict[str, str]], runs: int) -> str:
-    """The rows in Markdown, with the machine and the versions named."""
-    packages = (
-        "gne-mj", "mujoco", "numba", "numpy", "scipy", "nashopt", "jax", "mujoco-mjx", "diffrax",
-        "cbfpy", "elastiqp", "qpax",
-    )  # fmt: skip
-    versions = ", ".join(f"{name} {version(name)}" for name in packages)
-    lines = [
-        "# Benchmarks",
-        "",
-        f"Medians of {runs} turns in one process, compiled and warm, one thread where no"
-        f" cores are named. Machine: {_processor()}; Python {platform.python_version()},"
-        f" {versions}. Repeat with `scripts/benchmark`.",
-        "",
-        "| what | ours | other | ratio | target |",
-        "|---|---|---|---|---|",
-        *(
-            f"| {row['what']} | {row['ours']} | {row['other']} | {row['ratio']} | {row['target']} |"
-            for row in rows
-        ),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
+def _measured(names: list[str], runs: int, out: Path | None) -> history.Measured:
+    """The rows of some groups; those in `out` after each group outlive an interruption."""
+    # All before any is measured, and peers first, which settle what JAX computes with
+    groups = {name: importlib.import_module(GROUPS[name]) for name in reversed(names)}
+    found = history.Measured.here(runs)
+    for name in names:
+        began = time.perf_counter()
+        found = found.with_rows(name, groups[name].rows(runs))
+        print(f"{name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+        if out:
+            history.write(found, out)
+    return found
 
 
 if __name__ == "__main__":

@@ -292,6 +292,7 @@ def measure(twin: Twin, name: str, runs: int) -> list[dict[str, str]]:
             "other": f"{median[key]:.2f}",
             "ratio": f"{median[key] / median['ours']:.1f}",
             "target": target,
+            "better": "higher",
         }
         for key, law, target in (
             ("numba", "law and Jacobian by numba", ">= 8"),
