@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import gne_mj
+
 ROOT = Path(__file__).parents[1]
 PAGES = [
     ROOT / "README.md",
@@ -50,3 +52,16 @@ def test_headings_that_are_linked_are_there(page):
         headings = re.findall(r"(?m)^#+ (.+)$", other.read_text(encoding="utf-8"))
         anchors = {re.sub(r"[^\w -]", "", h.lower()).replace(" ", "-") for h in headings}
         assert anchor in anchors, f"{other.name}#{anchor}"
+
+
+def test_every_public_name_has_an_entry():
+    """Of the built site, with modules' names, scripts/site/check.py asks the same."""
+    text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
+    entries = re.findall(r"(?m)^::: gne_mj\.(\w+)$", text)
+    assert sorted(entries) == sorted(set(gne_mj.__all__) - {"__version__"})
+
+
+def test_every_page_is_in_the_sites_order():
+    order = re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.M)
+    pages = [path.relative_to(ROOT / "docs").as_posix() for path in ROOT.glob("docs/**/*.md")]
+    assert sorted(order) == sorted(pages)
