@@ -17,7 +17,7 @@ from gne_mj.scenario import load_scenario
 from gne_mj.viewer import Session
 
 FLEETS = {5: 0.3, 100: 2.0, 500: 8.0}  # robots, ms allowed for a frame
-SECONDS = 0.4  # of one turn
+SECONDS = 0.3  # of one turn
 
 BROWSER = """
 import asyncio, contextlib, sys
@@ -65,7 +65,8 @@ def watched(count: int) -> Iterator[Session]:
     tables = load_scenario("velocity-sync").model_dump(mode="json", exclude_none=True)
     system = tables["systems"]["robots"]
     system["agents"]["count"], system["initial"] = count, {}
-    tables["simulation"]["duration"] = 1e6
+    # As long as no session gets, with as many samples as may be recorded of 500 robots
+    tables["simulation"]["duration"], tables["recording"]["period"] = 1e4, 0.5
     session = Session(load_scenario(tables), "benchmark", speed=None)
     browser = subprocess.Popen([sys.executable, "-c", BROWSER, session.server.url])
     try:
