@@ -99,25 +99,3 @@ def estimate_rates(problem, y, memory, out):
                 row[r] -= scale * sent[r]
     for r in range(m):
         out[data.owner[r] * m + r] = 0.0
-
-
-@kernel
-def barrier_profile(data, i, own_action, estimates, profile):
-    """Fill the profile (own action, **y**^i_-i) where agent i's constraints read it.
-
-    Args:
-        data: the game's.
-        i: the agent.
-        own_action: (m_i,) what stands in its own block.
-        estimates: its row (m,).
-        profile: (m,), filled in the blocks of all agents in a constraint with y_i.
-    """
-    at = data.offsets
-    for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
-        k = data.own_index[entry]
-        for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
-            j = data.member_index[member]
-            for r in range(at[j], at[j + 1]):
-                profile[r] = estimates[r]
-    for r in range(len(own_action)):
-        profile[at[i] + r] = own_action[r]

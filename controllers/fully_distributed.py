@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from gne_mj.controllers.estimates import (
-    barrier_profile,
     clear_others,
     estimate_rates,
     move_estimates,
@@ -117,47 +116,47 @@ class FullyDistributed(Law):
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,); return -1, or agent * p + constraint of the first estimate outside.
 
-    The true profile's weights are not read: in their place agents use those of their estimates.
+    The true profile's weights are not read: in their place agents use those of their estimates, at
+    the penalty of work.now, which may fall in time. If an agent's filtered profile (z_i,
+    **y**^i_-i) is on or outside a boundary, work.profile is that profile.
     """
-    data, settings = problem.data, problem.settings
+    data, gain = problem.data, problem.settings[GAIN]
     at = data.offsets
     agents = len(at) - 1
     m = at[agents]
     z = memory[agents * m : agents * m + m]
-    prepare(problem, 0, len(at) - 1, y, memory)
+    prepare(problem, 0, agents, y, memory)
     for i in range(agents):
-        first, last = at[i], at[i + 1]
-        outside = agent_action(
-            game, data, settings, i, z[first:last], memory[i * m : (i + 1) * m], work, u[first:last]
-        )
+        for a in range(at[i], at[i + 1]):
+            u[a] = game.cost_gradient(data.parameters, i, a, memory[i * m : (i + 1) * m])
+    prepare(problem, 0, agents, z, memory)  # z_i stands in agent i's row for its barrier
+    found = -1
+    for i in range(agents):
+        row = memory[i * m : (i + 1) * m]
+        outside = add_barrier(game, data, i, work.now.penalty, row, u[at[i] : at[i + 1]])
         if outside >= 0:
-            return i * len(weights) + outside
-    return -1
+            copy(row, work.profile)
+            found = i * len(weights) + outside
+            break
+    prepare(problem, 0, agents, y, memory)
+    for r in range(m):
+        u[r] *= -gain
+    return found
 
 
 @kernel
-def agent_action(game, data, settings, i, own_filter, own_row, work, u):
-    """Action of agent i from what it has: z_i (m_i,) and its row (m,), its own action in place.
-
-    The penalty is that of work.now, which may fall in time.
-
-    work.profile is overwritten. Returns -1, or the constraint on or outside whose boundary the
-    agent's filtered profile (z_i, **y**^i_-i) lies.
-    """
-    first, q, profile = data.offsets[i], data.parameters, work.profile
-    barrier_profile(data, i, own_filter, own_row, profile)
-    for r in range(len(u)):
-        u[r] = game.cost_gradient(q, i, first + r, own_row)
+def add_barrier(game, data, i, rho, profile, u):
+    """Add the gradient of agent i's barrier at a profile (m,) to u (m_i,); -1, or the first
+    constraint that is not inside."""
+    first, q = data.offsets[i], data.parameters
     for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
         k = data.own_index[entry]
         room = -game.constraint(q, k, profile) - data.tightening[k]
         if not room > 0.0:
             return k
-        weight = work.now.penalty / room
+        weight = rho / room
         for r in range(len(u)):
             u[r] += weight * game.constraint_gradient(q, k, first + r, profile)
-    for r in range(len(u)):
-        u[r] *= -settings[GAIN]
     return -1
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.graph import Graph
+from gne_mj.loops.linear import weighted_sum
 from gne_mj.native import kernel
 
 
@@ -21,15 +22,15 @@ class Modes(NamedTuple):
     owner: Annotated[np.ndarray, "m", int]  # the agent that each column belongs to
     rates: Annotated[np.ndarray, "N - 1, m"]  # eigenvalues lambda of the owner's L_j
     rest: Annotated[np.ndarray, "N - 1, m"]  # Q'1, the modes at rest for an action of 1
-    # Q, by mode, agent and column; zero for the owner itself
-    vectors: Annotated[np.ndarray, "N - 1, N, m"]
+    # Q, by agent, mode and column; zero for the owner itself
+    vectors: Annotated[np.ndarray, "N, N - 1, m"]
 
 
 def modes_of(graph: Graph, owner: NDArray[np.int64]) -> Modes:
     """The eigenbases, for a graph and the agent that each column belongs to, owner (m,)."""
     agents, m = graph.agents, len(owner)
     rates, rest = np.zeros((agents - 1, m)), np.zeros((agents - 1, m))
-    vectors = np.zeros((agents - 1, agents, m))
+    vectors = np.zeros((agents, agents - 1, m))
     if agents > 1:
         others = np.array([np.delete(np.arange(agents), j) for j in range(agents)])
         grounded = graph.laplacian[others[:, :, None], others[:, None, :]]
@@ -37,26 +38,19 @@ def modes_of(graph: Graph, owner: NDArray[np.int64]) -> Modes:
         rates[:] = values[owner].T
         rest[:] = bases.sum(axis=1)[owner].T
         for r, j in enumerate(owner):
-            vectors[:, others[j], r] = bases[j].T
+            vectors[others[j], :, r] = bases[j]
     return Modes(owner, rates, rest, vectors)
 
 
 def to_modes(modes: Modes, estimates: NDArray[np.float64]) -> NDArray[np.float64]:
     """The modes, flat, of estimates (N m,)."""
-    _, agents, m = modes.vectors.shape
+    agents, _, m = modes.vectors.shape
     rows = estimates.reshape(agents, m)
-    return np.einsum("air,ir->ar", modes.vectors, rows).ravel()
+    return np.einsum("iar,ir->ar", modes.vectors, rows).ravel()
 
 
 @kernel
-def add_from_modes(vectors, amounts, estimates):
-    """estimates (N m,) += those that belong to the modes amounts ((N - 1) m,).
-
-    Nothing is added to the agents' own blocks.
-    """
-    count, agents, m = vectors.shape
-    rows, modes = estimates.reshape((agents, m)), amounts.reshape((count, m))
-    for a in range(count):
-        for i in range(agents):
-            for r in range(m):
-                rows[i, r] += vectors[a, i, r] * modes[a, r]
+def from_modes(vectors, modes, estimates):
+    """Fill estimates (N, m) with those of modes (N - 1, m), the agents' own blocks with zeros."""
+    for i in range(len(estimates)):
+        weighted_sum(estimates[i], vectors[i], modes)

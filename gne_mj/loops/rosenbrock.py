@@ -11,6 +11,7 @@ with linear maps, both are the same solution.
 
 import math
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,6 @@ from gne_mj.loops.rodas import STAGES, method
 from gne_mj.loops.rosenbrock_step import (
     ACT,
     EXIT_LENGTH,
-    OBSERVE,
     STEP_SCRATCH,
     Place,
     RosenbrockState,
@@ -54,10 +54,10 @@ from gne_mj.loops.stage_system import (
     stage_system,
 )
 from gne_mj.native import (
-    address_in,
     call_integer,
     callback,
     compiled,
+    kernel,
     source_key,
 )
 from gne_mj.parameter_block import ParameterBlock, floats_at
@@ -120,8 +120,24 @@ def parts() -> list[Any]:
     ]
 
 
+@kernel
+def observe(run, time, row, u):
+    """Fill a row at a time within the last step, and observe; False, and no numbers in u, if there
+    is no input."""
+    progress = run.progress
+    interpolate(progress, time, run.solver.dense, row)
+    # Outside between two states inside is the interpolation's doing and ends no run.
+    latch = run.exit if progress.end > 0.0 else run.monitor
+    good = control_step(run, time, row, latch, u)
+    if not good:
+        for r in range(len(u)):
+            u[r] = np.nan
+    run.monitor.steps = progress.accepted
+    return good
+
+
 @cache
-def build() -> Any:
+def build() -> SimpleNamespace:
     """The native loop, for all agents and games."""
     source = source_key()
 
@@ -130,18 +146,11 @@ def build() -> Any:
         """Fill rows, each followed by ``every`` sample steps; how many, and the step then."""
         _ = source
         fixed, run = run_in(place.parameter_block, place.workspace, place.solver)
-        progress, monitor, period = run.progress, run.monitor, clock_in(place.parameter_block).h
+        progress, period = run.progress, clock_in(place.parameter_block).h
         for sample in range(len(rows.u)):
-            row, time = rows.state[sample], step * period
-            interpolate(progress, time, run.solver.dense, row)
-            # Outside between two states inside is the interpolation's doing and ends no run.
-            latch = run.exit if progress.end > 0.0 else monitor
-            if not control_step(run, time, row, latch, rows.u[sample]):
-                if progress.end == 0.0:
-                    return sample, step
-                for r in range(len(run.u)):
-                    rows.u[sample, r] = np.nan
-            monitor.steps = progress.accepted
+            good = observe(run, step * period, rows.state[sample], rows.u[sample])
+            if not good and progress.end == 0.0:
+                return sample, step
             time = (step + every) * period
             while progress.end < time:
                 if not step_on(fixed, run):
@@ -149,7 +158,14 @@ def build() -> Any:
             step += every
         return len(rows.u), step
 
-    return advance
+    @compiled
+    def finish(place, time, rows):
+        """Fill the one row with what is at a time within the last step."""
+        _ = source
+        _fixed, run = run_in(place.parameter_block, place.workspace, place.solver)
+        observe(run, time, rows.state[0], rows.u[0])
+
+    return SimpleNamespace(advance=advance, finish=finish)
 
 
 class RosenbrockLoop(ClosedLoop):
@@ -166,6 +182,7 @@ class RosenbrockLoop(ClosedLoop):
         memory: the law's, at the start.
         rtol: error allowed per step, relative to each state's greatest magnitude so far.
         atol: error allowed per step besides, in the states' own units.
+        affine: whether all constraints are, so that they have no second derivatives.
     """
 
     def __init__(
@@ -177,8 +194,9 @@ class RosenbrockLoop(ClosedLoop):
         memory: NDArray[np.float64],
         rtol: float = 1e-6,
         atol: float = 1e-9,
+        affine: bool = False,
     ) -> None:
-        self._advance = build()
+        self._native = build()
         self._agents, self._shape = agents, state.shape
         data, m = setup.problem.data, len(state)
         constraints = len(data.member_pointer) - 1
@@ -199,7 +217,7 @@ class RosenbrockLoop(ClosedLoop):
             dense=np.zeros((5, self._length)),
             greatest=np.abs(state).max(axis=0),
             u=np.zeros(m),
-            system=stage_system(input_columns(agents.kind, agents.parameters), graph.agents),
+            system=stage_system(input_columns(agents.kind, agents.parameters), data, affine),
             modes=modes,
             method=method(rtol, atol),
         )
@@ -242,19 +260,13 @@ class RosenbrockLoop(ClosedLoop):
         """See the base class."""
         rows, done = self._rows(samples), 0
         if self.monitor.exit == watch.INSIDE:
-            done, self._step = self._advance(self._place, self._step, every, rows)
+            done, self._step = self._native.advance(self._place, self._step, every, rows)
         return self._samples(rows.state[:done], rows.u[:done])
 
     def finish(self) -> Samples:
         """See the base class."""
-        rows, progress = self._rows(1), self._progress
-        (row,), (u,) = rows
-        interpolate(progress, self.time, self._solver.dense, row)
-        latch = self._exit if progress.end > 0.0 else self.monitor
-        where = (*self._place, self.time, address_in(row), address_in(latch), address_in(u))
-        if not call_integer(self._solver.functions[OBSERVE], where):
-            u[:] = np.nan
-        self.monitor.steps = progress.accepted
+        rows = self._rows(1)
+        self._native.finish(self._place, self.time, rows)
         return self._samples(*rows)
 
     @property

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.estimate_modes import Modes, add_from_modes
+from gne_mj.loops.estimate_modes import Modes, from_modes
 from gne_mj.loops.feedback import StepScratch
 from gne_mj.loops.layout import (
     SCRATCH,
@@ -17,12 +17,13 @@ from gne_mj.loops.layout import (
     problem_in,
     steps_in,
 )
-from gne_mj.loops.linear import add_multiple
+from gne_mj.loops.linear import add_multiple, add_multiples
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, Method
 from gne_mj.loops.stage_system import (
     Fixed,
     StageSystem,
     linearise,
+    parts_of,
     prepare,
 )
 from gne_mj.native import (
@@ -217,8 +218,7 @@ def step_to_trial(fixed, run, time, h):
     for stage in range(STAGES + 1):
         if stage < ADDING:
             copy(state, trial)
-            for j in range(stage):
-                add_multiple(method.stage[stage, j], k[j], trial)
+            add_multiples(method.stage[stage], stage, k, 0, trial)
         else:
             add_multiple(1.0, k[stage - 1], trial)
         if stage > 0 and not act(run, time, stage, trial, run.exit, solver.u):
@@ -258,29 +258,23 @@ def look_ahead(run, time, h):
 @kernel
 def accept(fixed, run, h):
     """Move to the trial state, and keep what the dense output of the step needs."""
-    problem, channels, modes, method = fixed.problem, fixed.channels, fixed.modes, fixed.method
+    channels, modes, method = fixed.channels, fixed.modes, fixed.method
     progress, solver = run.progress, run.solver
-    at, states, state = problem.data.offsets, channels.equilibrium_state.shape[1], solver.state
-    m, agents = len(solver.u), len(at) - 1
-    size, n = m * states, solver.dense.shape[1]
+    states, state = channels.equilibrium_state.shape[1], solver.state
+    m, n = len(solver.u), solver.dense.shape[1]
     copy(state[:n], solver.dense[0])
     copy(solver.trial, state)
     # anew from the modes, so that rounding does not add up in the estimates
-    estimates = state[size : size + agents * m]
-    for i in range(agents):
-        row = estimates[i * m : (i + 1) * m]
-        for r in range(at[i]):
-            row[r] = 0.0
-        for r in range(at[i + 1], m):
-            row[r] = 0.0
-    add_from_modes(modes.vectors, state[n:], estimates)
+    now = parts_of(state, fixed)
+    from_modes(modes.vectors, now.w, now.e)
+    for r in range(m):
+        now.e[modes.owner[r], r] = now.x[r, channels.output]
     copy(state[:n], solver.dense[1])
     for line in range(len(method.dense)):
         out = solver.dense[2 + line]
         for r in range(n):
             out[r] = 0.0
-        for j in range(STAGES):
-            add_multiple(method.dense[line, j], solver.k[j], out)
+        add_multiples(method.dense[line], STAGES, solver.k, 0, out)
     for a in range(states):
         solver.greatest[a] = magnitude(states, state, solver, a)
     progress.start = progress.end

@@ -20,10 +20,11 @@ import numpy as np
 from gne_mj import banded
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
-from gne_mj.loops.estimate_modes import Modes, add_from_modes
+from gne_mj.game_model import GameData
+from gne_mj.loops.estimate_modes import Modes, from_modes
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.linear import add_multiple
-from gne_mj.loops.rodas import GAMMA, Method
+from gne_mj.loops.linear import add_multiples
+from gne_mj.loops.rodas import GAMMA, STAGES, Method
 from gne_mj.native import copy, kernel
 from gne_mj.plants import functions
 from gne_mj.plants.ode import Channels
@@ -53,6 +54,13 @@ class StageSystem(NamedTuple):
     k_x: Annotated[np.ndarray, "states"]  # one channel's
     k_y: Annotated[np.ndarray, "m"]
     k_u: Annotated[np.ndarray, "m"]
+    scales: Annotated[np.ndarray, "stages"]  # of earlier stages in this one
+    # the actions in one constraint after the other, and where each one's begin; read-only
+    start: Annotated[np.ndarray, "n", int]
+    column: Annotated[np.ndarray, "n", int]
+    # whether it may have second derivatives; read-only
+    curved: Annotated[np.ndarray, "n", int]
+    jacobian: Annotated[np.ndarray, "n"]  # its first ones, by those actions
     known: Annotated[np.ndarray, "m"]  # what V and the rates share, see gne_mj.plants.functions
 
 
@@ -65,11 +73,18 @@ class Fixed(NamedTuple):
     method: Method
 
 
-def stage_system(inputs: np.ndarray, agents: int) -> StageSystem:
-    """Fresh arrays for N agents; inputs (m, states) is G."""
+def stage_system(inputs: np.ndarray, data: GameData, affine: bool) -> StageSystem:
+    """Fresh arrays; inputs (m, states) is G, and ``affine`` says that all constraints are."""
     m, states = inputs.shape
-    made: StageSystem = fresh(StageSystem, m=m, states=states, N=agents)
-    return made._replace(inputs=inputs)
+    sizes = np.diff(data.offsets)[data.member_index]
+    start = np.concatenate([[0], np.cumsum(sizes)])[data.member_pointer]
+    first = data.offsets[data.member_index]
+    column = np.repeat(first - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
+    made: StageSystem = fresh(
+        StageSystem, m=m, states=states, N=len(data.everyone), n=len(column), stages=STAGES
+    )
+    curved = np.full(len(data.all_constraints), int(not affine))
+    return made._replace(inputs=inputs, start=start, column=column, curved=curved)
 
 
 @kernel
@@ -102,13 +117,13 @@ def linearise(fixed, state, u, work, system):
         copy(work.y[first:last], profile[first:last])
         for a in range(first, last):
             games.add_cost_hessian(data, i, a, profile, -gain, own[a])
+        swap_own(first, last, system)  # what is added to them from now on belongs to z
         copy(z[first:last], profile[first:last])
         for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
             k = data.own_index[entry]
             slack = -games.constraint(data, k, profile) - data.tightening[k]
-            weight = -gain * rho / slack
-            for a in range(first, last):
-                add_barrier_row(data, i, k, a, slack, weight, profile, system)
+            add_barrier_rows(data, i, k, slack, -gain * rho / slack, profile, system)
+        swap_own(first, last, system)
     for r in range(m):
         if u[r] != work.commanded[r]:  # an input at its limit does not answer
             for c in range(m):
@@ -117,16 +132,31 @@ def linearise(fixed, state, u, work, system):
 
 
 @kernel
-def add_barrier_row(data, i, k, a, slack, weight, profile, system):
-    """Add what constraint k's barrier answers at action a of agent i to each of its members."""
-    at, mine = data.offsets, games.constraint_gradient(data, k, a, profile) / slack
-    for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
-        j = data.member_index[member]
-        target = system.filtered[a] if j == i else system.own[a]
-        for b in range(at[j], at[j + 1]):
-            other = games.constraint_gradient(data, k, b, profile)
-            second = games.constraint_hessian(data, k, a, b, profile)
-            target[b] += weight * (second + mine * other)
+def swap_own(first, last, system):
+    """Swap an agent's own blocks of du/dy and du/dz."""
+    for a in range(first, last):
+        for b in range(first, last):
+            held = system.own[a, b]
+            system.own[a, b] = system.filtered[a, b]
+            system.filtered[a, b] = held
+
+
+@kernel
+def add_barrier_rows(data, i, k, slack, weight, profile, system):
+    """Add what constraint k's barrier answers at agent i's actions to each of its members."""
+    start, column, slopes = system.start[k : k + 2], system.column, system.jacobian
+    games.slopes(data, data.all_constraints[k : k + 1], start, column, profile, slopes)
+    for entry in range(start[0], start[1]):
+        a = column[entry]
+        if data.owner[a] != i:
+            continue
+        mine, row = slopes[entry] / slack, system.own[a]
+        for other in range(start[0], start[1]):
+            b = column[other]
+            slope = mine * slopes[other]
+            if system.curved[k] != 0:
+                slope += games.constraint_hessian(data, k, a, b, profile)
+            row[b] += weight * slope
 
 
 @kernel
@@ -140,26 +170,32 @@ def prepare(fixed, h, system):
         for r in range(m):
             system.decay[a, r] = 1.0 / (epsilon * s + modes.rates[a, r])
             system.mode_response[a, r] = modes.rates[a, r] * modes.rest[a, r] * system.decay[a, r]
-    for i in range(agents):
-        for r in range(m):
-            system.spread[i, r] = 0.0
-    add_from_modes(modes.vectors, system.mode_response, system.spread)
+    from_modes(modes.vectors, system.mode_response, system.spread)
     for r in range(m):
         if not respond(system, r, states, s):
             return False
-    filter_gain = 1.0 / (epsilon * s + 1.0)
-    for r in range(m):
-        i = modes.owner[r]
-        for c in range(m):
-            slope = system.own[r, c]
-            if modes.owner[c] == i:
-                slope += filter_gain * system.filtered[r, c]
-            else:
-                slope *= system.spread[i, c]
-            system.slope[r, c] = slope
-            system.matrix[r, c - r + m - 1] = -slope * system.response[c, channels.output]
-        system.matrix[r, m - 1] += 1.0
+    add_up(fixed, 1.0 / (epsilon * s + 1.0), system)
     return banded.factorise(system.matrix, m, m - 1, system.pivot)
+
+
+@kernel
+def add_up(fixed, filter_gain, system):
+    """Fill what k_y adds to k_u, and the matrix of the system for k_u."""
+    at, output, m = fixed.problem.data.offsets, fixed.channels.output, len(system.k_u)
+    for r in range(m):
+        system.k_y[r] = system.response[r, output]
+    for i in range(len(at) - 1):
+        spread = system.spread[i]
+        for r in range(at[i], at[i + 1]):
+            own, slope = system.own[r], system.slope[r]
+            row = system.matrix[r, m - 1 - r : 2 * m - 1 - r]
+            for c in range(m):
+                slope[c] = own[c] * spread[c]
+            for c in range(at[i], at[i + 1]):
+                slope[c] = own[c] + filter_gain * system.filtered[r, c]
+            for c in range(m):
+                row[c] = -slope[c] * system.k_y[c]
+            row[r] += 1.0
 
 
 @kernel
@@ -256,9 +292,11 @@ def right_hand_sides(fixed, h, stage, trial, u, k, system):
     size = now.x.size
     at_z = size + now.e.size
     for j in range(stage):
-        scale = method.rate[stage, j] / h
-        add_multiple(scale, k[j], one[:size])
-        add_multiple(epsilon * scale, k[j, at_z:], one[at_z:])
+        system.scales[j] = method.rate[stage, j] / h
+    add_multiples(system.scales, stage, k, 0, one[:size])
+    for j in range(stage):
+        system.scales[j] *= epsilon
+    add_multiples(system.scales, stage, k, at_z, one[at_z:])
 
 
 @kernel
@@ -274,13 +312,10 @@ def without_input(output, modes, filter_gain, now, system):
         copy(system.k_x, now.x[r])
         system.k_y[r] = now.x[r, output]
         now.z[r] *= filter_gain
-    for a in range(len(now.w)):
-        for r in range(m):
-            now.w[a, r] *= system.decay[a, r]
-    for i in range(len(now.e)):
-        for r in range(m):
-            now.e[i, r] = 0.0
-    add_from_modes(modes.vectors, now.w, now.e)
+    w, decay = now.w.reshape(now.w.size), system.decay.reshape(now.w.size)
+    for r in range(len(w)):
+        w[r] *= decay[r]
+    from_modes(modes.vectors, now.w, now.e)
 
 
 @kernel

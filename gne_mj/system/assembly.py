@@ -78,7 +78,10 @@ class Assembly(SystemData):
         if self.integrator == "rosenbrock" and self.law.graph is not None:
             from gne_mj.loops.rosenbrock import RosenbrockLoop
 
-            return RosenbrockLoop(self.agents, setup, self.law.graph, self.state, self.memory)
+            return RosenbrockLoop(
+                self.agents, setup, self.law.graph, self.state, self.memory,
+                affine=self.game.constraint_class == "affine",
+            )  # fmt: skip
         return OdeLoop(self.agents, setup, self.state, memory, self.fault_kernels)
 
     @property

@@ -71,8 +71,9 @@ class Twin:
         clock = LoopClock(0.05, 1, CONTINUOUS, RK4)
         setup = Setup(self.problem, np.zeros((N, self.states)), clock)
         return RosenbrockLoop(
-            self.agents, setup, self.graph, self.start, self.memory, rtol, 1e-3 * rtol
-        )
+            self.agents, setup, self.graph, self.start, self.memory, rtol, 1e-3 * rtol,
+            affine=self.game.constraint_class == "affine",
+        )  # fmt: skip
 
     def ours(self, rtol: float) -> tuple[float, np.ndarray]:
         """Time in s and all samples, (601, states that SciPy has)."""
