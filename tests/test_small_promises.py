@@ -9,7 +9,6 @@ from builders import FIVE, clock, robot_state, robot_system
 from own_games import boxed, plain_game
 
 from gne_mj import certificate
-from gne_mj.batches import execute
 from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
@@ -177,7 +176,6 @@ def test_processors_where_the_system_does_not_tell_which_are_ours(monkeypatch):
     for told, count in ((7, 7), (None, 1)):
         monkeypatch.setattr(os, "cpu_count", lambda told=told: told)
         assert cores() == count
-    assert execute.__module__ == cores.__module__
 
 
 class _Counting:
