@@ -113,6 +113,12 @@ def plot(
     ],
     out: WHERE = None,
     format_: FORMAT = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.webp", help="Write how agents move in the plane, and no figures."
+        ),
+    ] = None,
     replace: REPLACE = False,
 ) -> None:
     """Draw the figures of a stored run.
@@ -126,6 +132,10 @@ def plot(
     need("plots", "drawing figures")
     kinds = formats(format_)
     trajectory = stored(folder)
+    if animation is not None:
+        with telling("drawing") as shown:
+            print(plots.animate(trajectory, animation, replace=replace, progress=shown))
+        return
     target = folder_for(out, folder.parent if is_saved(folder) else folder)
     with named(folder="out"), telling("drawing") as shown:
         anyway = replace or target == folder

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,10 @@ def save_path(solution: Solution, file: Path) -> None:
         figure.savefig(file, dpi=200)
 
 
+# Of a cell of the map: where it was left first
+MARKS = {"x": "at a control instant", "o": "between instants only", "_": "refused"}
+
+
 def save_map(cells: Sequence[Cell], file: Path) -> None:
     """Draw where the set was left: a panel for each mode and push, period against start margin.
 
@@ -48,9 +53,10 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
             len(modes), len(pushes), 1.4 + 2.3 * len(pushes), 0.9 + 1.9 * len(modes),
             sharex=True, sharey=True,
         )  # fmt: skip
+        known: dict[str, Any] = {}
         for axes, (mode, push) in zip(grid.flat, product(modes, pushes), strict=True):
             share = np.full((len(margins), len(periods)), np.nan)
-            marks: dict[str, list[tuple[int, int]]] = {"x": [], "o": [], "_": []}
+            marks: dict[str, list[tuple[int, int]]] = {marker: [] for marker in MARKS}
             for cell in cells:
                 if (cell.mode, cell.push) != (mode, push):
                     continue
@@ -68,10 +74,10 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
             for marker, places in marks.items():
                 if places:
                     rows, columns = np.array(places).T
-                    axes.plot(
+                    known[marker] = axes.plot(
                         columns, rows, marker, color="#B00020", markersize=4.5, fillstyle="none",
                         markeredgewidth=1.0,
-                    )  # fmt: skip
+                    )[0]  # fmt: skip
             axes.set_title(f"{mode}, push {push:g}", fontsize=8.5)
             short = [f"{float(f'{1e3 * period:.2g}'):g}" for period in periods]
             axes.set_xticks(range(len(periods)), short)
@@ -80,6 +86,11 @@ def save_map(cells: Sequence[Cell], file: Path) -> None:
         for axes in grid[-1]:
             axes.set_xlabel("control period (ms)")
         for axes in grid[:, 0]:
-            axes.set_ylabel("margin of the start")
+            axes.set_ylabel("margin of the start,\nshare of the way")
         figure.colorbar(image, ax=grid, label="share that left the set", shrink=0.8)
+        if known:
+            figure.legend(
+                known.values(), [MARKS[marker] for marker in known], loc="outside lower center",
+                ncols=len(known), handletextpad=0.1,
+            )  # fmt: skip
         figure.savefig(file, dpi=180)

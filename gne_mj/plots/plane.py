@@ -24,22 +24,19 @@ def plane(data: "xarray.Dataset") -> "Figure | None":
     drawn as lines, the outputs at the end as rings; where an agent began is a small dot. Around
     agents that keep apart are discs of half of their distance.
     """
-    quantities = [data[name] for name in json.loads(data.attrs["quantities"])]
-    drawn = [each for each in quantities if {"between", "outline"} & set(each.attrs)]
-    if not drawn or "axis" not in data or set(data["axis"].to_numpy()) != {"x", "y"}:
+    place = points(data)
+    if place is None:
         return None
-    output = _points(data, "action")
-    place = _points(data, "position") if "position" in data else output
+    output = _channels(data, "action")
     from matplotlib.patches import Circle
 
     apart = json.loads(data.attrs["structure"])["separation"]
     figure, grid = subplots(1, 1, WIDTH + 1.0, WIDTH)
     axes = grid[0, 0]
-    for quantity in drawn:
-        _outline(axes, json.loads(quantity.attrs.get("outline", "[]")))
-        for i, j in json.loads(quantity.attrs.get("between", "[]")):
-            if i >= 0:
-                axes.plot(*place[-1, [i, j]].T, color="grey", linewidth=0.9, zorder=1)
+    for corners in outlines(data):
+        _outline(axes, corners)
+    for i, j in pairs(data):
+        axes.plot(*place[-1, [i, j]].T, color="grey", linewidth=0.9, zorder=1)
     for agent in range(place.shape[1]):
         style = line_style(agent)
         label = str(agent + 1) if place.shape[1] <= LEGEND else None
@@ -63,14 +60,37 @@ def plane(data: "xarray.Dataset") -> "Figure | None":
     return figure
 
 
-def _points(data: "xarray.Dataset", name: str) -> NDArray[np.float64]:
+def points(data: "xarray.Dataset") -> NDArray[np.float64] | None:
+    """Places in the plane over time, (T, N, 2), of the systems that :func:`plane` draws."""
+    if not _spatial(data) or "axis" not in data or set(data["axis"].to_numpy()) != {"x", "y"}:
+        return None
+    return _channels(data, "position" if "position" in data else "action")
+
+
+def pairs(data: "xarray.Dataset") -> list[tuple[int, int]]:
+    """Agents between whom a quantity is, numbered from 0."""
+    between = (json.loads(each.attrs.get("between", "[]")) for each in _spatial(data))
+    return [(i, j) for each in between for i, j in each if i >= 0]
+
+
+def outlines(data: "xarray.Dataset") -> list[list[list[float]]]:
+    """Corners of the parts of the plane that quantities are of."""
+    found = (json.loads(each.attrs.get("outline", "[]")) for each in _spatial(data))
+    return [corners for corners in found if corners]
+
+
+def _spatial(data: "xarray.Dataset") -> list["xarray.DataArray"]:
+    quantities = [data[name] for name in json.loads(data.attrs["quantities"])]
+    return [each for each in quantities if {"between", "outline"} & set(each.attrs)]
+
+
+def _channels(data: "xarray.Dataset", name: str) -> NDArray[np.float64]:
     """(T, N, 2) of a variable of actions, whose axes alternate."""
     values: NDArray[np.float64] = data[name].to_numpy()
     return values.reshape(len(values), -1, 2)
 
 
 def _outline(axes: "Axes", corners: list[list[float]]) -> None:
-    if corners:
-        x, y = np.array([*corners, corners[0]]).T
-        axes.fill(x, y, color="black", alpha=0.05, linewidth=0)
-        axes.plot(x, y, color="black", linewidth=0.9, linestyle=(0, (4, 3)))
+    x, y = np.array([*corners, corners[0]]).T
+    axes.fill(x, y, color="black", alpha=0.05, linewidth=0)
+    axes.plot(x, y, color="black", linewidth=0.9, linestyle=(0, (4, 3)))
