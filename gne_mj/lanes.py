@@ -23,6 +23,7 @@ from numba.core.typeconv import Conversion
 from numba.core.typing import signature
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model
+from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
 from gne_mj.native import KERNEL, array_at, load_word
@@ -264,6 +265,26 @@ def power_of_two(typingctx: Any, exponent: Any) -> Any:
 
 
 _ARRAY = types.Array(LANE, 1, "C")
+
+
+def _place(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
+    """Where an entry is: from the start, unless the kernel says a negative number itself."""
+    array = make_array(_ARRAY)(context, builder, arguments[0])
+    index = context.cast(builder, arguments[1], kind, types.intp)
+    if getattr(kind, "literal_value", 0) < 0:
+        index = builder.add(index, array.nitems)
+    return builder.gep(array.data, [index])
+
+
+@lower_builtin(operator.getitem, _ARRAY, types.Integer)
+def _get(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Numba would ask at every entry whether the index is negative, half of a loop's time."""
+    return builder.load(_place(context, builder, signature.args[1], arguments))
+
+
+@lower_builtin(operator.setitem, _ARRAY, types.Integer, LANE)
+def _set(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    builder.store(arguments[2], _place(context, builder, signature.args[1], arguments))
 
 
 @intrinsic

@@ -86,7 +86,12 @@ def dtype_of(record: Any, **known: Any) -> np.dtype[Any]:
 
     Numbers in it are among its own fields; ``known`` is what shapes use.
     """
-    return np.dtype((np.record, _parts(record, known)))
+    return _dtype_of(record, *known.items())
+
+
+@cache
+def _dtype_of(record: Any, *known: tuple[str, Any]) -> np.dtype[Any]:
+    return np.dtype((np.record, _parts(record, dict(known))))
 
 
 def _parts(record: Any, known: dict[str, Any]) -> list[tuple[Any, ...]]:

@@ -164,7 +164,7 @@ def test_rows_in_memory_are_bounded():
     fine = {**ODE, "simulation.duration": 600.0, "recording.period": 0.01}
     plan = make_plan("velocity-sync", fine, starts=100_000)
     assert 1 <= plan.chunk < 20
-    assert make_plan("velocity-sync", ODE, starts=100_000).chunk == 256
+    assert make_plan("velocity-sync", ODE, starts=100_000).chunk == 782
 
 
 @pytest.mark.parametrize(

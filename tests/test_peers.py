@@ -124,12 +124,23 @@ def test_robots_in_diffrax(script):
     peer = script("peer_diffrax", "diffrax")
     states = peer.common.starts(4)
     fine = 20 * peer.STEPS  # steps that are not divided
-    _, theirs = peer.batch(peer.fixed(peer.Rk4())(fine), states)()
-    _, mine = peer.our_robots(fine, states)()
+    _, theirs = peer.batch(peer.fixed(peer.Rk4())(fine), states[:, :, :3])()
+    _, mine = peer.ours(peer.of_robots(), fine, states)()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
-    _, theirs = peer.batch(peer.adaptive(peer.diffrax.Dopri8())(1e-10), states)()
-    _, mine = peer.our_robots(fine, states)()
+    _, theirs = peer.batch(peer.adaptive(peer.diffrax.Dopri8())(1e-10), states[:, :, :3])()
     assert np.allclose(mine, theirs, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["integrator", "pi_cascade"])
+def test_channels_in_diffrax(script, kind):
+    peer = script("peer_diffrax", "diffrax")
+    of = peer.of_channels(getattr(peer, kind))
+    states = of.starts(4)
+    fine = 4 * of.steps  # steps that are not divided
+    _, theirs = peer.batch(peer.fixed(peer.Rk4(), of.rate, of.end)(fine), states)()
+    _, mine = peer.ours(of, fine, states)()
+    assert np.max(np.abs(mine - states)) > 0.01
+    assert np.allclose(mine, theirs, rtol=0, atol=1e-12)
 
 
 def test_stiff_twin_in_diffrax(script):

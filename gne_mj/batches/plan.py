@@ -38,6 +38,7 @@ _CHUNK_RUNS = 256
 _CHUNK_BYTES = 2**27  # of rows in memory
 _CHECK = 1  # which random numbers say what is checked
 _LEAST_CHUNKS = 16  # of a small batch, so that its progress is seen and little is lost
+_MOST_CHUNKS = 128  # of a large one, whose chunks take as long to store as to run
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class Plan:
     def _fitting_chunk(self) -> int:
         """So many that their rows, which are in memory meanwhile, fit into the budget."""
         runs = min(_CHUNK_RUNS, max(1, -(-self.runs // _LEAST_CHUNKS)))
+        runs = max(runs, -(-self.runs // _MOST_CHUNKS))
         return max(1, min(runs, _CHUNK_BYTES // (8 * self._numbers_of_run)))
 
     @cached_property

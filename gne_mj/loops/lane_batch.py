@@ -1,5 +1,6 @@
 """Runs of a batch in groups of eight: the common steps in lanes, the others one run by itself."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from gne_mj.parameter_block import ParameterBlock, floats, floats_at, integers_a
 from gne_mj.plants.functions import RK4
 
 PIECES = 20_000  # of each run between looks at the user's wishes
+SPARE = 8  # places that are kept
 
 
 class Modules(NamedTuple):
@@ -199,6 +201,14 @@ def advance_group(group, marks, last, pieces):
     return False
 
 
+class _Place(NamedTuple):
+    """Where eight runs are moved on."""
+
+    like: ParameterBlock
+    block: LaneBlock
+    room: NDArray[np.float64]
+
+
 class LaneLoop:
     """Moves runs on in lanes.
 
@@ -213,6 +223,7 @@ class LaneLoop:
         self._loop, self._alone = int(lanes.build(*modules).address), alone
         self._marks = marks_of(sizes)
         self._room = self._marks.length + lanes.scratch_length(sizes.actions)
+        self._spare: deque[_Place] = deque(maxlen=SPARE)
 
     def fits(self, blocks: Sequence[ParameterBlock]) -> bool:
         """Whether all these runs can go through the lanes together."""
@@ -235,15 +246,27 @@ class LaneLoop:
             last: which step.
             stopped: asked from time to time.
         """
-        block, room = LaneBlock(blocks[0]), empty(self._room)
-        room[:] = 0.0
+        place = self._place(blocks[0])
         queue = np.zeros(1 + 2 * WIDTH, dtype=np.int64)
         queue[1 : 1 + WIDTH] = -1
         group = Group(
-            self._loop, block.address, int(room.ctypes.data), block.real, self._alone, addresses,
-            workspaces, queue,
+            self._loop, place.block.address, int(place.room.ctypes.data), place.block.real,
+            self._alone, addresses, workspaces, queue,
         )  # fmt: skip
         while not advance_group(group, self._marks, float(last), PIECES):
             if stopped():
                 return False
+        self._spare.append(place)
         return True
+
+    def _place(self, like: ParameterBlock) -> "_Place":
+        """Eight lanes, for one thread at a time: used ones again if they were for such runs."""
+        try:
+            place = self._spare.pop()
+        except IndexError:
+            place = None
+        if place is None or place.like is not like:
+            room = empty(self._room)
+            room[:] = 0.0
+            place = _Place(like, LaneBlock(like), room)
+        return place

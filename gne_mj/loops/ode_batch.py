@@ -14,7 +14,7 @@ from gne_mj.native import call_integer, compiled
 from gne_mj.parameter_block import ParameterBlock
 
 PIECE, MANY = 8, 256  # runs that a thread takes at a time; and at most, where lanes go through them
-LEAST = 50_000  # steps of all runs for which a loop of lanes is compiled; results are the same
+LEAST = 50_000  # steps, of all runs together, for which a loop of lanes is worth compiling
 STRIDE = 20_000  # steps of each of them between looks at the user's wishes
 
 
@@ -44,26 +44,24 @@ class OdeBatch(BatchLoop):
         self._faulty, self._threads = faulty, threads
         self._workers = ThreadPoolExecutor(threads)
         self._loops: dict[Modules, LaneLoop] = {}
+        self._asked = 0  # steps of all runs so far
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
         parameter_blocks, sizes, recorder, monitors = begin(cases, span, self._faulty)
         known = {block: block.address for block in set(parameter_blocks)}
         addresses = np.array([known[block] for block in parameter_blocks], dtype=np.int64)
-        starts = np.concatenate(
-            [
-                np.stack([case.state for case in cases]).reshape(len(cases), -1),
-                np.stack([case.memory for case in cases]),
-            ],
-            axis=1,
-        )
+        starts = np.array([case.state for case in cases]).reshape(len(cases), -1)
+        if sizes.memory:
+            starts = np.concatenate([starts, [case.memory for case in cases]], axis=1)
         length, rows = ode_workspace_length(sizes), recorder.addresses
         in_lanes = None
-        if len(cases) * span.steps >= LEAST and not self._faulty:
+        self._asked += len(cases) * span.steps
+        if self._asked >= LEAST and not self._faulty:
             in_lanes = self._in_lanes(parameter_blocks[0], sizes)
         size = PIECE
         if in_lanes is not None:
-            size = min(MANY, PIECE * -(-len(cases) // (PIECE * self._threads)))
+            size = min(MANY, PIECE * -(-len(cases) // (2 * PIECE * self._threads)))
 
         def piece(first: int) -> bool:
             part = slice(first, first + size)

@@ -66,12 +66,8 @@ def starts(runs: int, widest: float = 0.9, stretch: float = 1.0) -> np.ndarray:
     return np.stack([extension, velocity, velocity + slip, np.zeros((runs, N))], axis=2)
 
 
-def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
-    """What moves all runs to the clock's end by our native batch on all cores, as often as called.
-
-    It returns the seconds, from putting the starts into their rows to the last observation, and the
-    last states (runs, N, 4).
-    """
+def _call(one: System, clock: Clock, states: np.ndarray) -> Callable[[], Any]:
+    """What moves all runs to the clock's end by our native batch on all cores."""
     structure = Structure(one, clock, CORES)
     table = structure.parameter_block(one, one.setup(clock))
     cases = [
@@ -79,16 +75,35 @@ def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[fl
         for state in states
     ]
     span = Span(clock.steps(clock.duration), clock.steps(clock.duration))
+    return lambda: structure.loop.run(cases, span, lambda: False)
+
+
+def ours(one: System, clock: Clock, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
+    """What moves all runs to the clock's end by our native batch on all cores, as often as called.
+
+    It returns the seconds, from putting the starts into their rows to the last observation, and the
+    last states (runs, N, 4).
+    """
+    run = _call(one, clock, states)
 
     def call() -> tuple[float, np.ndarray]:
         began = time.perf_counter()
-        outcome = structure.loop.run(cases, span, lambda: False)
+        outcome = run()
         spent = time.perf_counter() - began
         if outcome is None or np.any(outcome.monitors.exit != watch.INSIDE):
             raise ArithmeticError("a run left the set, where the law has no value to compare")
         return spent, outcome.samples.state[:, -1]
 
     return call
+
+
+def undivided(one: System, clock: Clock, states: np.ndarray, runs: int) -> np.ndarray:
+    """The first of these starts whose runs divide no step, so that others take the same ones."""
+    monitors = _call(one, clock, states)().monitors
+    found = states[(monitors.divided == 0) & (monitors.exit == watch.INSIDE)][:runs]
+    if len(found) < runs:
+        raise ArithmeticError(f"only {len(found)} of {len(states)} runs divide no step")
+    return found
 
 
 def over_cores(one: Callable[..., Any]) -> Callable[..., Any]:

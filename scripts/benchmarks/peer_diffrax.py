@@ -1,9 +1,10 @@
 #!/usr/bin/env python
 """The ODE twins beside diffrax, compiled and warm, in double precision.
 
-Robots: 256 runs of 5 s under full information, mode continuous, from starts with gaps up to 0.9 of
-their bounds and stretched springs. diffrax is given the classic Runge-Kutta method as a tableau
-(it has none of its own), with our step: the same numbers come out. A second row lets it choose:
+Batches: 256 runs of 5 s under full information, mode continuous, of robots (gaps up to 0.9 of their
+bounds, stretched springs), and of ten channels as integrators and as PI cascades. diffrax is given
+the classic Runge-Kutta method as a tableau (it has none of its own), with our step, from starts
+whose runs divide no step: the same numbers come out. A second row lets it choose, from any starts:
 each of its methods takes the loosest step or tolerance of a grid whose greatest error in any state
 of any run at the end is at most 1e-6, ours the longest step of such a grid, and diffrax's fastest
 counts. Both batches are shared among all cores, diffrax's being vmapped.
@@ -17,6 +18,7 @@ controller of steps served it best, as did interpolating the samples over making
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import diffrax
@@ -27,8 +29,11 @@ import peer_common as common
 import twin
 from turns import in_turns, row
 
-from gne_mj.plants import pi_cascade
-from gne_mj.system import Clock
+from gne_mj.controllers import FullInformation
+from gne_mj.games import osnr_game, ten_channels
+from gne_mj.plants import integrator, pi_cascade
+from gne_mj.plants.agents import Agents
+from gne_mj.system import Clock, System
 
 RUNS, END, STEPS = 256, 5.0, 200
 ACCURACY = 1e-6
@@ -56,6 +61,29 @@ class Rk4(diffrax.AbstractERK):
         return 4
 
 
+@dataclass(frozen=True)
+class Batch:
+    """Runs of one system, for both.
+
+    Attributes:
+        name: what they are.
+        system: ours.
+        rate: for diffrax, of a state that is one array (N,) for each component.
+        starts: from how many runs to their states, ours, (runs, N, components or more).
+        components: of a channel's state, that diffrax has.
+        end: of the runs, in s.
+        steps: of Runge-Kutta 4, that are short enough for many starts not to divide any.
+    """
+
+    name: str
+    system: System
+    rate: Callable[..., Any]
+    starts: Callable[[int], np.ndarray]
+    components: int
+    end: float = END
+    steps: int = STEPS
+
+
 def robots(_time: Any, state: Any, _: Any) -> Any:
     """Rates of extensions, velocities and appendage velocities, each (N,)."""
     extension, velocity, appendage = state
@@ -66,29 +94,71 @@ def robots(_time: Any, state: Any, _: Any) -> Any:
     return velocity - appendage, u - pull, pull
 
 
-def fixed(solver: Any) -> Callable[[float], Any]:
+def channels(kind: Any) -> Callable[..., Any]:
+    """Rates of ten channels under full information, as integrators or PI cascades."""
+    n, q = twin.N, osnr_game(**ten_channels()).parameters
+    price, weight, gain, noise = (q[2 + n * k : 2 + n * (k + 1)] for k in range(4))
+    crosstalk, limit = q[2 + 4 * n :].reshape(n, n) + np.diag(gain), q[1]
+
+    def rate(_time: Any, state: Any, _: Any) -> Any:
+        y = state[0]
+        slope = price - weight * gain / (noise + jnp.sum(crosstalk * y, axis=1))
+        u = -slope - common.RHO / (limit - jnp.sum(y)) + common.RHO / y
+        return (u,) if kind is integrator else (u - y + 0.5 * state[1], u)
+
+    return rate
+
+
+def of_robots() -> Batch:
+    """Five robots."""
+    one = common.system("ode", "rk4", "continuous")
+    return Batch("robots' ODE twin", one, robots, common.starts, 3)
+
+
+def of_channels(kind: Any) -> Batch:
+    """Ten channels, with 0.1 to 0.24 mW each, of 2.5 mW together."""
+
+    def starts(runs: int) -> np.ndarray:
+        power = np.random.default_rng(0).uniform(0.1, 0.24, (runs, twin.N))
+        return np.stack([power, 2.0 * power], axis=2)[:, :, : len(kind.STATES)].copy()
+
+    numbers = np.tile([1.0, 0.5], (twin.N, 1))[:, : len(kind.PARAMETERS)]
+    one = System(
+        "channels", osnr_game(**ten_channels()), Agents(kind, numbers, np.full(twin.N, np.inf)),
+        FullInformation(), common.RHO, starts(1)[0], engine="ode", integrator="rk4",
+        mode="continuous",
+    )  # fmt: skip
+    name = f"ten channels, {kind.NAME}s"
+    return Batch(name, one, channels(kind), starts, len(kind.STATES), 0.5, 2500)
+
+
+def fixed(solver: Any, rate: Any = robots, end: float = END) -> Callable[[float], Any]:
     """From a number of steps to the function of one run that returns its last state."""
 
     def solve(steps: float) -> Callable[..., Any]:
-        return _to_the_end(solver, diffrax.ConstantStepSize(), END / steps)
+        return _to_the_end(rate, solver, diffrax.ConstantStepSize(), (end, end / steps))
 
     return solve
 
 
-def adaptive(solver: Any) -> Callable[[float], Any]:
+def adaptive(solver: Any, rate: Any = robots, end: float = END) -> Callable[[float], Any]:
     """The same from a tolerance."""
 
     def solve(tolerance: float) -> Callable[..., Any]:
         controller = diffrax.PIDController(rtol=tolerance, atol=tolerance, pcoeff=0.3, icoeff=0.4)
-        return _to_the_end(solver, controller, None)
+        return _to_the_end(rate, solver, controller, (end, None))
 
     return solve
 
 
-def _to_the_end(solver: Any, controller: Any, step: float | None) -> Callable[..., Any]:
+def _to_the_end(
+    rate: Any, solver: Any, controller: Any, span: tuple[float, float | None]
+) -> Callable[..., Any]:
+    end, step = span
+
     def one(*state: jax.Array) -> tuple[jax.Array, ...]:
         found = diffrax.diffeqsolve(
-            diffrax.ODETerm(robots), solver, 0.0, END, step, state,
+            diffrax.ODETerm(rate), solver, 0.0, end, step, state,
             saveat=diffrax.SaveAt(t1=True), stepsize_controller=controller, max_steps=None,
             **FREELY,
         )  # fmt: skip
@@ -97,17 +167,17 @@ def _to_the_end(solver: Any, controller: Any, step: float | None) -> Callable[..
     return one
 
 
-METHODS = {
-    "Tsit5, constant steps": (fixed(diffrax.Tsit5()), MORE_STEPS),
-    "Tsit5, adaptive": (adaptive(diffrax.Tsit5()), TOLERANCES),
-    "Dopri8, adaptive": (adaptive(diffrax.Dopri8()), TOLERANCES),
+METHODS: dict[str, tuple[Callable[..., Any], Any, Any]] = {
+    "Tsit5, constant steps": (fixed, diffrax.Tsit5(), MORE_STEPS),
+    "Tsit5, adaptive": (adaptive, diffrax.Tsit5(), TOLERANCES),
+    "Dopri8, adaptive": (adaptive, diffrax.Dopri8(), TOLERANCES),
 }
 
 
 def batch(one: Callable[..., Any], states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
-    """What moves all runs once: seconds and the last states (runs, N, 3)."""
+    """What moves all runs once: seconds and the last states (runs, N, components)."""
     compiled = common.over_cores(one)
-    start = [jnp.asarray(states[:, :, s]) for s in range(3)]
+    start = [jnp.asarray(states[:, :, s]) for s in range(states.shape[2])]
 
     def call() -> tuple[float, np.ndarray]:
         began = time.perf_counter()
@@ -117,14 +187,14 @@ def batch(one: Callable[..., Any], states: np.ndarray) -> Callable[[], tuple[flo
     return call
 
 
-def our_robots(steps: int, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
+def ours(of: Batch, steps: int, states: np.ndarray) -> Callable[[], tuple[float, np.ndarray]]:
     """The same of our batch."""
-    one = common.system("ode", "rk4", "continuous")
-    call = common.ours(one, Clock(END, END / steps, END / steps, END), states)
+    step = of.end / steps
+    call = common.ours(of.system, Clock(of.end, step, step, of.end), states)
 
     def known_to_diffrax() -> tuple[float, np.ndarray]:
         spent, last = call()
-        return spent, last[:, :, :3]
+        return spent, last[:, :, : of.components]
 
     return known_to_diffrax
 
@@ -132,36 +202,56 @@ def our_robots(steps: int, states: np.ndarray) -> Callable[[], tuple[float, np.n
 def _loosest(
     tries: Callable[[Any], Callable[[], tuple[float, np.ndarray]]], grid: Any, reference: np.ndarray
 ) -> Any:
-    """The first entry of a grid that is accurate enough."""
+    """The first entry of a grid that is accurate enough; None if none is."""
     for entry in grid:
         if np.max(np.abs(tries(entry)()[1] - reference)) <= ACCURACY:
             return entry
-    raise ArithmeticError(f"no step or tolerance of the grid reaches {ACCURACY:g}")
+    return None
 
 
-def _robots(turns: int) -> list[dict[str, str]]:
-    states = common.starts(RUNS)
-    same, mine = batch(fixed(Rk4())(STEPS), states), our_robots(STEPS, states)
-    apart = float(np.max(np.abs(same()[1] - mine()[1])))
+def _same(of: Batch, turns: int) -> dict[str, str]:
+    """The same method with the same steps."""
+    step = of.end / of.steps
+    clock = Clock(of.end, step, step, of.end)
+    states = common.undivided(of.system, clock, of.starts(50 * RUNS), RUNS)
+    theirs = batch(fixed(Rk4(), of.rate, of.end)(of.steps), states[:, :, : of.components])
+    mine = ours(of, of.steps, states)
+    apart = float(np.max(np.abs(theirs()[1] - mine()[1])))
     if not apart <= SAME:
         raise ArithmeticError(f"diffrax's classic Runge-Kutta method differs by {apart:.1e}")
-    reference = our_robots(50 * STEPS, states)()[1]
-    steps = _loosest(lambda n: our_robots(n, states), MORE_STEPS, reference)
-    found = {"ours": mine, "same": same, "ours, accurate": our_robots(steps, states)}
-    for name, (method, grid) in METHODS.items():
-        entry = _loosest(lambda one, method=method: batch(method(one), states), grid, reference)
-        found[name] = batch(method(entry), states)
+    times = in_turns({"ours": lambda: 1e3 * mine()[0], "diffrax": lambda: 1e3 * theirs()[0]}, turns)
+    return row(
+        f"{_what(of)}, {of.steps} steps of RK4 (equal within {apart:.0e}): ms; diffrax / our batch",
+        times, "ours", "diffrax", ">= 4", upside_down=True,
+    )  # fmt: skip
+
+
+def _what(of: Batch) -> str:
+    return f"{of.name}, {RUNS} runs of {of.end:g} s, continuous, {len(jax.devices())} cores"
+
+
+def _accurate(of: Batch, turns: int) -> dict[str, str]:
+    """Each with what is fastest at the same error."""
+    states = of.starts(RUNS)
+    known = states[:, :, : of.components]
+    reference = ours(of, 10 * of.steps, states)()[1]
+    steps = _loosest(lambda n: ours(of, n, states), MORE_STEPS, reference)
+    if steps is None:
+        raise ArithmeticError(f"none of our steps reaches {ACCURACY:g}")
+    found = {"ours": ours(of, steps, states)}
+    for name, (kind, solver, grid) in METHODS.items():
+        method = kind(solver, of.rate, of.end)
+        entry = _loosest(lambda one, method=method: batch(method(one), known), grid, reference)
+        if entry is not None:
+            found[name] = batch(method(entry), known)
     times = in_turns(
         {name: lambda call=call: 1e3 * call()[0] for name, call in found.items()}, turns
     )
-    best = min(METHODS, key=lambda name: statistics.median(times[name]))
-    what = f"robots' ODE twin, {RUNS} runs of {END:g} s, continuous, {len(jax.devices())} cores"
-    return [
-        row(f"{what}, {STEPS} steps of RK4 (equal within {apart:.0e}): ms; diffrax / our batch",
-            times, "ours", "same", "", upside_down=True),
-        row(f"{what}, error {ACCURACY:g}: ms; diffrax {best} / our batch",
-            times, "ours, accurate", best, "", upside_down=True),
-    ]  # fmt: skip
+    best = min(found.keys() - {"ours"}, key=lambda name: statistics.median(times[name]))
+    return row(
+        f"{_what(of)}, error {ACCURACY:g}: ms; diffrax {best} / our batch, {steps} steps",
+        times, "ours", best, ">= 2", upside_down=True,
+    )  # fmt: skip
 
 
 def osnr(case: twin.Twin) -> Callable[..., jax.Array]:
@@ -243,7 +333,11 @@ def _osnr(gain: float, epsilon: float, turns: int) -> dict[str, str]:
 
 def rows(runs: int = 20) -> list[dict[str, str]]:
     """Medians over ``runs`` turns, in ms for all runs together."""
-    return _robots(runs) + [_osnr(gain, epsilon, runs) for gain, epsilon in twin.CASES]
+    batches = (of_robots(), of_channels(integrator), of_channels(pi_cascade))
+    return [
+        *(compare(of, runs) for of in batches for compare in (_same, _accurate)),
+        *(_osnr(gain, epsilon, runs) for gain, epsilon in twin.CASES),
+    ]
 
 
 if __name__ == "__main__":
