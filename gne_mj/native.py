@@ -60,6 +60,13 @@ def kernel(function: F) -> F:
     return marked
 
 
+def kernel_as(native: Callable[..., Any], function: F) -> F:
+    """Mark ``function`` as a kernel that native code has ``native`` for, which does the same."""
+    overload(function, jit_options=KERNEL, strict=False)(lambda *_given, **_named: native)
+    function.is_kernel = True  # type: ignore[attr-defined]
+    return function
+
+
 def is_kernel(function: Any) -> bool:
     """Whether a function was marked with :func:`kernel`."""
     return bool(getattr(function, "is_kernel", False))
@@ -157,6 +164,21 @@ def address_in(array):
 @overload(address_in, jit_options=KERNEL)
 def _address_in(array):
     return (lambda array: _address(array)) if isinstance(array, types.Array) else None
+
+
+@intrinsic_or(lambda array, begin, length: array[begin : begin + length])
+def part(typingctx: Any, array: Any, begin: Any, length: Any) -> Any:
+    """So many entries of a contiguous array from one on; neither number is looked at.
+
+    A slice is made to fit into its array, which takes native code longer than the view itself.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = make_array(array)(context, builder, arguments[0]).data
+        address = builder.ptrtoint(builder.gep(data, [arguments[1]]), cgutils.intp_t)
+        return array_at(context, builder, array, address, arguments[2])
+
+    return array(array, types.intp, types.intp), codegen
 
 
 @intrinsic_or(lambda array, shape: array[: math.prod(shape)].reshape(shape))

@@ -30,7 +30,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.native import kernel, shaped
+from gne_mj.native import kernel, kernel_as, part, shaped
 from gne_mj.numbers import Numbers, are_whole, flat, names_of, numbers, numbers_in
 from gne_mj.parameter_block import floats, integers
 
@@ -198,8 +198,14 @@ def in_array(
     names = ", ".join(sizes.split())
     text = [f"def length({names}):", f"    return {' + '.join(lengths)}"]
     text += [f"def views(flat, at, {names}):", "    end = at", *lines, f"    return {result}"]
-    made = _define(record, text, {**used, **known})
-    return made["length"], made["views"]
+    written = _functions(record, text, {**used, **known, "part": _slice})
+    native = _functions(record, text, {**used, **known, "part": part})
+    length, views = written["length"], written["views"]
+    return kernel(length), kernel_as(native["views"], views)
+
+
+def _slice(flat: NDArray[Any], begin: int, length: int) -> NDArray[Any]:
+    return flat[begin : begin + length]
 
 
 def _laid(
@@ -213,7 +219,7 @@ def _laid(
         variable = f"{prefix}{name}_"
         if isinstance(field, Field):
             lengths.append(field.size)
-            view = "flat[begin:end]"
+            view = "part(flat, begin, end - begin)"
             if len(field.extents) > 1:
                 view += f".reshape(({field.shape}))"
         elif _are_numbers(field):
@@ -318,10 +324,15 @@ def _names_in(expression: str) -> set[str]:
 
 def _define(record: Any, lines: list[str], known: dict[str, Any]) -> dict[str, Any]:
     """The functions of a text, as kernels."""
+    return {name: kernel(made) for name, made in _functions(record, lines, known).items()}
+
+
+def _functions(record: Any, lines: list[str], known: dict[str, Any]) -> dict[str, Any]:
+    """The functions of a text."""
     made: dict[str, Any] = {
         "__name__": __name__, "record": record, "shaped": shaped, "floats": floats,
         "integers": integers, **known,
     }  # fmt: skip
     functions: dict[str, Any] = {}
     exec(compile("\n".join(lines), f"<layout of {record.__name__}>", "exec"), made, functions)
-    return {name: kernel(function) for name, function in functions.items()}
+    return functions

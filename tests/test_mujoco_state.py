@@ -1,5 +1,7 @@
 """What a step of MuJoCo starts from, late controls above all: looked ahead, kept and put back."""
 
+import ctypes
+
 import mujoco
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from gne_mj.games import velocity_game
 from gne_mj.loops import monitor as watch
 from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
-from gne_mj.plants.native_mujoco import STATE
+from gne_mj.plants.native_mujoco import STATE, state_parts
 from gne_mj.system import System
 
 H = 0.005
@@ -51,6 +53,18 @@ def loop_of(agents, mode, integrator="rk4", control=4 * H, start=START):
         engine="mujoco", mode=mode, integrator=integrator,
     )  # fmt: skip
     return system.closed_loop(clock(H, 1.0, control))
+
+
+def test_what_loops_keep_of_a_step_is_mujocos_own_state(tmp_path):
+    """All that mj_getState copies, in its order, where there are late controls and activations."""
+    plant = MjcfPlant(carts(tmp_path, lag=FILTER), H, "rk4")
+    row = np.random.default_rng(5).normal(size=mujoco.mj_stateSize(plant.model, STATE))
+    mujoco.mj_setState(plant.model, plant.data, row, STATE)
+    arrays = [
+        np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
+        for address, length in state_parts(plant.data).tolist()
+    ]
+    assert np.array_equal(np.concatenate(arrays), row)
 
 
 def test_looking_ahead_knows_what_is_still_to_act(tmp_path):

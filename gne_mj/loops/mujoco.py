@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
@@ -30,21 +29,19 @@ from gne_mj.loops.mujoco_workspace import place_of, workspace_at
 from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, control_step
 from gne_mj.loops.recorder import record
 from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
-from gne_mj.parameter_block import integers
+from gne_mj.parameter_block import floats_at, integers
 from gne_mj.plants.mujoco import PLACES
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
-    STATE,
     Offsets,
     address_of,
     call,
-    call_state,
     field,
     forces_lost,
     parameter_block_of,
     set_number,
-    state_functions,
+    state_parts,
     step_address,
     timed_step,
 )
@@ -131,25 +128,33 @@ def _remember_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
 @kernel
 def save(machine, row):
     """Keep what a step of MuJoCo starts from."""
-    call_state(machine.get, machine.model, machine.data, row.ctypes.data, machine.parts)
+    at = 0
+    for k in range(len(machine.parts)):
+        source = floats_at(machine.parts[k, 0], machine.parts[k, 1])
+        for entry in range(len(source)):
+            row[at + entry] = source[entry]
+        at += len(source)
 
 
 @kernel
 def restore(machine, row):
     """The way back."""
-    call_state(machine.set, machine.model, machine.data, row.ctypes.data, machine.parts)
+    at = 0
+    for k in range(len(machine.parts)):
+        target = floats_at(machine.parts[k, 0], machine.parts[k, 1])
+        for entry in range(len(target)):
+            target[entry] = row[at + entry]
+        at += len(target)
 
 
 class Machine(NamedTuple):
     """What moves a simulation: addresses, and room for what its steps start from."""
 
     step: int  # of mj_step
-    get: int  # of mj_getState
-    set: int  # of mj_setState
-    parts: int  # of the state that these move
     model: int
     data: int
-    saved: np.ndarray  # (2, entries of such a state), at a piece's start and at the step's
+    parts: np.ndarray  # (k, 2) address and length of each array that a step starts from
+    saved: np.ndarray  # (2, entries of these), at a piece's start and at the step's
 
 
 @kernel
@@ -267,11 +272,13 @@ def build(at: Offsets, fleet: ModuleType, faults: ModuleType) -> tuple[Any, ...]
     return tuple(make(at, fleet, faults) for make in (_control_of, _remember_of, _advance_of))
 
 
-def machine_of(model: mujoco.MjModel, data: mujoco.MjData, saved: NDArray[np.float64]) -> Machine:
-    """What moves this simulation; ``saved`` as :func:`workspace_for_states` makes it."""
-    return Machine(step_address(), *state_functions(), model._address, data._address, saved)
+def machine_of(model: mujoco.MjModel, data: mujoco.MjData) -> Machine:
+    """What moves this simulation.
 
-
-def workspace_for_states(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Two rows for what a step of MuJoCo starts from."""
-    return np.zeros((2, mujoco.mj_stateSize(model, STATE)))
+    Its state is copied from and to where it lies, as mj_getState and mj_setState do, which take
+    longer to find the same few arrays anew in each step.
+    """
+    parts = state_parts(data)
+    return Machine(
+        step_address(), model._address, data._address, parts, np.zeros((2, np.sum(parts[:, 1])))
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
 from gne_mj.loops.layout import steps_of
-from gne_mj.loops.mujoco import build, machine_of, workspace_for_states
+from gne_mj.loops.mujoco import build, machine_of
 from gne_mj.loops.mujoco_loop import observe
 from gne_mj.loops.mujoco_workspace import put_start, workspace_of
 from gne_mj.loops.ode import CONTINUOUS
@@ -90,7 +90,7 @@ class _Fleet:
 
     def __init__(self, plant: "FleetPlant") -> None:
         self.plant = plant
-        self.machine = machine_of(plant.model, plant.data, workspace_for_states(plant.model))
+        self.machine = machine_of(plant.model, plant.data)
         self._parameters = plant.agents.parameters
 
     def begin(self, case: Case, parameter_block: ParameterBlock) -> Any:

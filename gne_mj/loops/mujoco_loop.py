@@ -11,7 +11,7 @@ from gne_mj.loops import faultless
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.layout import Setup, steps_of
-from gne_mj.loops.mujoco import build, machine_of, workspace_for_states
+from gne_mj.loops.mujoco import build, machine_of
 from gne_mj.loops.mujoco_workspace import mujoco_parameter_block, put_start, workspace_of
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.recorder import Recorder
@@ -51,7 +51,7 @@ class MujocoLoop(ClosedLoop):
         self._memory = put_start(data, self._parameter_block, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._remembers = moved  # by MuJoCo's integrator
-        self._machine = machine_of(plant.model, data, workspace_for_states(plant.model))
+        self._machine = machine_of(plant.model, data)
 
     @property
     def _step(self) -> int:

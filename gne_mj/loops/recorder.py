@@ -50,6 +50,9 @@ def record(block, faults, parts, step, now):
         now: :class:`gne_mj.loops.base.Present`, all flat, as at the step's start.
     """
     head = head_in(integers_at(block, HEADER), 0)
+    due = head.first + head.done * head.every
+    if due - head.every < step < due:  # as nearly always, and without a division
+        return
     behind, rows = step - head.first, head.rows
     row = behind // head.every
     if behind < 0 or behind % head.every != 0 or row >= rows:

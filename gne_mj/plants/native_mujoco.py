@@ -19,6 +19,7 @@ import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
 from gne_mj.native import array_at, callback, compiled, kernel, load_word, source_key
@@ -260,6 +261,17 @@ def _call(builder: Any, function: Any, pointers: Any, *more: Any) -> None:
 def state_functions() -> tuple[int, int, int]:
     """What loops take steps back with: addresses of mj_getState and mj_setState, and STATE."""
     return step_address("mj_getState"), step_address("mj_setState"), STATE
+
+
+# The arrays of STATE, besides the time
+_STATE_ARRAYS = ("qpos", "qvel", "act", "history", "qacc_warmstart", "plugin_state")
+
+
+def state_parts(data: mujoco.MjData) -> NDArray[np.int64]:
+    """(k, 2) addresses and lengths of what STATE consists of, wherever it has an entry."""
+    arrays = [array for name in _STATE_ARRAYS if (array := getattr(data, name)).size]
+    time = data._address + 8 * offsets().time
+    return np.array([(time, 1), *((array.ctypes.data, array.size) for array in arrays)])
 
 
 @cache
