@@ -7,6 +7,7 @@ Both find their arrays through the address of a block of (address, length) pairs
 
 import ctypes
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class ParameterBlock:
         pairs = [(array.ctypes.data, array.size) for array in arrays]
         self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Where the pairs lie; a double, which is what MuJoCo can keep, holds it exactly.
 

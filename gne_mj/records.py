@@ -81,6 +81,7 @@ def _are_numbers(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, Numbers)
 
 
+@cache  # asked for at the start of every run of a batch
 def dtype_of(record: Any, **known: Any) -> np.dtype[Any]:
     """The layout of a record that lies in one flat array, for NumPy.
 

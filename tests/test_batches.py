@@ -87,8 +87,7 @@ def test_robots_of_every_row_are_those_that_composing_anew_would_make():
     for run in range(0, plan.runs, 5):
         runner.run(run)
         (structure,) = runner._structures.values()
-        fleet = structure.loop._fleets.get()
-        structure.loop._fleets.put(fleet)
+        (fleet,) = structure.loop._fleets
         scenario = plan.alone(run)
         numbers = scenario.system_objects()[0].agents.parameters
         lane = compose(numbers, decorated=False)

@@ -5,7 +5,6 @@ Threads of our own rather than ``mujoco.batch.Batch``, whose rows cannot divide 
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from queue import SimpleQueue
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin, workers
-from gne_mj.loops.layout import steps_of
+from gne_mj.loops.layout import Steps
 from gne_mj.loops.mujoco import build, machine_of
 from gne_mj.loops.mujoco_loop import observe
 from gne_mj.loops.mujoco_workspace import put_start, workspace_of
@@ -47,41 +46,43 @@ class MujocoBatch(BatchLoop):
         faulty: bool,
         threads: int,
     ) -> None:
-        self._passive, self._faulty, self._threads = plant.passive, faulty, threads
+        self._passive, self._faulty = plant.passive, faulty
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
-        self._fleets: SimpleQueue[_Fleet] = SimpleQueue()
-        for number in range(threads):
-            self._fleets.put(_Fleet(plant.twin() if number else plant))
+        self._fleets = [_Fleet(plant.twin() if number else plant) for number in range(threads)]
 
     def run(self, cases: Sequence[Case], span: Span, stopped: Callable[[], bool]) -> Outcome | None:
         """See the base class."""
         parameter_blocks, sizes, recorder, monitors = begin(cases, span, self._faulty)
-        blocks = recorder.addresses
+        blocks, first_rows = recorder.addresses, recorder.heads.first
+        runs = iter(range(len(cases)))  # each thread takes the next one: no queue, no task for each
 
-        def one(run: int) -> bool:
-            fleet = self._fleets.get()
-            try:
-                progress = fleet.begin(cases[run], parameter_blocks[run])
+        def work(fleet: _Fleet) -> bool:
+            progress = fleet.progress(sizes)
+            monitor = progress.monitor
+            for run in runs:
+                fleet.begin(cases[run], parameter_blocks[run], sizes.mode)
                 progress.recorder = blocks[run]
                 for done in range(0, span.steps, STRIDE):
                     if stopped():
                         return False
                     self._advance(fleet.machine, min(STRIDE, span.steps - done))
-                    if progress.monitor.exit != watch.INSIDE:
+                    if monitor.exit != watch.INSIDE:
                         break
-                recorder.heads.first[run] = span.last
+                first_rows[run] = span.last
                 observe(fleet.plant, self._control, progress)
-                monitors[run] = progress.monitor
-                return True
-            finally:
-                self._fleets.put(fleet)
+                monitors[run] = monitor
+            return True
 
         remember = self._remember if sizes.mode == CONTINUOUS and sizes.memory else None
         with (
             callbacks(control=self._control, passive=self._passive, activation=remember),
-            workers(self._threads) as pool,
+            workers(len(self._fleets)) as pool,
         ):
-            done = list(pool.map(one, range(len(cases))))
+            try:
+                done = list(pool.map(work, self._fleets))
+            finally:
+                for _ in runs:  # if something went wrong, nobody begins another one
+                    pass
         return Outcome(recorder.all(), monitors) if all(done) else None
 
 
@@ -93,16 +94,19 @@ class _Fleet:
         self.machine = machine_of(plant.model, plant.data)
         self._parameters = plant.agents.parameters
 
-    def begin(self, case: Case, parameter_block: ParameterBlock) -> Any:
-        """Make this the start of a run; returns its progress and monitor, by name."""
+    def progress(self, sizes: Steps) -> Any:
+        """The progress and monitor of its runs, by name."""
         plant = self.plant
-        if not np.array_equal(case.parameters, self._parameters):
-            for name, at, values in plant.model_fields(case.parameters[None]):
+        return workspace_of(plant.data.userdata, plant.sizes.workspace, sizes).loop
+
+    def begin(self, case: Case, parameter_block: ParameterBlock, mode: int) -> None:
+        """Make this the start of a run."""
+        plant, given = self.plant, case.parameters
+        if given is not self._parameters and not np.array_equal(given, self._parameters):
+            for name, at, values in plant.model_fields(given[None]):
                 getattr(plant.model, name)[at] = values[0]
             mujoco.mj_setConst(plant.model, plant.data)
-            self._parameters = case.parameters
-            plant.agents = replace(plant.agents, parameters=case.parameters)  # which say a start
+            plant.agents = replace(plant.agents, parameters=given)  # which say a start
+        self._parameters = given
         plant.reset(case.state)
-        sizes = steps_of(parameter_block)
-        put_start(plant.data, parameter_block, sizes.mode, case.memory)
-        return workspace_of(plant.data.userdata, plant.sizes.workspace, sizes).loop
+        put_start(plant.data, parameter_block, mode, case.memory)

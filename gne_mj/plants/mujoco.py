@@ -224,6 +224,8 @@ class MujocoPlant(FleetPlant):
         self.places.main_v = [joint.dofadr[0] for joint in main]
         self.places.appendage_v = [joint.dofadr[0] for joint in appendage]
         self.places.actuator = [self.model.actuator(name).id for name in names("force")]
+        # (2, m) main masses' and appendages' entries of qpos and of qvel
+        self._joints = flat[:, :2].T.copy(), flat[:, 2:4].T.copy()
         model = self.model
         workspace = ARCTANGENTS + self.agents.channels
         self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
@@ -300,11 +302,9 @@ class MujocoPlant(FleetPlant):
         """See the base class."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        at = self.places
-        self.data.qpos[at.main_q] = state[:, 3]
-        self.data.qpos[at.appendage_q] = state[:, 3] - state[:, 0]
-        self.data.qvel[at.main_v] = state[:, 1]
-        self.data.qvel[at.appendage_v] = state[:, 2]
+        position, (qpos, qvel) = state[:, 3], self._joints
+        self.data.qpos[qpos] = position, position - state[:, 0]
+        self.data.qvel[qvel] = state[:, 1], state[:, 2]
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
