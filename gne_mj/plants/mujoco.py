@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gne_mj.elementary import arctangent
 from gne_mj.errors import InvalidInput, named, part_of
-from gne_mj.native import compiled, kernel, source_key
+from gne_mj.native import compiled, kernel, part, source_key
 from gne_mj.numbers import Numbers, dtype_in, names_of, numbers_in
 from gne_mj.parameter_block import ParameterBlock, floats, integers
 from gne_mj.plants import flexible_robot
@@ -131,12 +132,15 @@ def add_atan_forces(at, data, parameter_block, m):
     qpos = field(data, at.qpos, sizes.nq)
     force = field(data, at.qfrc_passive, sizes.nv)
     places, coefficient = integers(parameter_block, PLACES), floats(parameter_block, ATAN)
-    kept = field(data, at.userdata, ARCTANGENTS + m)
+    angles = part(field(data, at.userdata, ARCTANGENTS + m), ARCTANGENTS, m)
     for r in range(m):
         place = place_of(places, r)
-        arctangent = np.arctan(qpos[place.main_q] - qpos[place.appendage_q])
-        kept[ARCTANGENTS + r] = arctangent  # for the storage function, which needs it again
-        spring_force = coefficient[r] * arctangent
+        angles[r] = qpos[place.main_q] - qpos[place.appendage_q]
+    for r in range(len(angles)):  # by itself, so that it takes vectors; kept for V as well
+        angles[r] = arctangent(angles[r])
+    for r in range(m):
+        place = place_of(places, r)
+        spring_force = coefficient[r] * angles[r]
         force[place.main_v] -= spring_force
         force[place.appendage_v] += spring_force
 

@@ -23,6 +23,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.elementary import arctangent, logarithm
 from gne_mj.native import kernel
 from gne_mj.plants import flexible_robot, lookahead
 
@@ -138,7 +139,7 @@ def start(parameters: Array, rest: Array, given: Mapping[str, Array]) -> Array:
 @kernel
 def shared(q, x):
     """What both the rate and V need: the extension's arctangent."""
-    return np.arctan(x[0])
+    return arctangent(x[0])
 
 
 @kernel
@@ -150,7 +151,7 @@ def spring_force(q, x, v, arctangent):
 @kernel
 def rate(q, x, u, out):
     """Fill out with x'; u in N."""
-    rate_given(q, x, u, np.arctan(x[0]), out)
+    rate_given(q, x, u, arctangent(x[0]), out)
 
 
 @kernel
@@ -168,7 +169,7 @@ def rate_given(q, x, u, arctangent, out):
 def euler_step(q, x, u, h, out):
     """One semi-implicit Euler step, as MuJoCo's: velocities first, positions with the new ones."""
     v = (x[1] - x[3]) / q[5]
-    force = spring_force(q, x, v, np.arctan(x[0]))
+    force = spring_force(q, x, v, arctangent(x[0]))
     v += h * (u - q[6] * v - force) / q[0]
     appendage = x[2] + h * force / q[1]
     out[0] = x[0] + h * (v - appendage)
@@ -212,7 +213,7 @@ def equilibrium(q, y, out):
 @kernel
 def storage(q, x, equilibrium_state):
     """V^{x*}(x), the Bregman divergence of V from the equilibrium ``equilibrium_state``."""
-    return storage_given(q, x, equilibrium_state, np.arctan(x[0]))
+    return storage_given(q, x, equilibrium_state, arctangent(x[0]))
 
 
 @kernel
@@ -221,7 +222,7 @@ def storage_given(q, x, equilibrium_state, arctangent):
     extension, v, w = x[0], (x[1] - x[3]) / q[5], x[2]
     away = x[3] - equilibrium_state[3]
     energy = 0.5 * q[2] * extension * extension + q[3] * (
-        extension * arctangent - 0.5 * np.log(1.0 + extension * extension)
+        extension * arctangent - 0.5 * logarithm(1.0 + extension * extension)
     )
     energy += 0.5 * q[0] * v * v + 0.5 * q[1] * w * w
     return q[5] * energy + away * (q[0] * v + q[1] * w) + 0.5 * q[6] * away * away
