@@ -203,6 +203,17 @@ def test_large_fleets_have_memory_by_their_number_and_take_the_same_steps(monkey
         assert_array_equal(runs[0][name].to_numpy(), runs[1][name].to_numpy())
 
 
+def test_large_fleets_have_room_for_their_estimates_at_all_stages(monkeypatch):
+    monkeypatch.setattr(fleet, "MANY", 4)
+    monkeypatch.setattr(fleet, "_LEAST_ARENA", 2**16)
+    monkeypatch.setattr(fleet, "_ARENA_FOR_EACH", 2**11)
+    world = fleet.compose(np.ones((60, 5)), decorated=False)
+    model = fleet.compile_model(world, timestep=0.001, integrator="RK4", memory=3600)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data)
+    assert data.maxuse_stack > 9 * 8 * 3600
+
+
 def test_a_line_of_thousands_is_solved():
     """5,000 robots on a line: the equilibrium is v_0, by a band of three diagonals."""
     system = large_line(5000)

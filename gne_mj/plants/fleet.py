@@ -24,6 +24,7 @@ GROUP = 200
 # Fleets of more have memory in bytes by their number
 MANY = 500
 _LEAST_ARENA, _ARENA_FOR_EACH = 2**24, 2**14
+_ARENA_FOR_MEMORY = 10 * 8  # for each entry of act: Runge-Kutta 4 has nine copies
 
 
 def element_names(what: str, channels: int, dimension: int = 1) -> list[str]:
@@ -162,6 +163,8 @@ def compile_model(
     """
     if memory:
         add_memory(world, memory)
+        if world.memory > 0:
+            world.memory += _ARENA_FOR_MEMORY * memory
     world.option.timestep = timestep
     world.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     world.nuserdata = userdata
