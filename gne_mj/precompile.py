@@ -9,6 +9,7 @@ import multiprocessing
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from typing import Any
 
 from gne_mj.scenario import load_scenario, shipped
@@ -37,15 +38,25 @@ def runs() -> list[tuple[str, dict[str, Any]]]:
     return [*(("velocity-sync", each) for each in OTHERS), *((name, {}) for name in shipped())]
 
 
+def batches() -> list[tuple[str, dict[str, Any]]]:
+    """What is run as a batch besides, since its loop takes eight runs at once: likewise."""
+    long = {"simulation.timestep": 0.01, "simulation.duration": 30.0, "recording.period": 1.0}
+    return [("velocity-sync", {**_ODE, **long})]
+
+
 def precompile(processes: int | None = None) -> Iterator[str]:
-    """Compile what :func:`runs` need, and yield each one's scenario when it is done.
+    """Compile what :func:`runs` and :func:`batches` need; yield each one's scenario when done.
 
     Args:
         processes: that compile beside each other; as many as there are processors if left out.
     """
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes or os.cpu_count(), spawn) as pool:
-        for done in as_completed([pool.submit(_run, *each) for each in runs()]):
+        jobs = [
+            *(pool.submit(_run_batch, *each) for each in batches()),
+            *(pool.submit(_run, *each) for each in runs()),
+        ]
+        for done in as_completed(jobs):
             yield done.result()
 
 
@@ -53,4 +64,16 @@ def _run(scenario: str, changes: dict[str, Any]) -> str:
     simulation = load_scenario(scenario, changes).simulation_object()
     simulation.advance(STEPS)
     simulation.trajectory()
+    return scenario
+
+
+def _run_batch(scenario: str, changes: dict[str, Any]) -> str:
+    from gne_mj.batches import make_plan
+    from gne_mj.batches.chunk import Runner
+    from gne_mj.loops.ode_batch import LEAST
+
+    plan = make_plan(scenario, changes)
+    steps = round(changes["simulation.duration"] / changes["simulation.timestep"])
+    plan = replace(plan, starts=-(-LEAST // steps), chunk=LEAST)
+    Runner(plan, 1).run(0)
     return scenario

@@ -8,6 +8,7 @@ import pytest
 from commands import environment, gne_here
 
 from gne_mj import precompile
+from gne_mj.loops.lane_batch import LaneLoop
 from gne_mj.scenario import load_scenario, shipped
 
 # Runs each scenario in a process of its own, and prints what that compiles
@@ -49,8 +50,18 @@ def test_all_kinds_are_among_the_runs():
     assert {system.decentralised for system in built} == {True, False}
 
 
+def test_the_batches_are_long_enough_for_lanes(monkeypatch):
+    begun = []
+    monkeypatch.setattr(LaneLoop, "__init__", lambda self, modules, *_: begun.append(modules))
+    monkeypatch.setattr(LaneLoop, "fits", lambda self, blocks: False)
+    for each in precompile.batches():
+        precompile._run_batch(*each)
+    assert len(begun) == len(precompile.batches()) > 0
+
+
 def test_the_command_says_how_much(monkeypatch):
     monkeypatch.setattr(precompile, "runs", lambda: [("velocity-sync", {"plant.engine": "ode"})])
+    monkeypatch.setattr(precompile, "batches", list)
     done = gne_here("precompile", "--processes", "1")
     assert (done.returncode, done.stdout) == (0, "compiled what 1 kinds of runs need\n")
 

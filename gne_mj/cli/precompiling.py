@@ -21,7 +21,7 @@ def precompile(
     """
     from gne_mj import precompile as compiling
 
-    total = len(compiling.runs())
+    total = len(compiling.runs()) + len(compiling.batches())
     with telling("compiling") as tell:
         for done, name in enumerate(compiling.precompile(processes), start=1):
             tell(done, total, f"compiled {done} of {total}: {name}")
