@@ -28,6 +28,10 @@ del OSNR["plant.engine"]
 SYSTEMS = {
     "robots": ("velocity-sync", {**ODE, **NEAR}),
     "robots, limited": ("velocity-sync", {**ODE, "agents.input_limit": 3.0}),
+    "sampled": ("velocity-sync", {**ODE, **NEAR, "controller.mode": "sampled",
+                                  "simulation.control_period": 0.5}),
+    "sampled, Euler": ("velocity-sync", {**ODE, "controller.mode": "sampled",
+                                         "simulation.integrator": "euler"}),
     "partial": ("velocity-sync", {**ODE, **NEAR, "controller.information": "partial",
                                   "controller.graph": "ring"}),
     "integrators": ("osnr", {**OSNR, "agents": {"type": "integrator", "count": 10}}),

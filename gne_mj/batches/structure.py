@@ -59,7 +59,7 @@ class Structure:
         if self._plant is None:
             block = ode_parameter_block(setup, system.agents, memory)
             block.modules = modules_for(
-                system.agents.kind, system.law.kernels, system.game.kernels, setup
+                system.agents.kind, system.law.kernels, system.game.kernels, setup, memory
             )
             return block
         from gne_mj.loops.mujoco_workspace import mujoco_parameter_block

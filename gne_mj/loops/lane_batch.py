@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.lanes import WIDTH, empty
-from gne_mj.loops import functions, lanes
+from gne_mj.loops import functions, lanes, lanes_held
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.layout import Setup, Steps
-from gne_mj.loops.ode import CONTINUOUS, ode_workspace_length, workspaces_of
+from gne_mj.loops.ode import CONTINUOUS, SAMPLED, ode_workspace_length, workspaces_of
 from gne_mj.native import INTERPRETED, call_integer, compiled, kernel
 from gne_mj.parameter_block import ParameterBlock, floats, floats_at, integers_at
 from gne_mj.plants.functions import RK4
@@ -36,15 +36,21 @@ _ELSEWHERE = (
 )  # fmt: skip
 
 
-def modules_for(agent: ModuleType, law: ModuleType, game: ModuleType, setup: Setup) -> Any:
+def modules_for(
+    agent: ModuleType, law: ModuleType, game: ModuleType, setup: Setup, memory: int
+) -> Any:
     """The modules of runs whose common steps can be taken in lanes, else None.
 
-    A module says that lanes can go through its kernels by ``LANES = True``.
+    That is in mode continuous with Runge-Kutta 4, and in mode sampled under laws without memory. A
+    module says that lanes can go through its kernels by ``LANES = True``.
     """
     modules = Modules(agent, law, game)
     clock, linked = setup.clock, setup.problem.functions
     able = not INTERPRETED and all(getattr(each, "LANES", False) for each in modules)
-    able = able and clock.mode == CONTINUOUS and clock.method == RK4
+    able = able and (
+        (clock.mode == CONTINUOUS and clock.method == RK4)
+        or (clock.mode == SAMPLED and memory == 0)
+    )
     able = able and not hasattr(game, "pseudo_gradient")  # whose sums have another order
     return modules if able and not np.any(linked[list(_ELSEWHERE)]) else None
 
@@ -220,7 +226,8 @@ class LaneLoop:
 
     def __init__(self, modules: Modules, sizes: Steps, alone: int) -> None:
         self._modules = modules
-        self._loop, self._alone = int(lanes.build(*modules).address), alone
+        kind = lanes if sizes.mode == CONTINUOUS else lanes_held
+        self._loop, self._alone = int(kind.build(*modules).address), alone
         self._marks = marks_of(sizes)
         self._room = self._marks.length + lanes.scratch_length(sizes.actions)
         self._spare: deque[_Place] = deque(maxlen=SPARE)

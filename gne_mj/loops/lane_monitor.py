@@ -10,7 +10,7 @@ from gne_mj.native import kernel
 
 
 @kernel
-def observe(figures, time, work, asked, u, storage, runs):
+def observe(figures, time, work, asked, inputs, storage, runs):
     """Take one observation of the lanes in the mask ``runs``.
 
     Args:
@@ -18,11 +18,12 @@ def observe(figures, time, work, asked, u, storage, runs):
         time: in s, of the step's start.
         work: of the loop; its stages' first rows have the outputs and constraint values then.
         asked: (m,) what the law asked for.
-        u: (m,) the input, within the actuators' limits.
+        inputs: that until now and from now on, (m,) each, within the actuators' limits.
         storage: V.
         runs: which have taken the step.
     """
     monitor, y, g = figures.numbers, work.stages.y, work.stages.g
+    before, u = inputs
     first = runs & (monitor.started == 0.0)
     later = runs & (not first)
     elapsed = where(first, 0.0, time - monitor.time)
@@ -42,8 +43,8 @@ def observe(figures, time, work, asked, u, storage, runs):
         figures.worst_time[k] = where(worse, time, figures.worst_time[k])
     for r in range(len(u)):
         last_y, last_u = figures.last_y[r], figures.last_u[r]
-        square = figures.square[r] + 0.5 * elapsed * (last_u * last_u + u[r] * u[r])
-        energy = figures.energy[r] + 0.25 * elapsed * (last_u + u[r]) * (last_y + y[r])
+        square = figures.square[r] + 0.5 * elapsed * (last_u * last_u + before[r] * before[r])
+        energy = figures.energy[r] + 0.25 * elapsed * (last_u + before[r]) * (last_y + y[r])
         figures.square[r] = where(runs, square, figures.square[r])
         figures.energy[r] = where(runs, energy, figures.energy[r])
         figures.last_y[r] = where(runs, y[r], last_y)

@@ -48,8 +48,8 @@ class Scratch(NamedTuple):
 
 
 scratch_length, scratch_in = in_array(Scratch, "m")
-_problem = in_parameter_block(Problem, place_in_block("problem"), floats=lanes)
-_channels = in_parameter_block(Channels, place_in_block("channels"), floats=lanes)
+problem_in_lanes = in_parameter_block(Problem, place_in_block("problem"), floats=lanes)
+channels_in_lanes = in_parameter_block(Channels, place_in_block("channels"), floats=lanes)
 
 
 @kernel
@@ -244,7 +244,10 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
         behind = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
         scratch = scratch_in(behind, 0, s.actions)
         turn, asked, known = scratch.turn, scratch.asked, scratch.known
-        problem, channels = _problem(block, s.agents), _channels(block, s.actions, s.output, -1)
+        problem, channels = (
+            problem_in_lanes(block, s.agents),
+            channels_in_lanes(block, s.actions, s.output, -1),
+        )
         h = floats_at(address_in(lanes(block, H)), 1)[0]
         loop, vectors = workspace.loop, workspace.vectors
         work, u, divided, progress = loop.work, loop.u, loop.work.division, loop.progress
@@ -279,7 +282,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
             halved = (not good) & sound & (divided.level < division.FINEST)
             hard = bits_of(not (good | halved)) & runs
             time = progress.step * h + divided.position * tick
-            observe(loop.monitor, time, work, asked, u, storage, good)
+            observe(loop.monitor, time, work, asked, (u, u), storage, good)
             due = bits_of(good & whole & (progress.step == turn.due)) & runs
             for lane in range(WIDTH if due != 0 else 0):
                 if (due >> lane) & 1:
