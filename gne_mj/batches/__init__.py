@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from gne_mj.arguments import answering
 from gne_mj.batches.cluster import connected
 from gne_mj.batches.execute import ahead, execute
-from gne_mj.batches.plan import Plan, make_plan, parse_record, parse_share
+from gne_mj.batches.options import parse_record, parse_share
+from gne_mj.batches.plan import Plan, make_plan
 from gne_mj.batches.progress import Progress, of_runs
 from gne_mj.batches.shard import Shard, parse_shard
 from gne_mj.batches.store import Store
