@@ -307,6 +307,19 @@ def test_threads_may_share_a_game():
         assert np.array_equal(found, both(start))
 
 
+def test_many_best_responses_are_those_of_each_agent():
+    """Shared among threads, in pieces, each with memory of its own."""
+    game, _, _ = chain(300, seed=3)
+    y = np.full(300, V0)
+    told = []
+    gains = measured_epsilon(game, y, lambda: told.append(1))
+    assert len(told) == 300
+    for agent in (0, 63, 64, 150, 299):
+        alone = best_response(game, agent, y)
+        gain = game.costs(y)[agent] - game.costs(alone.action)[agent]
+        assert gains[agent] == pytest.approx(max(gain, 0.0), rel=1e-9, abs=1e-12)
+
+
 def test_a_hole_in_the_set_hides_no_gain():
     """The ring's first player would rather be on its other side, as far left as may be."""
     y = np.array([0.97, -0.02])

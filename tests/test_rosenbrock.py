@@ -24,14 +24,14 @@ from reference_agents import Integrator
 from scipy.integrate import solve_ivp
 
 import reference
-from gne_mj import banded
+from gne_mj import banded, native
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InfeasibleStart
 from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels
+from gne_mj.loops import linear, rodas
 from gne_mj.loops import monitor as watch
-from gne_mj.loops import rodas
 from gne_mj.plants.agents import Agents
 from gne_mj.system import System
 
@@ -106,6 +106,24 @@ def test_small_systems():
     banded.solve(band, 6, 5, pivot, b)
     assert b == pytest.approx(expected, rel=1e-10)
     assert not banded.factorise(dense_band(np.ones((3, 3))), 3, 2, np.zeros(3, dtype=np.int64))
+
+
+@native.compiled
+def sum_rows(out, matrix, weights):
+    linear.weighted_sum(out, matrix, weights)
+
+
+@pytest.mark.parametrize(("count", "width"), [(0, 3), (1, 1), (2, 7), (9, 10), (3, 16), (4, 17)])
+def test_sums_of_rows(count, width):
+    """Eight entries at a time, none beyond the end, in the order of the rows to the bit."""
+    rng = np.random.default_rng(2)
+    matrix, weights = rng.normal(size=(2, count, width))
+    around = np.full(width + 2, 7.0)
+    sum_rows(around[1:-1], matrix, weights)
+    expected = np.zeros(width)
+    for row, factors in zip(matrix, weights, strict=True):
+        expected += row * factors
+    assert np.array_equal(around, [7.0, *expected, 7.0])
 
 
 def dense_band(matrix):
