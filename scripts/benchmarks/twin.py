@@ -296,7 +296,7 @@ def measure(twin: Twin, name: str, runs: int) -> list[dict[str, str]]:
             "better": "higher",
         }
         for key, law, target in (
-            ("numba", "law and Jacobian by numba", ">= 8"),
+            ("numba", "law and Jacobian by numba", ">= 10"),
             ("numpy", "law by NumPy, Jacobian by numba", ""),
             ("alone", "law by NumPy", ">= 40"),
         )
