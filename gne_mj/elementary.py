@@ -55,7 +55,7 @@ _ROOT_OF_HALF = 0x3FE6A09E667F3BCD  # the bits of the least double above sqrt(1/
 LOG_2, LOG_2_REST = 0.6931471803691238, 1.9082149292705877e-10  # ln 2: 32 bits, and the rest
 
 
-def mantissa_and_exponent(x):
+def mantissa_and_exponent(x: float) -> tuple[float, float]:
     """x = mantissa * 2^exponent, the mantissa between sqrt(1/2) and sqrt(2); positive, not tiny."""
     mantissa, exponent = math.frexp(x)
     if mantissa < math.sqrt(0.5):

@@ -80,10 +80,9 @@ def run_batch(
         check_in_mujoco: the share of runs, on engine "ode", that are made in MuJoCo too, as 0.01 or
             "1%"; the seed says which, and the dataset has how far each is from its twin.
         threads: native threads; 0 for one a processor.
-        resume: go on with what an earlier call has begun there, if there is such a folder.
+        resume: go on with what an earlier call has begun there, if any.
         cluster: address of a Dask scheduler to run on.
-        progress: True to tell on stderr how long it takes and how far it is, as the command does;
-            or what is called after each chunk.
+        progress: True to tell on stderr how far it is; or what is called after each chunk.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
@@ -92,19 +91,16 @@ def run_batch(
     """
     own = named(starts="runs", sweeps="sweep", given="record", folder="out", address="cluster")
     with own, named(plan=""):
-        plan = make_plan(
-            source, changes, system=system, sweeps=_sweeps(sweep or {}), starts=runs, seed=seed,
-            spread=spread, record=parse_record(record), chunk=chunk,
-            check_in_mujoco=_share(check_in_mujoco),
-        )  # fmt: skip
+        more: dict[str, Any] = {"seed": seed, "spread": spread, "record": parse_record(record)}
+        more |= {"chunk": chunk, "check_in_mujoco": _share(check_in_mujoco)}
+        more |= {"sweeps": _sweeps(sweep or {}), "starts": runs, "system": system}
+        plan = make_plan(source, changes, **more)
         with connected(cluster) as client, if_asked(progress) as tell:
             begin = Store.resume if resume and Path(out).exists() else Store.create
             store = begin(Path(out), plan)
-            words = ahead(plan, threads, cluster)
-            shown = of_runs(tell, words, quiet=not progress)
-            if callable(progress):
-                shown = progress
-            execute(store, threads=threads, cluster=client, progress=shown)
+            shown = of_runs(tell, ahead(plan, threads, cluster), quiet=not progress)
+            told = progress if callable(progress) else shown
+            execute(store, threads=threads, cluster=client, progress=told)
         return store.dataset()
 
 

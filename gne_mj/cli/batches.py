@@ -118,16 +118,7 @@ def batch(
     that was stopped or killed goes on with --resume, and ends as if it had not been. With --shard
     the same command does both: the first shard makes DIR, and each goes on with its own chunks.
     """
-    from gne_mj.batches import (
-        ahead,
-        connected,
-        execute,
-        make_plan,
-        of_runs,
-        parse_record,
-        parse_shard,
-        parse_share,
-    )
+    from gne_mj import batches
     from gne_mj.errors import InvalidInput, named
     from gne_mj.extras import need
 
@@ -138,33 +129,24 @@ def batch(
             "source", None, "a scenario must be named, unless `resume` `folder` DIR is all there is"
         )
     own = named(address="cluster", store="folder", target="folder")
-    with own, connected(cluster) as client, stopping() as stop:
-        part = None if shard is None else meaning("shard", parse_shard, shard)
+    with own, batches.connected(cluster) as client, stopping() as stop:
+        part = None if shard is None else meaning("shard", batches.parse_shard, shard)
         plan = None
         if source is not None:
-            plan = make_plan(
-                source,
-                settings(set_),
-                system=system,
-                sweeps=[_sweep(text) for text in sweeps or []],
-                starts=starts,
-                seed=seed,
-                spread=spread,
-                record=meaning("record", parse_record, record),
-                chunk=chunk,
-                check_in_mujoco=meaning("check_in_mujoco", parse_share, check_in_mujoco),
-            )
+            share = meaning("check_in_mujoco", batches.parse_share, check_in_mujoco)
+            plan = batches.make_plan(
+                source, settings(set_), system=system, starts=starts,
+                sweeps=[_sweep(text) for text in sweeps or []], seed=seed, spread=spread,
+                chunk=chunk, check_in_mujoco=share,
+                record=meaning("record", batches.parse_record, record),
+            )  # fmt: skip
         store = _opened(plan, folder, resume, part)
         with telling(PREPARING, quiet=as_json) as tell:
-            show = of_runs(tell, ahead(store.plan, threads, cluster), quiet=as_json)
-            now = execute(
-                store,
-                threads=threads,
-                cluster=client,
-                shard=part,
-                progress=show,
-                stopped=stop.is_set,
-            )
+            words = batches.ahead(store.plan, threads, cluster)
+            now = batches.execute(
+                store, threads=threads, cluster=client, shard=part, stopped=stop.is_set,
+                progress=batches.of_runs(tell, words, quiet=as_json),
+            )  # fmt: skip
         _tell(store, now, as_json, part)
     if not now.complete and not as_json:
         print(f"\nstopped: {_partial(store, now)}")

@@ -226,6 +226,28 @@ def forget(good, work, asked, u):
         work.g[k] = where(good, work.g[k], stages.g[k])
 
 
+@kernel
+def take_stages(agent, law, game, parts, vectors, known, piece):
+    """Fill the trial with the state a piece of so many s on; the mask of lanes that stay inside."""
+    state, trial, k, work = vectors.state, vectors.trial, vectors.rates, parts.work
+    states = parts.channels.equilibrium_state.shape[1]
+    note(0, work)
+    rates(agent, law, parts, 0, state, known, k[0])
+    stage_state(1, piece, state, k, trial)
+    good = act(law, game, parts, trial, states)
+    for stage in range(1, 4):
+        note(stage, work)
+        rates(agent, law, parts, stage, trial, known, k[stage])
+        if stage < 3:
+            stage_state(stage + 1, piece, state, k, trial)
+        else:
+            for r in range(len(state)):
+                rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
+                trial[r] = state[r] + piece / 6.0 * rise
+        good &= act(law, game, parts, trial, states)
+    return good
+
+
 @cache
 def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
     """The loop of eight runs, for modules of kernels that lanes can go through.
@@ -254,7 +276,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
         parts = Parts(
             problem, channels, LoopClock(h, 1, 0, 1), loop.monitor.numbers, loop.monitor, u, work
         )
-        state, trial, k, begun = vectors.state, vectors.trial, vectors.rates, vectors.begun
+        state, trial, begun = vectors.state, vectors.trial, vectors.begun
         size, tick = s.actions * s.states, h * division.SHARES[division.DEEPEST]
         sound = act(law, game, parts, state, s.states)
         size_up(problem, work)
@@ -262,21 +284,8 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
             storage = stored(agent, law, parts, state, known)
             copy(work.commanded, asked)
             copy(work.u, u)
-            note(0, work)
-            rates(agent, law, parts, 0, state, known, k[0])
             piece = h * power_of_two(-divided.level)
-            good = sound
-            for stage in range(1, 5):
-                if stage < 4:
-                    stage_state(stage, piece, state, k, trial)
-                else:
-                    for r in range(len(state)):
-                        rise = k[0, r] + 2.0 * k[1, r] + 2.0 * k[2, r] + k[3, r]
-                        trial[r] = state[r] + piece / 6.0 * rise
-                good &= act(law, game, parts, trial, s.states)
-                if stage < 4:
-                    note(stage, work)
-                    rates(agent, law, parts, stage, trial, known, k[stage])
+            good = take_stages(agent, law, game, parts, vectors, known, piece) & sound
             good &= stands(problem, work, runs & bits_of(good))
             whole = divided.position == 0.0
             halved = (not good) & sound & (divided.level < division.FINEST)
