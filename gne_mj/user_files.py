@@ -157,7 +157,7 @@ def compiler_complaint(error: BaseException) -> str | None:
     Its deepest reason stands behind the last "Failed in ..." line, and after it, innermost first,
     the lines of the files that led there.
     """
-    text = str(error)
+    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))  # numba colours it if colorama is installed
     places = re.findall(r'File "([^"]+)", line (\d+)', text) or [("", "")]
     own = {
         Path(module.__file__).name

@@ -1,14 +1,15 @@
 """Single lines that no other test would miss: scales of tolerances, ends of searches, sentences."""
 
 import os
-from types import SimpleNamespace
+import sys
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from builders import FIVE, clock, robot_state, robot_system
 from own_games import boxed, plain_game
 
-from gne_mj import certificate
+from gne_mj import certificate, user_files
 from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
@@ -150,6 +151,20 @@ def test_a_first_pattern_that_leaves_at_once_is_halved(monkeypatch):
     monkeypatch.setattr(trials, "stays_inside", stays)
     found = search_push(robot_system(robot_state(FIVE)), clock(0.01, 4.0, 0.01))
     assert 0.01 <= found.smallest_breaking_push <= 1.0201 * 0.01
+
+
+# -------------------------------------------------------------------------------------- messages
+
+
+def test_what_numba_says_in_colours_is_told_without(monkeypatch):
+    """It does where colorama is installed, as with the tools of the site."""
+    module = ModuleType(f"{user_files.USER_MODULES}mine")
+    module.__file__ = "/somewhere/mine.py"
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    plain = 'Failed in nopython mode\n{}Untyped name{}\n\nFile "{}/somewhere/mine.py{}", line 7:'
+    for styles in (("", "") * 2, ("\x1b[1m\x1b[31m", "\x1b[0m") * 2):
+        told = user_files.compiler_complaint(ValueError(plain.format(*styles)))
+        assert told == "mine.py, line 7: a kernel cannot be compiled: Untyped name"
 
 
 # ----------------------------------------------------------------------------------------- games
