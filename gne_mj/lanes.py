@@ -26,7 +26,8 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, models, overlo
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
-from gne_mj.native import KERNEL, array_at, load_word
+from gne_mj.native import KERNEL
+from gne_mj.parameter_block import array_of, entry_of
 
 WIDTH = 8  # doubles in a vector
 NUMBERS = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -290,28 +291,13 @@ def _set(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
 @intrinsic
 def lanes_at(typingctx: Any, address: Any, length: Any) -> Any:
     """The array of so many lanes at an address, a multiple of a lane's 64 bytes."""
-
-    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return array_at(context, builder, _ARRAY, *arguments)
-
-    return _ARRAY(types.int64, types.int64), codegen
+    return array_of(_ARRAY)
 
 
 @intrinsic
 def lanes(typingctx: Any, parameter_block: Any, index: Any) -> Any:
     """The array of lanes at this index of the parameter block at an address."""
-
-    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        parameter_block, index = arguments
-        pair = builder.add(
-            parameter_block, builder.mul(index, context.get_constant(types.intp, 16))
-        )
-        length = builder.add(pair, context.get_constant(types.intp, 8))
-        return array_at(
-            context, builder, _ARRAY, load_word(builder, pair), load_word(builder, length)
-        )
-
-    return _ARRAY(types.int64, types.int64), codegen
+    return entry_of(_ARRAY)
 
 
 def empty(length: int) -> NDArray[np.float64]:

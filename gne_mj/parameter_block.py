@@ -71,20 +71,23 @@ def _indexed(item: Any, parameter_block: int, index: int) -> NDArray[Any]:
     return _array(item, *_array(ctypes.c_int64, parameter_block + 16 * index, 2))
 
 
+_FLOATS, _INTEGERS = types.Array(types.float64, 1, "C"), types.Array(types.int64, 1, "C")
+
+
 @intrinsic_or(lambda parameter_block, index: _indexed(ctypes.c_double, parameter_block, index))
 def floats(typingctx: Any, parameter_block: Any, index: Any) -> Any:
     """The float array at this index of the parameter block at an address."""
-    return _entry(types.float64)
+    return entry_of(_FLOATS)
 
 
 @intrinsic_or(lambda parameter_block, index: _indexed(ctypes.c_int64, parameter_block, index))
 def integers(typingctx: Any, parameter_block: Any, index: Any) -> Any:
     """The integer array at this index of the parameter block at an address."""
-    return _entry(types.int64)
+    return entry_of(_INTEGERS)
 
 
-def _entry(item: types.Type) -> Any:
-    kind = types.Array(item, 1, "C")
+def entry_of(kind: types.Array) -> Any:
+    """For intrinsics: a parameter block's entry of an index as an array of a kind."""
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         parameter_block, index = arguments
@@ -102,17 +105,17 @@ def _entry(item: types.Type) -> Any:
 @intrinsic_or(lambda address, length: _array(ctypes.c_double, address, length))
 def floats_at(typingctx: Any, address: Any, length: Any) -> Any:
     """The float array of a length at an address."""
-    return _block(types.float64)
+    return array_of(_FLOATS)
 
 
 @intrinsic_or(lambda address, length: _array(ctypes.c_int64, address, length))
 def integers_at(typingctx: Any, address: Any, length: Any) -> Any:
     """The integer array of a length at an address."""
-    return _block(types.int64)
+    return array_of(_INTEGERS)
 
 
-def _block(item: types.Type) -> Any:
-    kind = types.Array(item, 1, "C")
+def array_of(kind: types.Array) -> Any:
+    """For intrinsics: the array of a kind and length at an address."""
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return array_at(context, builder, kind, *arguments)

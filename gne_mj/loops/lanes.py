@@ -248,6 +248,20 @@ def take_stages(agent, law, game, parts, vectors, known, piece):
     return good
 
 
+@kernel
+def laid_out(block, address, s):
+    """A loop's workspace, its scratch behind that, and its parts, by addresses and sizes."""
+    length = ode_workspace_length(s)
+    workspace = ode_workspace_in(lanes_at(address, length), s)
+    behind = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
+    problem = problem_in_lanes(block, s.agents)
+    channels = channels_in_lanes(block, s.actions, s.output, -1)
+    h, loop = floats_at(address_in(lanes(block, H)), 1)[0], workspace.loop
+    clock, monitor = LoopClock(h, s.period, s.mode, s.method), loop.monitor
+    parts = Parts(problem, channels, clock, monitor.numbers, monitor, loop.u, loop.work)
+    return workspace, scratch_in(behind, 0, s.actions), parts
+
+
 @cache
 def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
     """The loop of eight runs, for modules of kernels that lanes can go through.
@@ -261,21 +275,10 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
     def advance(block, address, count, runs):
         _ = source
         s = steps_in(block)
-        length = ode_workspace_length(s)
-        workspace = ode_workspace_in(lanes_at(address, length), s)
-        behind = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
-        scratch = scratch_in(behind, 0, s.actions)
+        workspace, scratch, parts = laid_out(block, address, s)
         turn, asked, known = scratch.turn, scratch.asked, scratch.known
-        problem, channels = (
-            problem_in_lanes(block, s.agents),
-            channels_in_lanes(block, s.actions, s.output, -1),
-        )
-        h = floats_at(address_in(lanes(block, H)), 1)[0]
-        loop, vectors = workspace.loop, workspace.vectors
+        loop, vectors, problem, h = workspace.loop, workspace.vectors, parts.problem, parts.clock.h
         work, u, divided, progress = loop.work, loop.u, loop.work.division, loop.progress
-        parts = Parts(
-            problem, channels, LoopClock(h, 1, 0, 1), loop.monitor.numbers, loop.monitor, u, work
-        )
         state, trial, begun = vectors.state, vectors.trial, vectors.begun
         size, tick = s.actions * s.states, h * division.SHARES[division.DEEPEST]
         sound = act(law, game, parts, state, s.states)

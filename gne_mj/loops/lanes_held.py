@@ -12,23 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.lanes import WIDTH, bits_of, lanes, lanes_at, where
+from gne_mj.lanes import WIDTH, bits_of, where
 from gne_mj.loops.lane_monitor import observe
 from gne_mj.loops.lanes import (
     LANES_LOOP,
     act,
-    channels_in_lanes,
+    laid_out,
     note,
-    problem_in_lanes,
     record,
-    scratch_in,
-    scratch_length,
     stored,
 )
-from gne_mj.loops.layout import H, LoopClock, Parts, steps_in
-from gne_mj.loops.ode import ode_workspace_in, ode_workspace_length
-from gne_mj.native import address_in, callback, copy, source_key
-from gne_mj.parameter_block import floats_at
+from gne_mj.loops.layout import steps_in
+from gne_mj.native import callback, copy, source_key
 from gne_mj.plants.functions import hold_step
 
 
@@ -40,20 +35,10 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
     def advance(block, address, count, runs):
         _ = source
         s = steps_in(block)
-        length = ode_workspace_length(s)
-        workspace = ode_workspace_in(lanes_at(address, length), s)
-        behind = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
-        scratch = scratch_in(behind, 0, s.actions)
+        workspace, scratch, parts = laid_out(block, address, s)
         turn, asked, known = scratch.turn, scratch.asked, scratch.known
-        problem = problem_in_lanes(block, s.agents)
-        channels = channels_in_lanes(block, s.actions, s.output, -1)
-        h = floats_at(address_in(lanes(block, H)), 1)[0]
-        loop, vectors = workspace.loop, workspace.vectors
+        loop, vectors, h = workspace.loop, workspace.vectors, parts.clock.h
         work, u, progress = loop.work, loop.u, loop.progress
-        parts = Parts(
-            problem, channels, LoopClock(h, s.period, s.mode, s.method), loop.monitor.numbers,
-            loop.monitor, u, work,
-        )  # fmt: skip
         state, trial = vectors.state, vectors.trial
         for _step in range(count):
             storage = stored(agent, law, parts, state, known)
@@ -74,7 +59,9 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
                 if (due >> lane) & 1:
                     record(lane, progress, turn, state, state[:0], u)
             copy(state, trial)
-            hold_step(agent, channels.parameters, s.states, s.method, h, trial, u, vectors.spare)
+            hold_step(
+                agent, parts.channels.parameters, s.states, s.method, h, trial, u, vectors.spare
+            )
             for r in range(len(state)):
                 state[r] = where(good, trial[r], state[r])
             progress.step = where(good, progress.step + 1.0, progress.step)
