@@ -152,6 +152,7 @@ def test_a_parameter_of_the_called_function_is_named(function, arguments, option
         ({"memory": np.ones(3)}, "memory"),
         ({"law": PartialInformation(graph.ring(4)), "memory": np.zeros(0)}, "law.graph"),
         ({"integrator": "rosenbrock"}, "integrator"),
+        ({"integrator": "tsit5", "rtol": 1.0}, "rtol"),
         ({"agents": integrators(5), "state": FIVE[:, None], "engine": "mujoco"}, "engine"),
         ({"decentralised": True}, "decentralised"),
         ({"faults": (faults.Noise(), faults.Push(agents=(7,)))}, "faults.1.agents"),
@@ -260,6 +261,8 @@ FILES = [
     ("velocity-sync", {"agents.damping": -1.0}, "agents.damping"),
     ("velocity-sync", {"agents": MIXED}, "agents.groups.1.integral_gain"),
     ("velocity-sync", {"plant.integrator": "rosenbrock"}, "plant.integrator"),
+    ("velocity-sync", {"plant.integrator": "tsit5"}, "plant.integrator"),
+    ("velocity-sync", {"simulation.rtol": 0.0}, "simulation.rtol"),
     ("osnr", {"plant.engine": "mujoco"}, "plant.engine"),
     ("osnr", {"controller.epsilon": 1e-3, "plant.integrator": "rk4"}, "simulation.timestep"),
     ("velocity-sync", {"controller.decentralised": True}, "controller.decentralised"),
@@ -333,7 +336,7 @@ def test_the_key_is_found_by_what_the_tables_declare():
 def test_every_parameter_of_a_system_and_clock_has_a_key():
     """A new one needs a key of its name, or one that says that it fills it."""
     scenario = load_scenario("velocity-sync")
-    for name in set(inspect.signature(System).parameters) - {"name", "seed"}:
+    for name in set(inspect.signature(System).parameters) - {"name", "seed", "rtol"}:  # the clock's
         assert scenario.key_of(f"systems.robots.{name}").count(".") >= 2
         assert _found(scenario, f"systems.robots.{name}"), name
     for name in inspect.signature(Clock).parameters:

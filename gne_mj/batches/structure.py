@@ -39,7 +39,7 @@ class Structure:
         if not self._native:
             self.loop = EachLoop(threads)
         elif system.engine == "ode":
-            self.loop = OdeBatch(system.fault_kernels, faulty, threads)
+            self.loop = OdeBatch(system.ode_loop.native, system.fault_kernels, faulty, threads)
         else:
             # Late: MuJoCo is slow to import, and the twins do not need it.
             from gne_mj.loops.mujoco_batch import MujocoBatch

@@ -83,7 +83,8 @@ def setup(
         control_period: how long inputs are held, s; the timestep if left out.
         sample_period: s between samples that are kept; likewise 0.05.
         engine: "ode" or "mujoco".
-        integrator: "rk4" or "euler"; "rosenbrock" is a change of ``plant.integrator``.
+        integrator: "rk4", "euler" or, of ODE agents, "tsit5" (adaptive steps); "rosenbrock" is a
+            change of ``plant.integrator``.
         faults: what goes wrong.
         tolerance: on the greatest distance to y*, for the status ``converged``.
         seed: of what is random in faults.

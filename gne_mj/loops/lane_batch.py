@@ -12,7 +12,9 @@ from gne_mj.lanes import WIDTH, empty
 from gne_mj.loops import functions, lanes, lanes_held
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.layout import Setup, Steps
-from gne_mj.loops.ode import CONTINUOUS, SAMPLED, ode_workspace_length, workspaces_of
+from gne_mj.loops.ode import CONTINUOUS, SAMPLED
+from gne_mj.loops.one_loop import Native
+from gne_mj.loops.recorder import next_row
 from gne_mj.native import INTERPRETED, call_integer, compiled, kernel
 from gne_mj.parameter_block import ParameterBlock, floats, floats_at, integers_at
 from gne_mj.plants.functions import RK4
@@ -104,10 +106,10 @@ class Marks(NamedTuple):
     exit: int
 
 
-def marks_of(sizes: Steps) -> Marks:
-    """Of workspaces of these sizes."""
-    length = ode_workspace_length(sizes)
-    loop = workspaces_of(np.arange(float(length)), sizes).loop
+def marks_of(native: Native, sizes: Steps) -> Marks:
+    """Of a loop's workspaces of these sizes."""
+    length = native.length(sizes)
+    loop = native.workspaces(np.arange(float(length)), sizes).loop
     return Marks(length, *map(int, (loop.step, loop.recorder, loop.monitor.exit)))
 
 
@@ -131,7 +133,7 @@ def load(group, marks, lane, run, last):
     for r in range(marks.length):
         room[WIDTH * r + lane] = own[r]
     turn = room[WIDTH * marks.length :]
-    turn[lane], turn[WIDTH + lane] = last, lanes.next_row(int(own[marks.recorder]))
+    turn[lane], turn[WIDTH + lane] = last, next_row(int(own[marks.recorder]))
     block, queue = group.blocks[run], group.queue
     queue[1 + lane] = run
     if queue[1 + WIDTH + lane] == block:
@@ -221,14 +223,15 @@ class LaneLoop:
     Args:
         modules: of kernels.
         sizes: of the runs.
-        alone: address of the loop of one run.
+        native: the loop of one run.
+        alone: its address.
     """
 
-    def __init__(self, modules: Modules, sizes: Steps, alone: int) -> None:
+    def __init__(self, modules: Modules, sizes: Steps, native: Native, alone: int) -> None:
         self._modules = modules
         kind = lanes if sizes.mode == CONTINUOUS else lanes_held
         self._loop, self._alone = int(kind.build(*modules).address), alone
-        self._marks = marks_of(sizes)
+        self._marks = marks_of(native, sizes)
         self._room = self._marks.length + lanes.scratch_length(sizes.actions)
         self._spare: deque[_Place] = deque(maxlen=SPARE)
 

@@ -21,7 +21,7 @@ from gne_mj.loops.feedback import LARGEST_INPUT, Problem
 from gne_mj.loops.lane_monitor import observe
 from gne_mj.loops.layout import H, LoopClock, Parts, place_in_block, steps_in
 from gne_mj.loops.ode import ode_workspace_in, ode_workspace_length, stage_state
-from gne_mj.loops.recorder import HEADER, columns_in_block, head_in
+from gne_mj.loops.recorder import HEADER, columns_in_block, head_in, next_row
 from gne_mj.native import address_in, callback, copy, kernel, source_key
 from gne_mj.numbers import Numbers
 from gne_mj.parameter_block import floats_at, integers_at
@@ -203,15 +203,6 @@ def record(lane, progress, turn, state, memory, u):
     head.done += 1
     due = floats_at(address_in(turn), 2 * WIDTH)[WIDTH:]  # turn.due
     due[lane] = next_row(block)
-
-
-@kernel
-def next_row(block):
-    """The step at whose start the next row of a recorder's block is due; infinite without one."""
-    if block == 0:
-        return np.inf
-    head = head_in(integers_at(block, HEADER), 0)
-    return np.inf if head.done >= head.rows else 1.0 * (head.first + head.done * head.every)
 
 
 @kernel

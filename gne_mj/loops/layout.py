@@ -54,6 +54,7 @@ class Run(NamedTuple):
     channels: Channels
     steps: Annotated[np.ndarray, "n", int]  # those of Steps
     h: Annotated[np.ndarray, "1"]  # length of a step in s
+    rtol: Annotated[np.ndarray, "1"]  # error allowed in a step, integrator tsit5
 
 
 def place_in_block(name: str) -> int:
@@ -61,7 +62,7 @@ def place_in_block(name: str) -> int:
     return PLANT_BLOCK + place(Run, name)
 
 
-STEPS, H = place_in_block("steps"), place_in_block("h")
+STEPS, H, RTOL = place_in_block("steps"), place_in_block("h"), place_in_block("rtol")
 steps_in = in_numbers(Steps, STEPS)  # of a parameter block, by its address
 _problem = in_parameter_block(Problem, place_in_block("problem"))
 _channels = in_parameter_block(Channels, place_in_block("channels"))
@@ -85,6 +86,7 @@ class Setup(NamedTuple):
     history: int = 0  # lengths of scratch arrays that depend on the kind of loop
     solver: int = 0
     separation: int = 0
+    rtol: float = 0.0  # integrator tsit5
 
 
 def parameter_arrays(
@@ -124,7 +126,10 @@ def parameter_arrays(
         np.ascontiguousarray(agents.parameters), np.ascontiguousarray(setup.equilibrium_state),
         compiled_functions(agents.kind), steps.output, steps.position,
     )  # fmt: skip
-    run = Run(problem, channels, np.array(steps, dtype=np.int64), np.array([clock.h]))
+    run = Run(
+        problem, channels, np.array(steps, dtype=np.int64), np.array([clock.h]),
+        np.array([setup.rtol]),
+    )  # fmt: skip
     return [*plant, *arrays(run)]
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import ClosedLoop, Present, Samples
+from gne_mj.loops.base import Present
 from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
     SCRATCH,
@@ -24,16 +24,14 @@ from gne_mj.loops.layout import (
     Setup,
     Steps,
     Workspace,
-    ode_parameter_block,
     parts_in,
     steps_in,
-    steps_of,
 )
-from gne_mj.loops.recorder import Recorder, record
+from gne_mj.loops.one_loop import Native, OneLoop
+from gne_mj.loops.recorder import record
 from gne_mj.native import callback, copy, kernel, source_key
 from gne_mj.parameter_block import floats_at
 from gne_mj.plants import functions as agents_functions
-from gne_mj.plants.agents import Agents
 from gne_mj.plants.functions import EULER, RK4
 from gne_mj.records import by_name, dtype_of, in_array
 
@@ -317,71 +315,22 @@ def build(faults: ModuleType = faultless) -> Any:
     return callback(LOOP, advance)
 
 
-class OdeLoop(ClosedLoop):
-    """The closed loop of ODE agents with a fixed step.
+NATIVE = Native(build, ode_workspace_length, workspaces_of)
 
-    Args:
-        agents: the agents.
-        setup: what the run is made of.
-        state: (m, states) at the start.
-        memory: the law's, at the start.
-        faults: module of kernels, see :func:`control_step`.
-    """
 
-    def __init__(
-        self,
-        agents: Agents,
-        setup: Setup,
-        state: NDArray[np.float64],
-        memory: NDArray[np.float64],
-        faults: ModuleType = faultless,
-    ) -> None:
-        self._advance = build(faults).ctypes
-        self._agents = agents
-        self._parameter_block = ode_parameter_block(setup, agents, len(memory))
-        self._h, self._shape, self._memory = setup.clock.h, state.shape, len(memory)
-        self._faulty = faults.RECORDED
-        sizes = steps_of(self._parameter_block)
-        self._flat = np.zeros(ode_workspace_length(sizes))
-        workspace = workspaces_of(self._flat, sizes)
-        self._progress, self.monitor = workspace.loop, workspace.loop.monitor
-        self._state = workspace.vectors.state
-        self._state[:] = np.concatenate([state.ravel(), memory])
+class OdeLoop(OneLoop):
+    """The closed loop of ODE agents with a fixed step; arguments are the base class's."""
+
+    native = NATIVE
 
     @property
     def time(self) -> float:
         """Time of the present state in s."""
-        return float(self._progress.step * self._h)
+        return self._reached
 
-    def advance(self, samples: int, every: int) -> Samples:
-        """See the base class."""
-        return self._run(samples, every, samples * every)
-
-    def finish(self) -> Samples:
-        """See the base class."""
-        rows = self._run(1, 1, 0)
-        if len(rows.input):
-            return rows
-        state, memory, _ = (row[None] for row in self.present())
-        columns = rows.input, rows.measurement, rows.applied
-        u, measurement, applied = (np.full((1, row.shape[1]), np.nan) for row in columns)
-        return Samples(state, u, memory, measurement, applied, u[:, :0])
-
-    def present(self) -> Present:
-        """See the base class."""
-        now, size = self._state.copy(), len(self._state) - self._memory
-        return Present(now[:size].reshape(self._shape), now[size:], now[:0])
+    def _now(self) -> NDArray[np.float64]:
+        now: NDArray[np.float64] = self._workspace.vectors.state
+        return now
 
     def _adopt(self, setup: Setup) -> None:
-        self._parameter_block = ode_parameter_block(setup, self._agents, self._memory)
-
-    def _run(self, rows: int, every: int, steps: int) -> Samples:
-        recorder = Recorder(
-            1, rows, self._shape, self._memory, self._faulty,
-            first=int(self._progress.step), every=every,
-        )  # fmt: skip
-        if rows > 0:
-            self._progress.recorder = recorder.addresses[0]
-            self._advance(self._parameter_block.address, self._flat.ctypes.data, steps)
-            self._progress.recorder = 0.0
-        return recorder.samples(0)
+        self._take(setup)

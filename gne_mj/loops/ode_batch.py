@@ -9,7 +9,7 @@ import numpy as np
 from gne_mj.loops.batch import BatchLoop, Case, Outcome, Span, begin
 from gne_mj.loops.lane_batch import LaneLoop, Modules
 from gne_mj.loops.layout import Steps
-from gne_mj.loops.ode import build, ode_workspace_length, workspaces_of
+from gne_mj.loops.one_loop import Native
 from gne_mj.native import call_integer, compiled
 from gne_mj.parameter_block import ParameterBlock
 
@@ -26,9 +26,10 @@ def _advance_each(advance, parameter_blocks, workspaces, steps):
 
 
 class OdeBatch(BatchLoop):
-    """Runs of ODE agents with a fixed step.
+    """Runs of ODE agents.
 
     Args:
+        native: what runs one, with fixed or adaptive steps.
         faults: module of kernels, see :func:`gne_mj.loops.ode.build`.
         faulty: whether runs record what was seen and what acted.
         threads: how many.
@@ -36,11 +37,12 @@ class OdeBatch(BatchLoop):
 
     def __init__(
         self,
+        native: Native,
         faults: ModuleType,
         faulty: bool,
         threads: int,
     ) -> None:
-        self._advance = build(faults)
+        self._native, self._advance = native, native.build(faults)
         self._faulty, self._threads = faulty, threads
         self._workers = ThreadPoolExecutor(threads)
         self._loops: dict[Modules, LaneLoop] = {}
@@ -54,7 +56,7 @@ class OdeBatch(BatchLoop):
         starts = np.array([case.state for case in cases]).reshape(len(cases), -1)
         if sizes.memory:
             starts = np.concatenate([starts, [case.memory for case in cases]], axis=1)
-        length, rows = ode_workspace_length(sizes), recorder.addresses
+        length, rows = self._native.length(sizes), recorder.addresses
         in_lanes = None
         self._asked += len(cases) * span.steps
         if self._asked >= LEAST and not self._faulty:
@@ -66,7 +68,7 @@ class OdeBatch(BatchLoop):
         def piece(first: int) -> bool:
             part = slice(first, first + size)
             flat = np.zeros((len(addresses[part]), length))
-            workspaces = workspaces_of(flat, sizes)
+            workspaces = self._native.workspaces(flat, sizes)
             workspaces.loop.recorder = rows[part]
             workspaces.vectors.state = starts[part]
             at = flat.ctypes.data + 8 * length * np.arange(len(flat))
@@ -94,5 +96,7 @@ class OdeBatch(BatchLoop):
         if modules is None:
             return None
         if modules not in self._loops:
-            self._loops[modules] = LaneLoop(modules, sizes, int(self._advance.address))
+            self._loops[modules] = LaneLoop(
+                modules, sizes, self._native, int(self._advance.address)
+            )
         return self._loops[modules]

@@ -68,6 +68,15 @@ def record(block, faults, parts, step, now):
     head.done = row + 1
 
 
+@kernel
+def next_row(block):
+    """The step at whose start the next row of a recorder's block is due; infinite without one."""
+    if block == 0:
+        return np.inf
+    head = head_in(integers_at(block, HEADER), 0)
+    return np.inf if head.done >= head.rows else 1.0 * (head.first + head.done * head.every)
+
+
 class Recorder:
     """Room for rows of several runs.
 

@@ -32,6 +32,7 @@ from gne_mj.passivity.trials import (
 )
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
+from gne_mj.plants.functions import METHODS
 from gne_mj.plants.ode import OdePlant
 from gne_mj.progress import Tell, nothing
 
@@ -48,9 +49,9 @@ MOST_TRIAL, _KEPT = 1_000_000_000, 12
 def plants_of(agents: Agents, engine: str, integrator: str) -> Build:
     """How to build copies of agents on an engine ("ode" or "mujoco"), for :func:`examine`.
 
-    The adaptive "rosenbrock" is for closed loops; plants alone are stepped by "rk4" then.
+    The adaptive integrators are for closed loops; plants alone are stepped by "rk4" then.
     """
-    method = "rk4" if integrator == "rosenbrock" else integrator
+    method = integrator if integrator in METHODS else "rk4"
 
     def build(copies: int, timestep: float) -> Plant:
         if engine == "ode":

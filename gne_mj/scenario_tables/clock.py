@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from gne_mj.system.checks import RTOL
 from gne_mj.toml_table import ACTION, Fills, Table, Unit
 
 
@@ -15,9 +16,16 @@ class SimulationTable(Table):
     control_period: Annotated[float | None, Unit("s")] = Field(
         None, gt=0, description="how long held modes hold inputs; the timestep if left out"
     )
-    integrator: Literal["rk4", "euler"] = Field(
-        "rk4", description="Runge and Kutta's of order four, or MuJoCo's semi-implicit Euler"
+    integrator: Literal["rk4", "euler", "tsit5"] = Field(
+        "rk4",
+        description="Runge and Kutta's of order four, MuJoCo's semi-implicit Euler, or Tsitouras's"
+        " pair with adaptive steps (ODE agents, mode 'continuous')",
     )
+    rtol: float = Field(
+        1e-6, ge=RTOL[0], le=RTOL[1],
+        description="error allowed in a step of integrators 'tsit5' and 'rosenbrock', of each state"
+        " relative to its greatest magnitude so far",
+    )  # fmt: skip
     tolerance: Annotated[float, Unit(ACTION)] = Field(
         1e-3, gt=0, description="on max |y - y*|, for status converged"
     )

@@ -44,7 +44,7 @@ class PlantTable(Table):
     engine: Literal["mujoco", "ode"] | None = Field(
         None, description="'ode' if left out, but 'mujoco' for MJCF robots"
     )
-    integrator: Literal["rk4", "euler", "rosenbrock"] | None = Field(
+    integrator: Literal["rk4", "euler", "tsit5", "rosenbrock"] | None = Field(
         None, description="in place of the simulation's; 'rosenbrock' for the distributed law"
     )
 
@@ -205,6 +205,7 @@ class SystemTable(Table):
             decentralised=self.controller.decentralised,
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
+            rtol=simulation.rtol,
         )
         acts = mode_of(system).explicit_period(period, simulation.timestep)
         if schedule is None or self.barrier.floor is not None or acts is None:

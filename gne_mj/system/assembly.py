@@ -13,12 +13,14 @@ from gne_mj.controllers.settings import GUARDED, LINKS
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.loops import functions
+from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
 from gne_mj.loops.link import link, penalty, positions, separation
 from gne_mj.loops.ode import OdeLoop
+from gne_mj.loops.one_loop import OneLoop
 from gne_mj.loops.separation import neighbours_length
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
@@ -28,6 +30,9 @@ from gne_mj.system.modes import mode_of
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
+
+
+_METHODS = {**METHODS, "tsit5": TSIT5}
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +85,15 @@ class Assembly(SystemData):
 
             return RosenbrockLoop(
                 self.agents, setup, self.law.graph, self.state, self.memory,
+                rtol=self.rtol, atol=1e-3 * self.rtol,
                 affine=self.game.constraint_class == "affine",
             )  # fmt: skip
-        return OdeLoop(self.agents, setup, self.state, memory, self.fault_kernels)
+        return self.ode_loop(self.agents, setup, self.state, memory, self.fault_kernels)
+
+    @property
+    def ode_loop(self) -> type[OneLoop]:
+        """What runs on engine "ode", but for integrator "rosenbrock"."""
+        return AdaptiveLoop if self.integrator == "tsit5" else OdeLoop
 
     @property
     def _others(self) -> dict[int, Any]:
@@ -151,9 +162,10 @@ class Assembly(SystemData):
                 clock.timestep,
                 clock.steps(clock.control_period),
                 mode.native,
-                METHODS.get(self.integrator, -1),  # the Rosenbrock loop has no use for it
+                _METHODS.get(self.integrator, -1),  # the Rosenbrock loop has no use for it
             ),
             *self._sizes,
+            rtol=self.rtol,
         )
 
     @property

@@ -14,11 +14,12 @@ from gne_mj.game_model import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.native import INTERPRETED
 from gne_mj.plants.agent_type import has_ode, in_mujoco
-from gne_mj.system.data import SystemData
+from gne_mj.system.data import ADAPTIVE, SystemData
 from gne_mj.system.modes import mode_of
 
 # The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
 ROSENBROCK_AGENTS = 200
+RTOL = 1e-12, 1e-2  # errors in a step that adaptive integrators can be asked for
 # How many copies of all estimates a loop makes: stages of the integrator, and some for itself
 ESTIMATES = 8
 
@@ -174,6 +175,10 @@ def check_engine(system: SystemData) -> None:
             f"it keeps N x N x N numbers and is for up to {ROSENBROCK_AGENTS} agents, not"
             f" {system.game.agents}; use mode 'sampled'",
         )
+    if system.integrator in ADAPTIVE and not RTOL[0] <= system.rtol <= RTOL[1]:
+        raise InvalidInput("rtol", system.rtol, f"it must lie from {RTOL[0]:g} to {RTOL[1]:g}")
+    if system.integrator == "tsit5":
+        check_adaptive(system)
     if system.integrator == "rosenbrock" and (
         not system.law.rosenbrock or mode_of(system).held or system.engine != "ode"
     ):
@@ -185,11 +190,31 @@ def check_engine(system: SystemData) -> None:
         )
 
 
+def check_adaptive(system: SystemData) -> None:
+    """Refuse what integrator "tsit5" does not run."""
+    key = "integrator"
+    if system.engine != "ode":
+        raise InvalidInput(
+            key, system.integrator, "MuJoCo steps by itself: it is for engine 'ode'; use 'rk4'"
+        )
+    if mode_of(system).held:
+        raise InvalidInput(
+            key,
+            system.integrator,
+            f"it is for mode 'continuous': in mode '{system.mode}' inputs are held for whole"
+            " timesteps; use 'rk4' or 'euler'",
+        )
+    if system.separation is not None:
+        raise InvalidInput(
+            key, system.integrator, "agents that keep apart need a fixed timestep; use 'rk4'"
+        )
+
+
 def check_faults(system: SystemData) -> None:
     """Refuse faults that the integrator, mode or agents do not know."""
     key = "faults"
-    if system.faults and system.integrator == "rosenbrock":
-        raise InvalidInput(key, "given", "integrator 'rosenbrock' knows none; use 'rk4'")
+    if system.faults and system.integrator in ADAPTIVE:
+        raise InvalidInput(key, "given", f"integrator '{system.integrator}' knows none; use 'rk4'")
     for number, fault in enumerate(system.faults):
         where = f"{key}.{number}"
         if fault.needs_graph and system.law.graph is None:

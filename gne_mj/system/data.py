@@ -20,6 +20,8 @@ from gne_mj.plants.agent_type import followed_position
 from gne_mj.plants.agents import Agents
 from gne_mj.separation import Separation
 
+ADAPTIVE = ("tsit5", "rosenbrock")  # integrators that choose their steps
+
 
 @dataclass(frozen=True, eq=False)
 class SystemData:
@@ -41,6 +43,7 @@ class SystemData:
     seed: int = 0
     disturbance: Disturbance | None = None
     separation: Separation | None = None
+    rtol: float = 1e-6
     barrier: LogBarrier = field(init=False)
 
     @property

@@ -25,8 +25,9 @@ class System(Assembly):
             distributed law all profiles at which agents evaluate the barrier must be inside.
         mode: "continuous", "sampled" or "implicit".
         engine: "ode", or "mujoco" for flexible robots.
-        integrator: "rk4" or "euler"; for engine "ode" and the fully distributed law in mode
-            continuous also "rosenbrock", which is adaptive and does not mind a small epsilon.
+        integrator: "rk4" or "euler"; for engine "ode" in mode continuous also "tsit5", which
+            chooses its steps by their error, and for the fully distributed law there
+            "rosenbrock", which does so too and does not mind a small epsilon.
         schedule: how the penalty falls to rho in time; None if it does not change.
         decentralised: mode implicit: each agent finds its input alone and keeps to its share of
             what is left of every bound (:mod:`gne_mj.loops.local`).
@@ -34,6 +35,8 @@ class System(Assembly):
         seed: of what is random in the faults.
         disturbance: what the game's tightening is meant to cover; None if nothing is declared.
         separation: how far apart agents in the plane keep; None if nothing keeps them apart.
+        rtol: error allowed in a step that "tsit5" or "rosenbrock" chooses, of each state
+            relative to its greatest magnitude so far.
 
     Raises:
         InvalidInput: parts that do not fit together.

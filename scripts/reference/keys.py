@@ -123,9 +123,13 @@ def _default(field: FieldInfo) -> str:
     return f"`{json.dumps(value)}`"
 
 
+def _shown(limit: float) -> str:
+    return f"{limit:g}" if isinstance(limit, float) else str(limit)
+
+
 def _range(field: FieldInfo) -> str:
     words = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-    found = [f"{sign} {getattr(each, name):.17g}" for each in field.metadata
+    found = [f"{sign} {_shown(getattr(each, name))}" for each in field.metadata
              for name, sign in words.items() if hasattr(each, name)]  # fmt: skip
     least = [f"at least {each.min_length}" for each in field.metadata
              if hasattr(each, "min_length")]  # fmt: skip

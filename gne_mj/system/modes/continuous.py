@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.loops.ode import CONTINUOUS
-from gne_mj.system.data import SystemData
+from gne_mj.system.data import ADAPTIVE, SystemData
 from gne_mj.system.modes.mode import Array, Figure, Mode, entry
 
 
@@ -48,7 +48,7 @@ class Continuous(Mode):
 
     def divides(self, system: SystemData) -> bool:
         """With fixed steps."""
-        return system.integrator != "rosenbrock"
+        return system.integrator not in ADAPTIVE
 
     def reports(self, system: SystemData) -> bool:
         """With fixed steps."""
