@@ -168,12 +168,17 @@ class Law(ABC):
         """
         return np.zeros((0, len(game_actions)))
 
-    def propagator(self, period: float) -> Propagator:
-        """What ``propagate`` needs for a control period in s."""
+    def propagator(self, period: float, lists: GraphData | None = None) -> Propagator:
+        """What ``propagate`` needs for a control period in s.
+
+        Args:
+            period: in s.
+            lists: who hears whom meanwhile; by the law's graph if left out.
+        """
         if self.graph is None:
             return no_propagator()
         with named(duration="period"):
-            return propagator(self.graph, self.estimate_rate * period)
+            return propagator(lists or self.graph_data, self.estimate_rate * period)
 
 
 def check_positive(law: Law, *keys: str) -> None:

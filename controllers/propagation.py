@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gne_mj.errors import InvalidInput
-from gne_mj.graph import Graph
+from gne_mj.graph import GraphData, laplacian_of
 from gne_mj.native import kernel
 
 # Columns of estimates that move together: rows long enough for vector instructions, and blocks
@@ -44,18 +44,23 @@ def no_propagator() -> Propagator:
     return Propagator(np.zeros((0, 0, 0)), np.zeros(0), np.zeros(3))
 
 
-def propagator(graph: Graph, duration: float) -> Propagator:
-    """The exact maps over s = ``duration`` (rate times period), in the cheaper form."""
-    agents = graph.agents
-    degrees = np.diff(graph.data.pointer)
-    pairs = np.array(graph.edges, dtype=np.int64).reshape(-1, 2)
+def propagator(lists: GraphData, duration: float) -> Propagator:
+    """The exact maps over s = ``duration`` (rate times period), in the cheaper form.
+
+    Args:
+        lists: who hears whom, undirected.
+        duration: in time constants of the estimates.
+    """
+    degrees = np.diff(lists.pointer)
+    agents = len(degrees)
     # Anderson and Morley's bound; L_j is a principal submatrix, so it holds for all j.
-    bound = float(np.max(degrees[pairs].sum(axis=1), initial=1))
+    both = np.repeat(degrees, degrees) + degrees[lists.neighbour]
+    bound = float(np.max(both, initial=1))
     numbers = np.array([bound, duration, np.exp(-duration)])
     half = 0.5 * bound * duration
     few = agents <= 64  # so that their maps stay small
     if few and half > 100.0:
-        return Propagator(_dense(graph, duration), np.zeros(0), numbers)
+        return Propagator(_dense(lists, duration), np.zeros(0), numbers)
     if half > _LONGEST:
         raise InvalidInput(
             "duration",
@@ -63,8 +68,8 @@ def propagator(graph: Graph, duration: float) -> Propagator:
             f"{agents} agents on this graph allow at most {2.0 * _LONGEST / bound:.3g}",
         )
     coefficients = _series(half)
-    if few and agents * agents <= len(coefficients) * (agents + 2 * len(pairs)):
-        return Propagator(_dense(graph, duration), np.zeros(0), numbers)
+    if few and agents * agents <= len(coefficients) * (agents + len(lists.neighbour)):
+        return Propagator(_dense(lists, duration), np.zeros(0), numbers)
     return Propagator(np.zeros((0, 0, 0)), coefficients, numbers)
 
 
@@ -80,10 +85,10 @@ def _series(half: float) -> np.ndarray:
     return (size * (-1.0) ** terms)[:keep]
 
 
-def _dense(graph: Graph, duration: float) -> np.ndarray:
-    agents = graph.agents
+def _dense(lists: GraphData, duration: float) -> np.ndarray:
+    laplacian = laplacian_of(lists)
+    agents = len(laplacian)
     maps = np.zeros((agents, agents, agents))
-    laplacian = graph.laplacian
     for j in range(agents):
         others = np.delete(np.arange(agents), j)
         values, vectors = np.linalg.eigh(laplacian[np.ix_(others, others)])

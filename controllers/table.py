@@ -5,11 +5,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gne_mj import graph as graphs
+from gne_mj.changing_graph import disc, switching
 from gne_mj.controllers.law import Law
 from gne_mj.game_model import Game
+from gne_mj.graph import NAMED, Graph
 from gne_mj.registry import MODES
-from gne_mj.toml_table import Fills, Table
+from gne_mj.toml_table import Fills, Table, Unit
 
 
 class LawTable(Table):
@@ -28,16 +29,63 @@ class LawTable(Table):
         """The law."""
 
 
+GraphKey = Literal["line", "ring", "star", "complete", "printed", "caption"] | list[tuple[int, int]]
+
+
+class SwitchingTable(Table):
+    """One graph after the other, over and over."""
+
+    type: Literal["switching"]
+    graphs: list[GraphKey] = Field(description="each a name or edges, and connected")
+    every: Annotated[float | list[float], Unit("s", "positive, whole steps or control periods")] = (
+        Field(description="how long each of them is there: one number, or one each")
+    )
+    order: Literal["given", "random"] = Field(
+        "given", description="'random': the next one is drawn by simulation.seed"
+    )
+
+    def build(self, count: int) -> Graph:
+        """The graph."""
+        return switching(
+            [_fixed(each, count) for each in self.graphs],
+            self.every,
+            random=self.order == "random",
+        )
+
+
+class DiscTable(Table):
+    """Agents hear those within a radius."""
+
+    type: Literal["disc"]
+    radius: Annotated[float, Unit("m")] = Field(gt=0, description="how far agents hear each other")
+    interval: Annotated[float, Unit("s")] = Field(
+        0.1, gt=0, description="how often distances are looked at"
+    )
+
+    def build(self, count: int) -> Graph:
+        """The graph."""
+        return disc(count, self.radius, self.interval)
+
+
 class NetworkTable(LawTable):
     """A law over a communication graph."""
 
     graph: Annotated[
-        Literal["line", "ring", "star", "complete", "printed", "caption"] | list[tuple[int, int]],
+        GraphKey | Annotated[SwitchingTable | DiscTable, Field(discriminator="type")],
         Fills("edges"),
-    ] = Field("ring", description="a name, or edges as pairs of agents numbered from 1")
+        Fills(""),
+    ] = Field(
+        "ring", description="a name, edges as pairs of agents numbered from 1, or one that changes"
+    )
 
-    def network(self, count: int) -> graphs.Graph:
+    def network(self, count: int) -> Graph:
         """The communication graph."""
-        if isinstance(self.graph, str):
-            return graphs.NAMED[self.graph](count)
-        return graphs.Graph(count, tuple((i - 1, j - 1) for i, j in self.graph))
+        if isinstance(self.graph, Table):
+            return self.graph.build(count)
+        return _fixed(self.graph, count)
+
+
+def _fixed(given: GraphKey, count: int) -> Graph:
+    if isinstance(given, str):
+        return NAMED[given](count)
+    return Graph(count, tuple((i - 1, j - 1) for i, j in given))

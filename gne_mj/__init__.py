@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gne_mj.barrier import LogBarrier
     from gne_mj.batches import open_batch
     from gne_mj.batches import run_batch as batch
+    from gne_mj.changing_graph import disc, switching
     from gne_mj.environment import load_environment
     from gne_mj.expressions import band, fixed, game, private
     from gne_mj.game_model import Game
@@ -80,6 +81,7 @@ __all__ = [
     "compare",
     "complete",
     "custom_agents",
+    "disc",
     "estimate_corruption",
     "fixed",
     "flexible_robots",
@@ -111,6 +113,7 @@ __all__ = [
     "silence",
     "solve",
     "star",
+    "switching",
     "view",
 ]
 
@@ -128,6 +131,7 @@ _PLACES = {
     "band": "gne_mj.expressions",
     "batch": "gne_mj.batches",
     "complete": "gne_mj.graph",
+    "disc": "gne_mj.changing_graph",
     "fixed": "gne_mj.expressions",
     "game": "gne_mj.expressions",
     "line": "gne_mj.graph",
@@ -137,6 +141,7 @@ _PLACES = {
     "private": "gne_mj.expressions",
     "ring": "gne_mj.graph",
     "star": "gne_mj.graph",
+    "switching": "gne_mj.changing_graph",
 }
 
 _NAMES = {"batch": "run_batch"}  # what is called otherwise in its module

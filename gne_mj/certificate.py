@@ -51,6 +51,8 @@ class Certificate:
         separation: of agents that keep apart: the least distance of two positions (None if no two
             came within reach), and the pairs that hold a run which rests away from the
             equilibrium; None of others.
+        network: of a graph that changes: how often it did (``changes``), and for how long it was
+            not connected (``disconnected``, s); None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
@@ -71,6 +73,7 @@ class Certificate:
     positions: dict[str, Any] | None
     contacts: dict[str, Any] | None
     separation: dict[str, Any] | None
+    network: dict[str, Any] | None
     exit: dict[str, Any] | None
     of_modes: dict[str, Any]
     steps: int
@@ -102,6 +105,7 @@ def certify_run(
     wall_time: float,
     interrupted: bool = False,
     intervened: bool = False,
+    network: dict[str, Any] | None = None,
 ) -> Certificate:
     """Put together what a run of ``system`` showed.
 
@@ -118,8 +122,7 @@ def certify_run(
         intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
     """
     known = system.known_equilibrium
-    middle = np.nan if known is None else known.action
-    distance = np.max(np.abs(action - middle), axis=1)
+    distance = np.max(np.abs(action - (np.nan if known is None else known.action)), axis=1)
     (settled,) = run_metrics.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     holding = kept_apart.holding(system, time, action, (status, duration, tolerance))
@@ -143,6 +146,7 @@ def certify_run(
         positions=_positions(system, monitor),
         contacts=_contacts(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
+        network=network,
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),

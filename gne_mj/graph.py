@@ -51,7 +51,8 @@ class Graph:
                 raise InvalidInput("edges", [i + 1, j + 1], "an edge joins two agents")
             unique.add((min(i, j), max(i, j)))
         object.__setattr__(self, "edges", tuple(sorted(unique)))
-        part = parts(self.data.neighbour, self._hearer, self.agents)
+        first, second = np.array(self.edges, dtype=np.int64).reshape(-1, 2).T
+        part = parts(first, second, self.agents)
         if np.any(part > 0):
             apart = [int(i) + 1 for i in np.flatnonzero(part > 0)]
             shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
@@ -69,8 +70,7 @@ class Graph:
     @cached_property
     def laplacian(self) -> np.ndarray:
         """L = D - A, shape (N, N), dense and read-only."""
-        matrix = np.diag(np.diff(self.data.pointer).astype(np.float64))
-        matrix[self._hearer, self.data.neighbour] = -1.0
+        matrix = laplacian_of(self.data)
         matrix.flags.writeable = False
         return matrix
 
@@ -123,9 +123,33 @@ class Graph:
         return GraphData(np.concatenate([[0], np.cumsum(degrees)]), heard[order])
 
     @property
+    def members(self) -> "tuple[Graph, ...] | None":
+        """The graphs that it can be, or of which it always has one's edges: itself.
+
+        None where they are too many to be looked at.
+        """
+        return (self,)
+
+    @property
     def _hearer(self) -> NDArray[np.int64]:
         """Who hears each of the neighbours of `data`."""
-        return np.repeat(np.arange(self.agents), np.diff(self.data.pointer))
+        return _hearer_of(self.data)
+
+
+def _hearer_of(lists: GraphData) -> NDArray[np.int64]:
+    return np.repeat(np.arange(len(lists.pointer) - 1), np.diff(lists.pointer))
+
+
+def laplacian_of(lists: GraphData) -> NDArray[np.float64]:
+    """L = D - A of neighbour lists, shape (N, N), dense."""
+    matrix = np.diag(np.diff(lists.pointer).astype(np.float64))
+    matrix[_hearer_of(lists), lists.neighbour] = -1.0
+    return matrix
+
+
+def connected(lists: GraphData) -> bool:
+    """Whether everyone can be reached over these neighbour lists."""
+    return bool(np.all(parts(_hearer_of(lists), lists.neighbour, len(lists.pointer) - 1) == 0))
 
 
 def parts(first: ArrayLike, second: ArrayLike, count: int) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gne_mj.bounds import MOST_RECORDED, check_room
 from gne_mj.certificate import Certificate, certify_run
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Present, Samples
@@ -373,6 +374,15 @@ class SystemRun:
 
     def change(self, system: System) -> None:
         """See :meth:`Simulation.change`."""
+        graphs = [each.law.graph for each in (self.system, system)]
+        if any(isinstance(graph, ChangingGraph) for graph in graphs) and graphs[0] is not graphs[1]:
+            tables = [getattr(graph, "table", None) for graph in graphs]
+            if tables[0] != tables[1]:
+                raise InvalidInput(
+                    "law.graph",
+                    "another one",
+                    "one that changes stays what it is while a run goes on",
+                )
         self.loop.adopt(system.setup(self.clock))
         self.loop.kept_alive = system
         self.system = system
@@ -419,6 +429,7 @@ class SystemRun:
             wall_time=self.wall_time,
             interrupted=interrupted,
             intervened=intervened,
+            network=self.loop.network,
         )
         return parts, certificate
 

@@ -27,6 +27,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         rows["contacts"] = _contacts(report["contacts"])
     if report["separation"] is not None:
         rows["separation"] = _separation(report["separation"])
+    if report["network"] is not None:
+        rows["network"] = _network(report["network"])
     if gap is not None:
         size = f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}".rstrip()
         rows["widest gap"] = f"{size}, {gap['name']} at {gap['time']:.4g} s"
@@ -58,6 +60,14 @@ def _least_margin(worst: dict[str, Any] | None) -> str:
     if worst is None:
         return "nothing was observed"
     return f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s"
+
+
+def _network(seen: dict[str, Any]) -> str:
+    changes = seen["changes"]
+    text = f"became another one {changes} time{'s' * (changes != 1)}"
+    if seen["disconnected"] > 0.0:
+        return f"{text}; not connected for {seen['disconnected']:.6g} s, of which nothing is proven"
+    return f"{text}, connected throughout"
 
 
 def _separation(seen: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
@@ -165,6 +166,10 @@ def coordinates_of(system: SystemData, time: NDArray[np.float64]) -> dict[str, A
         "constraint_name": ("constraint", np.array(game.constraint_names)),
         "component": ("component", np.array([name for name, _ in system.agents.kind.STATES])),
     }
+    if _network_changes(system):
+        assert system.law.graph is not None
+        pairs = [f"{i + 1}-{j + 1}" for i, j in system.law.graph.edges]
+        coordinates["edge"] = ("edge", np.array(pairs))
     if axis_of(system) == "action":
         coordinates["owner"] = ("action", game.agent_of_action + 1)
         coordinates["axis"] = ("action", np.array(game.axis_of_action))
@@ -337,6 +342,17 @@ def _nearest_distance(rows: Rows) -> Array:
     return nearest_distances(rows.samples.state[:, :, followed_position(rows.system.agents.kind)])
 
 
+def _network_changes(system: SystemData) -> bool:
+    return isinstance(system.law.graph, ChangingGraph)
+
+
+def _linked(rows: Rows) -> Array:
+    system = rows.system
+    assert isinstance(system.law.graph, ChangingGraph)
+    places = system.places(rows.samples.state)
+    return system.law.graph.edges_at(rows.time, places, system.seed)
+
+
 def _least_distances(system: SystemData) -> dict[str, Array]:
     assert system.separation is not None
     return {"nearest_distance_lower_bound": np.full(system.game.agents, system.separation.distance)}
@@ -392,6 +408,10 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         figure=True, page="line",
     ),
     _memory,
+    Variable(
+        "linked", ("time", "edge"), _linked, there=_network_changes,
+        long_name="whether the two agents hear each other", page="behind", batch=False,
+    ),
     Variable(
         "measurement", ("time", AXIS), lambda rows: rows.samples.measurement, there=_is_faulty,
         unit=_action_unit, long_name="outputs as the law read them for the input of that time",

@@ -53,7 +53,7 @@ def data_of(sizes):
 
 def series(graph, duration):
     """The series whatever the graph's size."""
-    found = propagator(graph, duration)
+    found = propagator(graph.data, duration)
     if len(found.coefficients):
         return found
     terms = propagation._series(0.5 * found.numbers[0] * duration)
@@ -63,7 +63,7 @@ def series(graph, duration):
 def dense(graph, duration):
     """The maps whatever the graph's size."""
     numbers = np.array([np.nan, duration, np.exp(-duration)])
-    return Propagator(propagation._dense(graph, duration), np.zeros(0), numbers)
+    return Propagator(propagation._dense(graph.data, duration), np.zeros(0), numbers)
 
 
 def moved(graph, sizes, found, y, rows):
@@ -136,7 +136,7 @@ def test_a_large_ring_against_expm_multiply():
     rng = np.random.default_rng(0)
     graph = graphs.ring(count)
     owner, y, rows = draw(rng, graph, np.ones(count, dtype=int))
-    end = moved(graph, np.ones(count, dtype=int), propagator(graph, duration), y, rows)
+    end = moved(graph, np.ones(count, dtype=int), propagator(graph.data, duration), y, rows)
     for r in (0, 499, 999):
         others = np.arange(count) != owner[r]
         start = rows[others, r] - y[r]
@@ -169,14 +169,14 @@ def test_estimates_that_agree_stay_and_long_periods_end_at_the_actions(form):
 
 
 def test_the_cheaper_form_is_taken_and_many_agents_need_no_cubes():
-    few = propagator(graphs.complete(10), 5.0)
+    few = propagator(graphs.complete(10).data, 5.0)
     assert few.maps.shape == (10, 10, 10)
     assert len(few.coefficients) == 0
-    short = propagator(graphs.ring(30), 1e-3)
+    short = propagator(graphs.ring(30).data, 1e-3)
     assert short.maps.size == 0
     for count in (300, 3000):
         for duration in (1e-3, 1.0, 100.0):
-            found = propagator(graphs.ring(count), duration)
+            found = propagator(graphs.ring(count).data, duration)
             assert found.maps.size == 0
             assert len(found.coefficients) <= 40 + 12 * (2.0 * duration) ** 0.5
         assert scratch_length(count) == 4 * BLOCK * count
@@ -184,4 +184,4 @@ def test_the_cheaper_form_is_taken_and_many_agents_need_no_cubes():
 
 @pytest.mark.parametrize("graph", [graphs.ring(40), graphs.complete(12), graphs.printed()])
 def test_the_bound_holds_for_the_spectrum(graph):
-    assert graph.largest_eigenvalue <= propagator(graph, 1.0).numbers[0] + 1e-12
+    assert graph.largest_eigenvalue <= propagator(graph.data, 1.0).numbers[0] + 1e-12

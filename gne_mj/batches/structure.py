@@ -7,6 +7,7 @@ else may differ, and is in a run's table.
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.loops.batch import BatchLoop, EachLoop
 from gne_mj.loops.lane_batch import modules_for
 from gne_mj.loops.layout import Setup, ode_parameter_block
@@ -33,7 +34,7 @@ class Structure:
 
     def __init__(self, system: System, clock: Clock, threads: int) -> None:
         self._plant: FleetPlant | None = None
-        self._native = system.integrator != "rosenbrock"
+        self._native = system.integrator != "rosenbrock" and not _network_changes(system)
         self.loop: BatchLoop
         faulty = bool(system.faults)
         if not self._native:
@@ -67,13 +68,17 @@ class Structure:
         return mujoco_parameter_block(self._plant, setup, system.agents, memory)
 
 
+def _network_changes(system: System) -> bool:
+    return isinstance(system.law.graph, ChangingGraph)
+
+
 def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:
     """The same for systems of one structure, and for no others."""
     agents, game = system.agents, system.game
     return (
         system.engine, system.integrator, clock.timestep, agents.kind, agents.dimension,
         (agents.robots, agents.together) if isinstance(agents, MjcfRobots) else None,
-        system.equation, system.fault_kernels,
+        system.equation, system.fault_kernels, _network_changes(system),
         game.actions, game.constraints_count, game.agents, agents.states,
         len(system.loop_memory), setup.clock.mode, setup.history, setup.solver,
     )  # fmt: skip

@@ -66,11 +66,14 @@ class ClosedLoop(ABC):
 
     Attributes:
         monitor: what :mod:`gne_mj.loops.monitor` measures, by name.
+        network: of a graph that changes: how often it did, and for how many s it was not connected;
+            None of others.
         kept_alive: what must live as long as the loop, as plain functions that it knows by address.
     """
 
     monitor: Any
     kept_alive: object = None
+    network: dict[str, Any] | None = None
 
     @abstractmethod
     def advance(self, samples: int, every: int) -> Samples:

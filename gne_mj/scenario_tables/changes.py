@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from gne_mj.bounds import MOST_SYSTEMS, check_count, check_nesting
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import Law
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.expressions.build import ExpressionGame
@@ -20,6 +21,7 @@ from gne_mj.scenario_tables.system import SystemTable
 from gne_mj.system import System
 from gne_mj.toml_table import Table, union_tags
 
+_TABLES = "tagged-union"  # pydantic's name of tables that a key chooses among
 _STAYS = "it stays as it is while a simulation goes on; games, barriers and controllers may change"
 
 
@@ -120,6 +122,8 @@ def plain(value: Any) -> Any:
         return plain(_game_table(value))
     if isinstance(value, Law):
         return {"information": "python", "object": keep(value, type(value).__name__)}
+    if isinstance(value, ChangingGraph):
+        return plain(value.table)
     if isinstance(value, Graph):
         return [[i + 1, j + 1] for i, j in value.edges]  # a name would fit any number of agents
     if isinstance(value, Mapping):
@@ -177,7 +181,10 @@ def complaint(error: ValidationError) -> InvalidInput:
         # of "one number, a list of them or a list of lists" the user meant what goes deepest
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
         detail = max(same[1:], key=lambda d: len(d["loc"]))
-    tags = union_tags() | {"float", "str", "list", "literal"}
+    if isinstance(detail["input"], Mapping):  # so it is the tables among the choices that count
+        deeper = [d for d in details if any(str(p).startswith(_TABLES) for p in d["loc"])]
+        detail = deeper[0] if deeper else detail
+    tags = union_tags() | {"float", "str", "list", "literal", _TABLES}
     where = [
         str(part)
         for depth, part in enumerate(detail["loc"])

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.controllers.propagation import no_propagator
+from gne_mj.changing_graph import ChangingGraph
+from gne_mj.controllers.propagation import Propagator, no_propagator
 from gne_mj.controllers.settings import GUARDED, LINKS
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
+from gne_mj.graph import GraphData
 from gne_mj.loops import functions
 from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
 from gne_mj.loops.base import ClosedLoop
+from gne_mj.loops.changing_network import ChangingNetworkLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
@@ -62,12 +65,26 @@ class Assembly(SystemData):
             InvalidInput: a step that the estimates' dynamics do not allow, or a control period
                 over which an agent's output does not rise with its input, mode implicit.
         """
-        loop = self._closed_loop(clock, plant)
+        setup = self.setup(clock)
+        loop = self._closed_loop(setup, clock, plant)
+        if isinstance(self.law.graph, ChangingGraph):
+            loop.kept_alive = self
+            loop = self._over_changing_network(loop, setup, clock)
         loop.kept_alive = self
         return loop
 
-    def _closed_loop(self, clock: Clock, plant: "FleetPlant | None") -> ClosedLoop:
-        setup = self.setup(clock)
+    def _over_changing_network(self, loop: ClosedLoop, setup: Setup, clock: Clock) -> ClosedLoop:
+        law, held = self.law, mode_of(self).held
+        assert isinstance(law.graph, ChangingGraph)
+
+        def propagator(lists: GraphData) -> Propagator:
+            return law.propagator(clock.control_period, lists)
+
+        return ChangingNetworkLoop(
+            loop, setup, law.graph, self.places, propagator if held else None, self.seed
+        )
+
+    def _closed_loop(self, setup: Setup, clock: Clock, plant: "FleetPlant | None") -> ClosedLoop:
         memory = self.loop_memory
         if self.engine == "mujoco":
             # Late: MuJoCo is slow to import, and the twins do not need it.
@@ -135,6 +152,7 @@ class Assembly(SystemData):
                 fit the game.
         """
         steps.check_step(self, clock)
+        steps.check_network(self, clock)
         mode = mode_of(self)
         mode.check_period(self, clock)
         settings = self.law_settings(self.rho)
@@ -142,7 +160,7 @@ class Assembly(SystemData):
             propagator = self.law.propagator(clock.control_period) if mode.held else no_propagator()
         problem = Problem(
             data=self.game.data,
-            graph=self.law.graph_data,
+            graph=self.graph_at_start,
             settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.centre,

@@ -7,6 +7,7 @@ what would be right.
 import numpy as np
 
 from gne_mj.bounds import check_room
+from gne_mj.changing_graph import ChangingGraph, DiscGraph
 from gne_mj.controllers import Law
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import for_native, message_delay, sensor_delay, strikes_messages
@@ -207,6 +208,25 @@ def check_adaptive(system: SystemData) -> None:
     if system.separation is not None:
         raise InvalidInput(
             key, system.integrator, "agents that keep apart need a fixed timestep; use 'rk4'"
+        )
+
+
+def check_network(system: SystemData) -> None:
+    """Refuse a graph that changes where what it changes is not known."""
+    graph, key = system.law.graph, "law.graph"
+    if not isinstance(graph, ChangingGraph):
+        return
+    if system.integrator in ("rosenbrock", "tsit5"):
+        raise InvalidInput(
+            "integrator",
+            system.integrator,
+            "its steps do not end where the graph changes; use 'rk4' or 'euler'",
+        )
+    if strikes_messages(system.faults):
+        raise InvalidInput(key, "one that changes", "faults of messages are of a graph that stays")
+    if isinstance(graph, DiscGraph) and system.places(system.state) is None:
+        raise InvalidInput(
+            key, "'disc'", f"{system.agents.kind.NAME}s have no places from which distances follow"
         )
 
 

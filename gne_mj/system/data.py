@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.barrier import LogBarrier, Schedule
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import Law
 from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
 from gne_mj.game_model import Game
+from gne_mj.graph import GraphData
 from gne_mj.loops import faultless, faultless_apart
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
-from gne_mj.plants.agent_type import followed_position
+from gne_mj.plants.agent_type import followed_position, placed_state
 from gne_mj.plants.agents import Agents
 from gne_mj.separation import Separation
 
@@ -56,6 +58,22 @@ class SystemData:
         """q(0), shape (m,), of agents whose positions follow their outputs; None of others."""
         at = followed_position(self.agents.kind)
         return None if at < 0 else self.state[:, at]
+
+    def places(self, state: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Where agents are, (..., N, d) in m, in states (..., m, states); None without places."""
+        placed = placed_state(self.agents.kind)
+        if placed is None:
+            return None
+        at = [name for name, _ in self.agents.kind.STATES].index(placed)
+        return state[..., at].reshape(*state.shape[:-2], self.game.agents, -1)
+
+    @property
+    def graph_at_start(self) -> GraphData:
+        """Who hears whom at the start; nobody hears anybody without a graph."""
+        graph = self.law.graph
+        if isinstance(graph, ChangingGraph):
+            return graph.lists_at(0.0, self.places(self.state), self.seed)
+        return self.law.graph_data
 
     @property
     def equilibrium(self) -> Equilibrium:

@@ -48,7 +48,7 @@ def problem_at_start(system: System) -> Problem:
     rho = system.rho if system.schedule is None else system.schedule.start
     return Problem(
         data=system.game.data,
-        graph=system.law.graph_data,
+        graph=system.graph_at_start,
         settings=system.law_settings(rho),
         limit=system.agents.input_limit,
         equilibrium=np.ascontiguousarray(system.start),  # nothing is measured from it here

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput
 from gne_mj.system.clock import Clock
 from gne_mj.system.data import SystemData
@@ -44,6 +45,24 @@ def check_step(system: SystemData, clock: Clock) -> None:
             f" {STABLE[system.integrator] / largest:.4g} /s, which '{system.integrator}' can follow"
             f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
         )
+
+
+def check_network(system: SystemData, clock: Clock) -> None:
+    """Refuse a graph that changes between steps, or between control instants."""
+    graph = system.law.graph
+    if not isinstance(graph, ChangingGraph):
+        return
+    held = mode_of(system).held
+    unit = clock.control_period if held else clock.timestep
+    for time in graph.times:
+        count = time / unit
+        if round(count) < 1 or abs(count - round(count)) > 1e-6:
+            what = "control period" if held else "timestep"
+            raise InvalidInput(
+                "law.graph",
+                f"{time:g} s",
+                f"it must change after a multiple of the {what} {unit:g} s",
+            )
 
 
 def _rounded_down(value: float) -> float:

@@ -69,4 +69,5 @@ class System(Assembly):
         checks.check_memory(self)
         checks.check_engine(self)
         checks.check_faults(self)
+        checks.check_network(self)
         check_separation(self)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gne_mj.changing_graph import DiscGraph, SwitchingGraph
 from gne_mj.margins import is_affine
 from gne_mj.plants.agent_type import by_type, energy_balance, is_passive, why_not_passive
 from gne_mj.system import System
@@ -97,9 +98,16 @@ def plants(system: System) -> Assumption:
 
 def graph(system: System) -> Assumption:
     """[asmp:graph]: undirected and connected."""
-    assert system.law.graph is not None
-    edges = len(system.law.graph.edges)
-    return Assumption("asmp:graph", MET, f"undirected and connected, {edges} edges")
+    found = system.law.graph
+    assert found is not None
+    if isinstance(found, DiscGraph):
+        return Assumption(
+            "asmp:graph", ASSUMED, "undirected; that it stays connected only the run tells"
+        )
+    if isinstance(found, SwitchingGraph):
+        each = f"each of the {len(found.graphs)} graphs is undirected and connected"
+        return Assumption("asmp:graph", MET, each)
+    return Assumption("asmp:graph", MET, f"undirected and connected, {len(found.edges)} edges")
 
 
 def output_to_state(gain: Gain) -> Assumption:

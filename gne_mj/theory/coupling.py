@@ -84,7 +84,8 @@ def needed_connectivity(slopes: Slopes) -> tuple[float, float]:
 
 
 def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
-    """What the gain c must exceed on a graph, and whether it does."""
+    """What the gain c must exceed on a graph, and whether it does; on the worst of one that
+    changes."""
     connectivity = graph.algebraic_connectivity
     sure = slopes.monotone
 
@@ -96,11 +97,13 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
         return Coupling(gain, nothing, nothing, None, slopes.label)
     printed, rigorous = (needed / connectivity for needed in needed_connectivity(slopes))
     quadratic = None
-    bound = slopes.between
-    if bound is not None:
+    bound, members = slopes.between, graph.members
+    if bound is not None and members is not None:
         owner = slopes.game.agent_of_action
-        if len(_entries(bound.base, bound.loss, owner)[0]) ** 3 <= _WORK:
-            least = least_coupling(bound.base, graph, owner, loss=bound.loss)
+        if len(members) * len(_entries(bound.base, bound.loss, owner)[0]) ** 3 <= _WORK:
+            least = max(
+                least_coupling(bound.base, each, owner, loss=bound.loss) for each in members
+            )
             quadratic = condition(least, sure)
     return Coupling(
         gain, condition(printed, False), condition(rigorous, sure), quadratic, slopes.label

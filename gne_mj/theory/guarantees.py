@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import part_of
 from gne_mj.game_model import Box
 from gne_mj.graph import Graph
@@ -155,6 +156,7 @@ def _graph(graph: Graph) -> dict[str, Any]:
         "edges": len(graph.edges),
         "lambda_2": graph.algebraic_connectivity,
         "lambda_max": graph.largest_eigenvalue,
+        "changes": isinstance(graph, ChangingGraph),
     }
 
 

@@ -39,7 +39,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield (
             "graph",
             f"lambda_2 = {graph['lambda_2']:.6g}, lambda_max = {graph['lambda_max']:.6g},"
-            f" {graph['edges']} edges",
+            f" {graph['edges']} edges" + ", of the worst that it becomes" * graph["changes"],
         )
     if g["coupling"] is not None:
         yield from _coupling(g["coupling"])

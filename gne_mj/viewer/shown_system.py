@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.faults import for_native
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
@@ -94,6 +95,8 @@ class ShownSystem:
         margin = -np.max(values["constraint"], axis=1)
         found[f"{name}/margin"] = margin.astype(np.float32)
         found[f"{name}/share"] = shares(game, values).astype(np.float32)
+        if self._network_changes and "linked" in values:
+            found[f"{name}/linked"] = values["linked"].astype(np.float32)
         for variable in self._shown("estimates"):
             found[f"{name}/{variable.name}"] = values[variable.name].astype(np.float32)
         return found
@@ -114,9 +117,9 @@ class ShownSystem:
 
     @property
     def _message_period(self) -> float | None:
-        """s between messages; None if they flow all the time."""
+        """s between messages; None if they flow all the time, or over a graph that changes."""
         system = self.system
-        held = system.law.graph is not None and mode_of(system).held
+        held = system.law.graph is not None and mode_of(system).held and not self._network_changes
         return self.clock.control_period if held else None
 
     @cached_property
@@ -133,12 +136,19 @@ class ShownSystem:
         pairs |= {(i, j) for members in game.in_constraint for i in members for j in members}
         return [[i + 1, j + 1] for i, j in sorted(pairs) if i < j]
 
+    @property
+    def _network_changes(self) -> bool:
+        return isinstance(self.system.law.graph, ChangingGraph)
+
     @cached_property
     def _links(self) -> list[list[int]]:
-        """[hearer, sender], from 1, in the order of native neighbour lists."""
+        """[hearer, sender], from 1, in the order of native neighbour lists; of a graph that
+        changes both of each edge."""
         graph = self.system.law.graph
         if graph is None:
             return []
+        if self._network_changes:
+            return [pair for i, j in self._edges for pair in ([i, j], [j, i])]
         hearer = np.repeat(np.arange(graph.agents), np.diff(graph.data.pointer))
         return (np.column_stack([hearer, graph.data.neighbour]) + 1).tolist()
 

@@ -11,6 +11,7 @@ export const partsOf = (system) => [
   "share",
   "margin",
   "estimate",
+  "linked",
 ];
 
 /**

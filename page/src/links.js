@@ -1,7 +1,7 @@
 // Who hears whom: links between agents, and messages on their way along them.
 import { colour, reducedMotion } from "./theme.js";
 /** @import { Scene } from "./scene.js" */
-/** @import { Numbers, System } from "./types.d.ts" */
+/** @import { Instant, Numbers, System } from "./types.d.ts" */
 
 /** @typedef {{system: System, from: number, to: number, lost: boolean, born: number}} Pulse */
 
@@ -37,6 +37,8 @@ export class Links {
     this.pulses = []; // messages on their way, between agents from 0
     this.lastPulse = new Map(); // when each link had one
     this.heads = new Map(); // where links of each agent begin
+    /** @type {Map<string, Numbers | undefined>} */
+    this.linked = new Map(); // of graphs that change: which of a system's edges there are now
   }
 
   /** Another scene. */
@@ -76,7 +78,9 @@ export class Links {
    */
   flowIn(system, now) {
     const every = Math.max(1, Math.ceil(system.links.length / MANY));
+    const linked = this.linked.get(system.name);
     for (let link = 0; link < system.links.length; link += every) {
+      if (linked && !(linked[link >> 1] > 0.5)) continue; // an edge's two links follow each other
       const key = `${system.name}/${link}`;
       // each begins at a moment of its own
       if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - ((link * 617) % FLOW));
@@ -144,18 +148,26 @@ export class Links {
 
   /**
    * @param {System[]} systems
+   * @param {Instant} instant
    * @param {number} now
    */
-  draw(systems, now) {
+  draw(systems, instant, now) {
     if (!this.shown) return void (this.pulses = []); // or they would keep pictures coming
     this.heads.clear();
-    for (const system of systems) this.edges(system);
+    for (const system of systems) {
+      const linked = instant.systems[system.name].linked;
+      this.linked.set(system.name, linked);
+      this.edges(system, (edge) => !linked || linked[edge] > 0.5);
+    }
     this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
     for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
   }
 
-  /** @param {System} system */
-  edges(system) {
+  /**
+   * @param {System} system
+   * @param {(edge: number) => boolean} there
+   */
+  edges(system, there) {
     const { context } = this;
     const dense = system.edges.length > 60;
     context.lineWidth = dense ? 0.8 : 1.4;
@@ -163,7 +175,8 @@ export class Links {
     context.globalAlpha = dense ? Math.max(0.15, 30 / system.edges.length) : 0.75;
     context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
     context.beginPath();
-    for (const [a, b] of system.edges) {
+    for (const [edge, [a, b]] of system.edges.entries()) {
+      if (!there(edge)) continue;
       const curve = this.curve(system, a - 1, b - 1);
       if (!curve) continue;
       const [from, bend, to] = curve;

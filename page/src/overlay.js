@@ -75,7 +75,7 @@ export class Overlay {
     context.clearRect(0, 0, w, h);
     this.taken = [];
     this.marks = [];
-    this.links.draw(this.systems, now);
+    this.links.draw(this.systems, instant, now);
     for (const system of this.systems)
       if (system.drawn_as === "bars") this.barTexts(system);
       else if (this.labelled) this.labels(system, instant);

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from gne_mj.controllers.table import DiscTable, SwitchingTable
 from gne_mj.registry import Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.toml_table import Table, Unit
@@ -30,7 +31,8 @@ TITLES = {"game": "`[systems.NAME.game]`", "agents": "`[systems.NAME.agents]`",
           "faults": "`[[systems.NAME.faults]]`, as many as there are"}  # fmt: skip
 GRAPHS = """`graph` is `line`, `ring`, `star` or `complete` for any number of agents, `printed` or
 `caption` for ten (the paper's, as its figure is drawn and as its caption says), or a list of edges:
-`graph = [[1, 2], [2, 3]]`. A table without `information` is of full information.
+`graph = [[1, 2], [2, 3]]`; or a table of a graph that [changes](networks.md).
+A table without `information` is of full information.
 """
 
 
@@ -48,6 +50,8 @@ def page() -> str:
             continue
         if name == "controller":
             parts += [GRAPHS]
+            for tag, table in (("switching", SwitchingTable), ("disc", DiscTable)):
+                parts += [f'`graph = {{type = "{tag}"}}` has\n', _rows(table)]
         for tag, table in sorted(registry._tables.items()):
             if table.__module__.startswith("gne_mj."):  # and of no plug-in
                 parts += [f'### `{registry.key} = "{tag}"`\n', _about(table), _rows(table)]

@@ -267,7 +267,8 @@
     ...system.quantities.map((quantity) => `quantity/${quantity.name}`),
     "share",
     "margin",
-    "estimate"
+    "estimate",
+    "linked"
   ];
   var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
   var instantOfFrame = (pack, systems) => {
@@ -676,6 +677,7 @@
       this.pulses = [];
       this.lastPulse = /* @__PURE__ */ new Map();
       this.heads = /* @__PURE__ */ new Map();
+      this.linked = /* @__PURE__ */ new Map();
     }
     /** Another scene. */
     begin() {
@@ -711,7 +713,9 @@
      */
     flowIn(system, now) {
       const every = Math.max(1, Math.ceil(system.links.length / MANY));
+      const linked = this.linked.get(system.name);
       for (let link = 0; link < system.links.length; link += every) {
+        if (linked && !(linked[link >> 1] > 0.5)) continue;
         const key = `${system.name}/${link}`;
         if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - link * 617 % FLOW);
         this.pulse(system, link, false, now, FLOW);
@@ -772,17 +776,25 @@
     }
     /**
      * @param {System[]} systems
+     * @param {Instant} instant
      * @param {number} now
      */
-    draw(systems, now) {
+    draw(systems, instant, now) {
       if (!this.shown) return void (this.pulses = []);
       this.heads.clear();
-      for (const system of systems) this.edges(system);
+      for (const system of systems) {
+        const linked = instant.systems[system.name].linked;
+        this.linked.set(system.name, linked);
+        this.edges(system, (edge) => !linked || linked[edge] > 0.5);
+      }
       this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
       for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
     }
-    /** @param {System} system */
-    edges(system) {
+    /**
+     * @param {System} system
+     * @param {(edge: number) => boolean} there
+     */
+    edges(system, there) {
       const { context } = this;
       const dense = system.edges.length > 60;
       context.lineWidth = dense ? 0.8 : 1.4;
@@ -790,7 +802,8 @@
       context.globalAlpha = dense ? Math.max(0.15, 30 / system.edges.length) : 0.75;
       context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
       context.beginPath();
-      for (const [a, b] of system.edges) {
+      for (const [edge, [a, b]] of system.edges.entries()) {
+        if (!there(edge)) continue;
         const curve = this.curve(system, a - 1, b - 1);
         if (!curve) continue;
         const [from, bend, to] = curve;
@@ -887,7 +900,7 @@
       context.clearRect(0, 0, w, h);
       this.taken = [];
       this.marks = [];
-      this.links.draw(this.systems, now);
+      this.links.draw(this.systems, instant, now);
       for (const system of this.systems)
         if (system.drawn_as === "bars") this.barTexts(system);
         else if (this.labelled) this.labels(system, instant);
