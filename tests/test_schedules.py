@@ -5,6 +5,7 @@ import pytest
 from builders import FIVE, robot_state, robot_system, run_loop
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 import reference
 from gne_mj.barrier import Schedule
@@ -45,6 +46,27 @@ def test_the_law_takes_the_penalty_of_its_time(engine):
         rho = max(0.5 * np.exp(-k * 0.01 / 0.3), 0.01)
         expected = reference.full_information(GAME, rho, state[k, :, 1])
         assert np.allclose(u[k], expected, rtol=0, atol=1e-12)
+
+
+def test_every_stage_takes_the_penalty_of_its_own_time():
+    """Against SciPy: half the step leaves a sixteenth of the error."""
+    schedule = Schedule("exponential", 1.0, 1e-3, 0.1)
+    system = robot_system(robot_state(FIVE), rho=1e-3, schedule=schedule)
+
+    def rate(time, flat):
+        x1, y, x3, _ = flat.reshape(5, 4).T
+        spring = x1 + np.arctan(x1) + (y - x3)  # every number of EQUAL is 1
+        u = reference.full_information(GAME, max(np.exp(-time / 0.1), 1e-3), y)
+        return np.column_stack([y - x3, u - spring, spring, y]).ravel()
+
+    begin = system.state.ravel()
+    exact = solve_ivp(rate, (0.0, 0.32), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    errors = [
+        np.max(np.abs(run_loop(system, h, round(0.32 / h))[0][-1].ravel() - exact))
+        for h in (0.01, 0.005)
+    ]
+    assert errors[1] < 1e-9
+    assert errors[0] > 12.0 * errors[1]
 
 
 @pytest.mark.slow

@@ -6,10 +6,11 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import FIVE, clock, robot_state, robot_system
+from builders import FIVE, clock, integrators, robot_state, robot_system, run_loop
 from own_games import boxed, plain_game
 
 from gne_mj import certificate, user_files
+from gne_mj.controllers import FullInformation
 from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
@@ -18,7 +19,9 @@ from gne_mj.games.platoon import _check_monotone
 from gne_mj.loops import division
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Case, EachLoop, Span
-from gne_mj.theory import Slopes, convexity, search_push, theorem, trials
+from gne_mj.system import System
+from gne_mj.theory import Slopes, assumptions, convexity, search_push, theorem, trials
+from gne_mj.theory.assumption import MET, UNKNOWN
 from gne_mj.theory.gain import Gain, decay_rate
 from gne_mj.theory.verdict import _limit
 
@@ -233,3 +236,31 @@ def test_a_piece_that_changes_slacks_by_little_is_ordinary(end, good):
     problem = SimpleNamespace(data=SimpleNamespace(tightening=np.zeros(1)))
     for count in (1, 4):
         assert division.ordinary(count, problem, work, stages) == good
+
+
+def test_a_start_of_estimates_as_far_away_as_the_boundary_is_not_known_to_be_inside():
+    """The ball of the lemma is open: 3/8 and 4/8 away, with slacks of 5/8."""
+    game = boxed(lambda i, y: y[i] ** 2 / 2, lambda i, y: y[i], 10 / 8)
+    own = 5 / 8 + np.array([[3 / 8, 4 / 8], [0.0, 0.0]])
+
+    def found(share):
+        law = SimpleNamespace(barrier_profiles=lambda agent, memory: 5 / 8 + share * (own - 5 / 8))
+        system = SimpleNamespace(game=game, law=law, memory=None, start=np.full(2, 5 / 8))
+        return assumptions.estimates_start(system).status
+
+    assert found(1.0) == UNKNOWN
+    assert found(0.999) == MET
+
+
+def test_a_period_whose_equation_was_not_solved_is_not_counted_as_solved():
+    """J = -5 y^2 over periods of 1 s: the slope is negative, and Newton's method stops."""
+    game = boxed(
+        lambda i, y: -5.0 * y[i] ** 2, lambda i, y: -10.0 * y[i], 1.0, 1,
+        lambda i, y, scale, out: np.add(out, -10.0 * scale, out=out),
+    )  # fmt: skip
+    system = System(
+        "one", game, integrators(1), FullInformation(), 0.1, np.array([[0.5]]),
+        mode="implicit", integrator="euler",
+    )  # fmt: skip
+    *_, loop = run_loop(system, 1.0, 1)
+    assert loop.monitor.unsolved == loop.monitor.solutions > 0.0
