@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from batch_plans import CASES, ODE, ROOT, SLOW, all_chunks, assert_same, plan_of
 
-from gne_mj.batches import (
-    make_plan,
-)
+from gne_mj.batches import Sweep, make_plan
+from gne_mj.batches import chunk as chunks
 from gne_mj.batches.chunk import Runner
 from gne_mj.errors import InfeasibleStart, UserCodeError
 from gne_mj.plants.fleet import compile_model, compose
@@ -147,3 +146,12 @@ def test_estimates_that_are_given_may_make_a_start_infeasible():
         else:
             report = plan.alone(run).simulation_object().run().reports["robots"]
             assert report["worst_constraint"]["margin"] == found["least_margin"][1][run]
+
+
+def test_a_runner_keeps_so_many_combinations_and_not_more(monkeypatch):
+    monkeypatch.setattr(chunks, "_COMBINATIONS", 2)
+    plan = make_plan("velocity-sync", ODE, sweeps=[Sweep("barrier.rho", (0.1, 0.2, 0.3, 0.4))])
+    runner = Runner(plan, 1)
+    for chunk in range(plan.chunks):
+        runner.run(chunk)
+    assert [number for number, _ in runner._prepared] == [2, 3]

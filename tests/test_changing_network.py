@@ -162,6 +162,8 @@ def test_batches_do_the_same(tmp_path):
     found = gne_mj.batch(scenario, {"barrier.rho": [0.1, 0.2]}, runs=0, out=tmp_path / "batch")
     alone = scenario.simulation_object().run()["robots"]["action"].to_numpy()[-1]
     assert_array_equal(found["final_action"].to_numpy()[0], alone)
+    with pytest.raises(InvalidInput, match=r"^systems\.robots\.controller\.graph: .*multiple of"):
+        gne_mj.batch(scenario, {"controller.graph.every": [0.0003]}, runs=0, out=tmp_path / "no")
 
 
 @pytest.mark.parametrize(
