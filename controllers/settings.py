@@ -21,6 +21,7 @@ class Now(Numbers):
     tightened_value: float  # that value
     faults_step: float  # the step up to which faults were dealt with
     memory_step: float  # the step that the law's memory belongs to, held modes
+    next_instant: float  # the step of the next control instant, where periods may end early
 
 
 LENGTH_OF_NOW = len(names_of(Now))

@@ -23,6 +23,11 @@ class LawTable(Table):
     decentralised: bool = Field(
         False, description="mode implicit: each agent keeps to its share of every bound's slack"
     )
+    between: Literal["watched", "guarded"] = Field(
+        "watched",
+        description="between control instants: every step is watched, or a period of modes implicit"
+        " and sampled is cut before it leads outside",
+    )
 
     @abstractmethod
     def build(self, game: Game) -> Law:

@@ -169,6 +169,11 @@ def apart(system: SystemData) -> bool:
     return system.separation is not None
 
 
+def guarded(system: SystemData) -> bool:
+    """Whether control periods may end early."""
+    return system.guarded
+
+
 def _least_distance(runs: Runs) -> Array:
     """Not a number where no two agents came within reach."""
     least = runs.seen("least_distance")
@@ -284,6 +289,15 @@ JUDGED = (
         "position_margin", ("run",),
         lambda runs: _where(runs.observed, -runs.seen("positions_worst")), there=follow,
         long_name="least -g at positions that follow outputs",
+    ),
+    _of_monitor(
+        "periods_cut", "cut", there=guarded,
+        long_name="control periods that ended early, before they led outside",
+    ),
+    Variable(
+        "shortest_period", ("run",),
+        lambda runs: _where(runs.seen("cut") > 0, runs.seen("shortest_period")), there=guarded,
+        unit="s", long_name="the shortest of these",
     ),
     _of_monitor(
         "contacts", "contacts", there=collide,

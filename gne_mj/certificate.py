@@ -48,6 +48,8 @@ class Certificate:
         contacts: of agents whose bodies collide in MuJoCo: how many contacts between two agents
             there were (each counted at every step that it lasted), at how many steps, the first
             one, whose it was, and how deep bodies were in each other; None of others.
+        between: where control periods may end early: how many did, when the first one began and
+            the length of the shortest; None elsewhere.
         separation: of agents that keep apart: the least distance of two positions (None if no two
             came within reach), and the pairs that hold a run which rests away from the
             equilibrium; None of others.
@@ -72,6 +74,7 @@ class Certificate:
     actuators: dict[str, Any]
     positions: dict[str, Any] | None
     contacts: dict[str, Any] | None
+    between: dict[str, Any] | None
     separation: dict[str, Any] | None
     network: dict[str, Any] | None
     exit: dict[str, Any] | None
@@ -145,6 +148,7 @@ def certify_run(
         actuators=_actuators(system, monitor),
         positions=_positions(system, monitor),
         contacts=_contacts(system, monitor),
+        between=_between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
         network=network,
         exit=_exit_report(system, monitor),
@@ -230,6 +234,13 @@ def _exit(system: System, monitor: Any) -> tuple[str, str]:
     if (pair := kept_apart.pair_of(monitor)) is not None:
         return EXITS[code], kept_apart.exit_text(system, monitor, pair, at)
     constraint = game.constraint_names[int(monitor.exit_constraint)]
+    if code == watch.FORESEEN:
+        return (
+            EXITS[code],
+            f"held for even one integration step from {at[3:]} on, the input that there is would"
+            f" violate constraint '{constraint}' (predicted g = {value:.6g}), and it was not given:"
+            f" {_instead(system)} can go on there",
+        )
     if code == watch.STEP_TOO_SMALL:
         return (
             EXITS[code],
@@ -294,8 +305,10 @@ def _concerned(system: System, monitor: Any) -> list[int]:
 
 
 def _instead(system: System) -> str:
-    """What does where steps cannot be divided finely enough."""
-    ways = ["mode 'implicit'", "a larger rho", "a smaller timestep"]
+    """What does where steps are too long next to a bound."""
+    ways = ["a larger rho", "a smaller timestep"]
+    if system.mode != "implicit":
+        ways.insert(0, "mode 'implicit'")
     if system.law.rosenbrock and system.engine == "ode":
         ways.insert(0, "integrator 'rosenbrock'")
     return f"{', '.join(ways[:-1])} or {ways[-1]}"
@@ -355,6 +368,18 @@ def _contacts(system: System, monitor: Any) -> dict[str, Any] | None:
         "first": float(monitor.contact_time) if any_at_all else None,
         "agents": agents if any_at_all else None,
         "depth": float(monitor.contact_depth),
+    }
+
+
+def _between(system: System, monitor: Any) -> dict[str, Any] | None:
+    """What a guard did between control instants."""
+    if not system.guarded:
+        return None
+    any_at_all = monitor.cut > 0
+    return {
+        "periods_cut": int(monitor.cut),
+        "first_cut": float(monitor.cut_time) if any_at_all else None,
+        "shortest_period": float(monitor.shortest_period) if any_at_all else None,
     }
 
 

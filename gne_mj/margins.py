@@ -107,6 +107,25 @@ def influence(
     return Influence(gains[0], gains[1], gains[2], exact)
 
 
+def errors_ahead(
+    agents: Agents, timestep: float, integrator: str, period: int, disturbance: Disturbance
+) -> Array:
+    """Bounds of |y - predicted y| (period, m) at the end of each step of a control period.
+
+    Of a state that is known at its start, but for the reading's error.
+    """
+    found = np.zeros((period, agents.channels))
+    known: dict[bytes, tuple[Array, Array]] = {}
+    for r, row in enumerate(agents.parameters):
+        key = row.tobytes()
+        if key not in known:
+            ((kind, own),) = by_type(agents.kind, row[None])
+            known[key] = _Channel(kind, own[0], timestep, integrator).gains_ahead(period)
+        pushed, read = known[key]
+        found[:, r] = pushed * disturbance.push[r] + read * disturbance.noise[r]
+    return found
+
+
 def tightening(game: Game, error: Array) -> Array:
     """How much a difference of outputs of at most ``error`` (m,) can add to g, shape (p,).
 
@@ -191,15 +210,21 @@ def with_margin(
     timestep: float,
     integrator: str,
     period: int,
+    guarded: bool = False,
 ) -> Game:
     """The game with a barrier that leaves room for such disturbances, and for no others.
+
+    Where periods may end early (``guarded``), for what they can do over any shorter one too.
 
     Raises:
         InvalidInput: as :func:`influence` and :func:`tightening`.
     """
     with named(error="disturbance"):
-        effect = influence(agents, timestep, integrator, period, disturbance.delay)
-        return game.tightened(tightening(game, effect.of(disturbance)))
+        error = influence(agents, timestep, integrator, period, disturbance.delay).of(disturbance)
+        if guarded:
+            ahead = errors_ahead(agents, timestep, integrator, period, disturbance)
+            error = np.maximum(error, np.max(ahead, axis=0))
+        return game.tightened(tightening(game, error))
 
 
 def of_the_set(game: Game) -> Game:
@@ -267,18 +292,26 @@ class _Channel:
 
     def gains(self, steps: int) -> tuple[float, float]:
         """Bounds of |dy| for pushes of at most 1, and for an output that is read wrong by 1."""
+        pushed, read = self.gains_ahead(steps)
+        return float(pushed[-1]), float(read[-1])
+
+    def gains_ahead(self, steps: int) -> tuple[Array, Array]:
+        """The same after each of so many steps, (steps,) both."""
         pushed, read = np.zeros_like(self._b), np.zeros_like(self._b)
         read[self._output] = 1.0
+        found = np.zeros((2, steps))
         if self.linear:
             a, b = self._exact
-            response, total = b, np.zeros_like(b)
-            for _ in range(steps):
-                total += np.abs(response)
+            response = b
+            for step in range(steps):
+                pushed = pushed + np.abs(response)
                 response, read = a @ response, a @ read
-            return float(total[self._output]), float(abs(read[self._output]))
-        for _ in range(steps):
+                found[:, step] = pushed[self._output], abs(read[self._output])
+            return found[0], found[1]
+        for step in range(steps):
             pushed, read = self._a @ pushed + self._b, self._a @ read
-        return float(pushed[self._output]), float(read[self._output])
+            found[:, step] = pushed[self._output], read[self._output]
+        return found[0], found[1]
 
     def least_slope(self, steps: int) -> float:
         """A lower bound of dy/du for an input held so long: exact where the map is linear.

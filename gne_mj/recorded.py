@@ -23,7 +23,7 @@ from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
 from gne_mj.quantity import Quantity
 from gne_mj.separation import Separation
-from gne_mj.system.data import SystemData
+from gne_mj.system.data import WATCHED, SystemData
 
 if TYPE_CHECKING:
     import xarray
@@ -105,6 +105,7 @@ def recorded_system(
         engine=attributes["engine"],
         integrator=attributes["integrator"],
         decentralised=bool(attributes["decentralised"]),
+        between=attributes.get("between", WATCHED),
         faults=faults,
         seed=seed,
         separation=None if known["separation"] is None else Separation(*known["separation"]),

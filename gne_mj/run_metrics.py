@@ -20,6 +20,7 @@ EXITS = {
     watch.STEP_TOO_SMALL: "step_too_small",
     watch.FORCES_LOST: "forces_left_out",
     watch.TOO_NEAR: "too_near",
+    watch.FORESEEN: "exit_foreseen",
 }
 STATUS = "<U28"  # dtype that holds every status, infeasible_start too
 SETTLED = 0.02  # of the initial distance

@@ -383,6 +383,10 @@ class SystemRun:
                     "another one",
                     "one that changes stays what it is while a run goes on",
                 )
+        if system.between != self.system.between:
+            raise InvalidInput(
+                "between", system.between, "it stays as it is while a simulation goes on"
+            )
         self.loop.adopt(system.setup(self.clock))
         self.loop.kept_alive = system
         self.system = system

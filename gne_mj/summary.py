@@ -23,6 +23,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {seen['least_margin']:.6g}, constraint '{seen['constraint']}' at"
             f" {seen['time']:.4g} s"
         )
+    if report["between"] is not None:
+        rows["control periods"] = _between(report["between"])
     if report["contacts"] is not None:
         rows["contacts"] = _contacts(report["contacts"])
     if report["separation"] is not None:
@@ -45,6 +47,15 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {bounds_text(epsilon)}"
         )
     return rows
+
+
+def _between(seen: dict[str, Any]) -> str:
+    if not seen["periods_cut"]:
+        return "none was cut, all being inside at every step as predicted"
+    return (
+        f"{seen['periods_cut']} cut before they led outside (first at {seen['first_cut']:.4g} s),"
+        f" the shortest to {1e3 * seen['shortest_period']:.4g} ms"
+    )
 
 
 def _contacts(seen: dict[str, Any]) -> str:

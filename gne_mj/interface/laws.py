@@ -25,12 +25,15 @@ Network = Graph | str | Sequence[tuple[int, int]]
 
 
 @answering
-def full_information(*, mode: str = "continuous", decentralised: bool = False) -> LawTable:
+def full_information(
+    *, mode: str = "continuous", decentralised: bool = False, between: str = "watched"
+) -> LawTable:
     """Every agent measures all actions [eq:nonlinFIfeedback].
 
     Args:
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
+        between: "guarded" cuts periods of held modes before they lead outside.
     """
     return made(FullController, information="full", **locals())
 
@@ -43,6 +46,7 @@ def partial_information(
     time_constant: float = 1.0,
     mode: str = "continuous",
     decentralised: bool = False,
+    between: str = "watched",
 ) -> LawTable:
     """Costs at estimates that neighbours exchange, a measured barrier [eq:nonlinearPIFeedback].
 
@@ -52,6 +56,7 @@ def partial_information(
         time_constant: tau of the estimates in s; the paper has 1.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
+        between: "guarded" cuts periods of held modes before they lead outside.
     """
     return made(PartialController, information="partial", **locals())
 

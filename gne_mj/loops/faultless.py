@@ -1,9 +1,11 @@
 """A run without faults: outputs are seen as they are, inputs act as delivered.
 
-A loop is compiled with this module, with :mod:`gne_mj.loops.faultless_apart` or with
-:mod:`gne_mj.loops.faults`, so that what a run does not use costs nothing.
+A loop is compiled with this module, or with one in its place (:mod:`gne_mj.loops.faults`,
+:mod:`gne_mj.loops.faultless_apart`, :mod:`gne_mj.loops.guarded`,
+:mod:`gne_mj.loops.guarded_faults`), so that what a run does not use costs nothing.
 """
 
+from gne_mj.loops import functions
 from gne_mj.native import copy, kernel
 
 # Whether the law's action follows from the present state alone, whichever step comes next
@@ -15,6 +17,18 @@ RECORDED = False  # whether rows have what was seen and what acted
 def measured(problem):
     """Whether the law has the outputs as they are."""
     return True
+
+
+@kernel
+def begins(clock, now, step):
+    """Whether a control period begins with this step, in the held modes."""
+    return step % clock.period == 0
+
+
+@kernel
+def elapse(problem, step, work, memory):
+    """Move the law's memory over the period that has passed, in the held modes."""
+    functions.propagate(problem, work.held, memory, work.scratch)
 
 
 @kernel

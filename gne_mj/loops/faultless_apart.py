@@ -3,8 +3,10 @@
 from gne_mj.loops.faultless import (
     RECORDED,
     begin,
+    begins,
     choose,
     deliver,
+    elapse,
     measured,
     push,
     record,
@@ -14,8 +16,8 @@ from gne_mj.loops.faultless import (
 from gne_mj.loops.functions import keep_apart, push_apart
 
 __all__ = [
-    "PREDICTION_KNOWN", "RECORDED", "begin", "choose", "deliver", "keep_apart", "measured", "push",
-    "push_apart", "record", "sense", "sense_state",
+    "PREDICTION_KNOWN", "RECORDED", "begin", "begins", "choose", "deliver", "elapse", "keep_apart",
+    "measured", "push", "push_apart", "record", "sense", "sense_state",
 ]  # fmt: skip
 
 # Half-planes are renewed at every piece of a step

@@ -12,6 +12,8 @@ import numpy as np
 
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import LINKS
+from gne_mj.loops.faultless import begins as begins
+from gne_mj.loops.faultless import elapse as elapse
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Fault
 from gne_mj.loops.functions import keep_apart as keep_apart
 from gne_mj.loops.functions import push_apart as push_apart
@@ -86,8 +88,10 @@ def measured(problem):
 @kernel
 def begin(parts, at, state, memory):
     """What happens before the law acts: sensors read, estimates corrupted, messages exchanged."""
-    work, step = parts.work, at.step
-    fresh = at.stage == 0 and work.now.faults_step <= step
+    work, clock, step = parts.work, parts.clock, at.step
+    # at a control instant of the clock's; where periods end early there are others
+    regular = clock.mode == 0 or step % clock.period == 0
+    fresh = at.stage == 0 and work.now.faults_step <= step and regular
     if at.stage == 0:
         work.now.faults_step = step + 1.0
     read_sensors(parts, step, state)
@@ -96,7 +100,7 @@ def begin(parts, at, state, memory):
     if len(memory) > 0:
         if fresh:
             corrupt(parts.problem, parts.clock, step, memory)
-        if parts.problem.settings[LINKS] > 0.0:
+        if parts.problem.settings[LINKS] > 0.0 and regular:
             exchange(parts.problem, parts.clock, step, memory, work)
 
 

@@ -81,6 +81,8 @@ class Problem(NamedTuple):
     size: Annotated[np.ndarray, "1 + p"] = np.zeros(1)
     # of agents that keep apart: gne_mj.separation.Separation.numbers
     separation: Annotated[np.ndarray, "3"] = np.zeros(3)
+    # where control periods may end early, of every step and constraint: gne_mj.loops.guard
+    ahead: Annotated[np.ndarray, "n"] = np.zeros(0)
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
     parameter_block: int = 0

@@ -30,28 +30,55 @@ FAR = 1e-2
 @kernel
 def act(faults, plant, context, parts, at, state, memory):
     """Fill work.commanded; False, with the exit latched, if there is no input."""
-    problem, channels, clock, work = parts.problem, parts.channels, parts.clock, parts.work
-    time, step, monitor = at.time, at.step, parts.monitor
-    m, states = channels.equilibrium_state.shape
-    solver = solver_in(work.solver, problem.order, len(work.g), states)
-    found = solver.numbers.found
-    if solver.numbers.solved_step == step + 1.0:  # a run that goes on after its end was looked at
-        copy(solver.held, work.commanded)
+    solver = solver_of(parts)
+    if (
+        solver.numbers.solved_step == at.step + 1.0
+    ):  # a run that goes on after its end was looked at
+        copy(solver.held, parts.work.commanded)
         return True
-    solver.numbers.solved_step = step + 1.0
-    faults.sense(problem, work, work.y, work.measurement)
-    known = faults.sense_state(plant, parts, step, state, solver.state, solver.scratch)
-    if found > 0.0:
-        watch.compare(monitor, time, work.y, solver.prediction)
-    else:
-        find_slopes(plant, context, channels, clock, known, solver)
-        # inside for certain, as y(0) that is seen is not
-        copy(problem.equilibrium, solver.prediction)
+    faults.sense(parts.problem, parts.work, parts.work.y, parts.work.measurement)
+    known = faults.sense_state(plant, parts, at.step, state, solver.state, solver.scratch)
+    look(parts, at, known, solver)
+    if solver.numbers.found == 0.0:
+        find_slopes(plant, context, parts.channels, parts.clock, known, solver)
     # where the inputs so far lead to
     extrapolate(solver)
+    solver.numbers.found += 1.0
+    ended, agreed, least = solve(plant, context, parts, parts.clock, known, memory, solver)
+    return settle(parts, at.time, memory, solver, ended, agreed, least)
+
+
+@kernel
+def solver_of(parts):
+    """The arrays that inputs are solved for in."""
+    work, states = parts.work, parts.channels.equilibrium_state.shape[1]
+    return solver_in(work.solver, parts.problem.order, len(work.g), states)
+
+
+@kernel
+def look(parts, at, known, solver):
+    """Begin a control instant: ``known`` is the flat state as the law has it."""
+    problem, channels, work = parts.problem, parts.channels, parts.work
+    m, states = channels.equilibrium_state.shape
+    solver.numbers.solved_step = at.step + 1.0
+    if solver.numbers.found > 0.0:
+        watch.compare(parts.monitor, at.time, work.y, solver.prediction)
+    else:
+        # inside for certain, as y(0) that is seen is not
+        copy(problem.equilibrium, solver.prediction)
     for r in range(m):
         solver.anchor[r] = known[r * states + channels.output]
-    solver.numbers.found, solver.numbers.steps = found + 1.0, 0.0
+    solver.numbers.steps = 0.0
+
+
+@kernel
+def solve(plant, context, parts, clock, known, memory, solver):
+    """Fill solver.held with the input for the clock's period, and solver.y with what it leads to.
+
+    It begins with the input solver.u and the slopes that there are. Returns how Newton's method
+    ended, whether prediction and solution agree, and the least secant.
+    """
+    problem, channels, work, m = parts.problem, parts.channels, parts.work, len(solver.u)
     map_prediction(plant, context, channels, clock, known, solver)
     copy(solver.reached, solver.y)
     ended, agreed, least = OUTSIDE, False, np.inf
@@ -78,6 +105,14 @@ def act(faults, plant, context, parts, at, state, memory):
         if agreed:
             copy(solver.reached, solver.y)
             break
+    return ended, agreed, least
+
+
+@kernel
+def settle(parts, time, memory, solver, ended, agreed, least):
+    """Give the input that was solved for, and count it; False, with the exit latched, if there is
+    none."""
+    problem, work, monitor = parts.problem, parts.work, parts.monitor
     functions.prepare(problem, 0, len(problem.data.offsets) - 1, solver.anchor, memory)
     copy(solver.y, solver.prediction)
     copy(solver.held, work.commanded)

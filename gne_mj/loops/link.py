@@ -302,13 +302,20 @@ def solve(equation: ModuleType) -> Any:
 
 
 @cache
-def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
-    """What mode implicit does at a control instant, for all laws and games.
+def act(
+    plant: ModuleType,
+    faults: ModuleType,
+    at: Any,
+    find: Callable[..., Any] = implicit.act,
+) -> Any:
+    """What a mode with a prediction does at a control instant, for all laws and games.
 
     Args:
         plant: module that predicts, :mod:`gne_mj.plants.zero_order_hold` and its like.
         faults: :mod:`gne_mj.loops.faultless` or one of those in its place.
         at: where MuJoCo keeps what, for a plant that asks it.
+        find: the kernel that finds the input: :func:`gne_mj.loops.implicit.act`, or one of
+            :mod:`gne_mj.loops.guard`.
     """
     source = source_key(plant, faults)
 
@@ -316,7 +323,7 @@ def act(plant: ModuleType, faults: ModuleType, at: Any) -> Any:
         _ = source
         steps = steps_in(block)
         parts = parts_at(block, workspace, steps)
-        good = implicit.act(
+        good = find(
             faults, plant, (at, model, data, block), parts, Instant(time, step, 0),
             floats_at(state, steps.actions * steps.states), floats_at(memory, steps.memory),
         )  # fmt: skip

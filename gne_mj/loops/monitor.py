@@ -43,6 +43,10 @@ class MonitorNumbers(Numbers):
     prediction_time: float
     not_monotone: float  # periods with dy+/du not positive in some channel
     not_monotone_time: float
+    # Control periods that may end early, see gne_mj.loops.guard
+    cut: float  # periods that did
+    cut_time: float  # the first one's start
+    shortest_period: float  # length in s of the shortest of these; 0 if none did
     # Mode continuous, see gne_mj.loops.division
     divided: float  # steps that were divided
     smallest_step: float  # length in s of the shortest piece of one; 0 if none was divided
@@ -87,7 +91,10 @@ class Monitor(NamedTuple):
 # FORCES_LOST: MuJoCo has left out forces; EXIT_VALUE says which of its warnings told so
 # TOO_NEAR: two agents are; exit_agent and exit_constraint say which, as they do where a step is too
 # small for two agents
-INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST, TOO_NEAR = range(7)
+# FORESEEN: the input that there is leads outside within one step, and is not given
+INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST, TOO_NEAR, FORESEEN = range(
+    8
+)
 
 
 def fresh(actions: int, constraints: int, *runs: int) -> Any:
@@ -144,6 +151,16 @@ def count_solution(monitor, time, steps, accurate, least):
         if monitor.not_monotone == 0.0:
             monitor.not_monotone_time = time
         monitor.not_monotone += 1.0
+
+
+@kernel
+def count_cut(monitor, time, length):
+    """Note that the control period which begins now lasts only ``length`` s."""
+    if monitor.cut == 0.0:
+        monitor.cut_time = time
+    if monitor.cut == 0.0 or length < monitor.shortest_period:
+        monitor.shortest_period = length
+    monitor.cut += 1.0
 
 
 @kernel

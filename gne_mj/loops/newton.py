@@ -51,6 +51,7 @@ class SolverNumbers(Numbers):
     leaves: float  # what they leave of an error
     rho: float  # the penalty that is solved for
     solved_step: float  # the step (plus 1) that was solved for last
+    length: float  # steps in the period that slopes are of, where periods may be cut
 
 
 class InputSolver(NamedTuple):

@@ -85,7 +85,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
     divided, stage = work.division, max(at.stage, 0)
     known = divided.known if at.stage == 0 else float(division.NOTHING)
     divided.known = division.NOTHING
-    instant = clock.mode == CONTINUOUS or at.step % clock.period == 0
+    instant = clock.mode == CONTINUOUS or faults.begins(clock, work.now, at.step)
     if not look(faults, place, parts, at, known, state):
         if not instant:
             monitor.exit_between = 1.0
@@ -95,7 +95,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
         return True
     if instant and known != division.LAW:
         if clock.mode != CONTINUOUS and work.now.memory_step < at.step:  # a period has passed
-            functions.propagate(problem, work.held, memory, work.scratch)
+            faults.elapse(problem, at.step, work, memory)
             work.now.memory_step = at.step
         faults.begin(parts, at, state, memory)
         if clock.mode == IMPLICIT:

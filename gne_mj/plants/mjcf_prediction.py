@@ -123,12 +123,8 @@ def roll(channels, clock, state, u, scratch):
 
 
 @kernel
-def predict(context, channels, clock, state, u, out, trial, scratch):
-    """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
-
-    The arguments are as :func:`gne_mj.plants.zero_order_hold.predict` has them, but that it starts
-    from the simulation itself and not from ``state``.
-    """
+def set_out(context, channels, state, u, trial):
+    """Make the second mjData what the simulation is now, under u (m,)."""
     at, model, data, parameter_block = context
     prediction, places = prediction_in(parameter_block), integers(parameter_block, PLACES)
     twin = prediction.twin
@@ -137,6 +133,32 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     ctrl = field(twin, at.ctrl, sizes_in(parameter_block).nu)
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r]
+
+
+@kernel
+def step_on(context, channels, clock, u, out, trial, scratch):
+    """Fill out (m,) with the outputs one integration step after where the second mjData is."""
+    at, model, _data, parameter_block = context
+    prediction = prediction_in(parameter_block)
+    timed_step(at, prediction.step, model, prediction.twin)
+    # sensors are of the last step's start; a whole mj_forward would leave another warm start
+    refresh(model, prediction.twin, parameter_block)
+    gather(at, prediction.twin, parameter_block, trial)
+    for r in range(len(u)):
+        out[r] = trial[2 * r]
+
+
+@kernel
+def predict(context, channels, clock, state, u, out, trial, scratch):
+    """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
+
+    The arguments are as :func:`gne_mj.plants.zero_order_hold.predict` has them, but that it starts
+    from the simulation itself and not from ``state``.
+    """
+    at, model, _data, parameter_block = context
+    prediction = prediction_in(parameter_block)
+    twin = prediction.twin
+    set_out(context, channels, state, u, trial)
     for _ in range(clock.period):
         timed_step(at, prediction.step, model, twin)
     if prediction.forward != 0:  # sensors are of the last step's start

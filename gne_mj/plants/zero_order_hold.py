@@ -31,6 +31,20 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
 
 
 @kernel
+def set_out(context, channels, state, u, trial):
+    """Begin to look at a control period step by step, from a flat state; ``trial`` is the place."""
+    copy(state[: len(trial)], trial)
+
+
+@kernel
+def step_on(context, channels, clock, u, out, trial, scratch):
+    """Fill out (m,) with the outputs one integration step after ``trial``, which moves on."""
+    functions.roll(channels, clock.method, clock.h, 1, trial, u, scratch)
+    for r in range(len(u)):
+        out[r] = trial[r * channels.equilibrium_state.shape[1] + channels.output]
+
+
+@kernel
 def is_affine(clock):
     """Whether the map is affine in u beyond doubt: one Euler step, since x' is affine in u."""
     return clock.period == 1 and clock.method == 0

@@ -32,6 +32,7 @@ from gne_mj.separation import Separation, SeparationTable
 from gne_mj.starts import interior_profile
 from gne_mj.system import System, mode_of
 from gne_mj.system.checks import check_estimates
+from gne_mj.system.data import GUARDED
 from gne_mj.theory.periods import least_rho
 from gne_mj.toml_table import ACTION, Fills, PerAction, Sizes, Table, Unit, per_action
 
@@ -203,6 +204,7 @@ class SystemTable(Table):
             memory=memory,
             mode=self.controller.mode,
             decentralised=self.controller.decentralised,
+            between=self.controller.between,
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
             rtol=simulation.rtol,
@@ -307,6 +309,7 @@ class SystemTable(Table):
                 simulation.timestep,
                 self.plant.integrator or simulation.integrator,
                 max(1, round(period / simulation.timestep)),
+                self.controller.between == GUARDED,
             )
         return game, agents
 

@@ -29,6 +29,7 @@ from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
 from gne_mj.system.data import SystemData
+from gne_mj.system.guard import room_ahead
 from gne_mj.system.modes import mode_of
 
 if TYPE_CHECKING:
@@ -157,7 +158,8 @@ class Assembly(SystemData):
         mode.check_period(self, clock)
         settings = self.law_settings(self.rho)
         with named(period="clock.control_period"):
-            propagator = self.law.propagator(clock.control_period) if mode.held else no_propagator()
+            moved = clock.timestep if self.guarded else clock.control_period
+            propagator = self.law.propagator(moved) if mode.held else no_propagator()
         problem = Problem(
             data=self.game.data,
             graph=self.graph_at_start,
@@ -169,6 +171,7 @@ class Assembly(SystemData):
             schedule=np.zeros(3) if self.schedule is None else self.schedule.numbers,
             order=self.rows,
             separation=np.zeros(3) if self.separation is None else self.separation.numbers,
+            ahead=room_ahead(self, clock),
             functions=self.functions,
             faults=for_native(self.faults, self.game, self.law.graph, self.seed),
         )
@@ -179,7 +182,7 @@ class Assembly(SystemData):
             LoopClock(
                 clock.timestep,
                 clock.steps(clock.control_period),
-                mode.native,
+                mode.native_of(self),
                 _METHODS.get(self.integrator, -1),  # the Rosenbrock loop has no use for it
             ),
             *self._sizes,
@@ -211,7 +214,7 @@ class Assembly(SystemData):
 
         mode = mode_of(self)
         userdata, memory = entries_needed(
-            self.game, self.agents, len(self.loop_memory), mode.native, self._sizes
+            self.game, self.agents, len(self.loop_memory), mode.native_of(self), self._sizes
         )
         plant = build_fleet(
             self.agents, clock.timestep, self.integrator, userdata=userdata, memory=memory,

@@ -15,7 +15,7 @@ from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
 from gne_mj.game_model import Game
 from gne_mj.graph import GraphData
-from gne_mj.loops import faultless, faultless_apart
+from gne_mj.loops import faultless, faultless_apart, guarded, guarded_faults
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
 from gne_mj.plants.agent_type import followed_position, placed_state
@@ -23,6 +23,9 @@ from gne_mj.plants.agents import Agents
 from gne_mj.separation import Separation
 
 ADAPTIVE = ("tsit5", "rosenbrock")  # integrators that choose their steps
+# What is done between two control instants: every step is watched; or a period that would lead
+# outside is cut before it begins
+WATCHED, GUARDED = "watched", "guarded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +44,18 @@ class SystemData:
     memory: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     schedule: Schedule | None = None
     decentralised: bool = False
+    between: str = WATCHED
     faults: tuple[Fault, ...] = ()
     seed: int = 0
     disturbance: Disturbance | None = None
     separation: Separation | None = None
     rtol: float = 1e-6
     barrier: LogBarrier = field(init=False)
+
+    @property
+    def guarded(self) -> bool:
+        """Whether control periods end early where they would lead outside."""
+        return self.between == GUARDED
 
     @property
     def start(self) -> NDArray[np.float64]:
@@ -110,6 +119,8 @@ class SystemData:
     @property
     def fault_kernels(self) -> ModuleType:
         """The module of what goes wrong in this system's loops."""
+        if self.guarded:
+            return guarded_faults if self.faults else guarded
         if self.faults:
             return native_faults
         return faultless if self.separation is None else faultless_apart

@@ -8,6 +8,7 @@ from gne_mj.game_check import refuse
 from gne_mj.system import checks
 from gne_mj.system.apart import check_separation
 from gne_mj.system.assembly import Assembly
+from gne_mj.system.guard import check_guard
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,6 +32,8 @@ class System(Assembly):
         schedule: how the penalty falls to rho in time; None if it does not change.
         decentralised: mode implicit: each agent finds its input alone and keeps to its share of
             what is left of every bound (:mod:`gne_mj.loops.local`).
+        between: "watched", or "guarded": held modes cut a control period before it leads outside
+            (:mod:`gne_mj.loops.guard`).
         faults: what goes wrong (:mod:`gne_mj.faults`).
         seed: of what is random in the faults.
         disturbance: what the game's tightening is meant to cover; None if nothing is declared.
@@ -71,3 +74,4 @@ class System(Assembly):
         checks.check_faults(self)
         checks.check_network(self)
         check_separation(self)
+        check_guard(self)

@@ -73,7 +73,13 @@ def held_for(system: System, timestep: float, steps: int) -> System:
     if system.disturbance is None:
         return system
     game = with_margin(
-        system.game, system.agents, system.disturbance, timestep, system.integrator, steps
+        system.game,
+        system.agents,
+        system.disturbance,
+        timestep,
+        system.integrator,
+        steps,
+        system.guarded,
     )
     return replace(system, game=game)
 

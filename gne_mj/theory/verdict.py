@@ -1,5 +1,6 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import mode_of
 from gne_mj.theory.assumption import ASSUMED
 from gne_mj.theory.commanded_input import limited
@@ -8,6 +9,20 @@ from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
 NOTHING = "nothing"
+_AT_INSTANTS = (
+    "at every control instant every shared constraint holds, from every interior start, unless the"
+    " input of the period before was not found accurately (a run counts those: not_accurate)"
+)
+_BETWEEN = (
+    "at every integration step every shared constraint holds, from every interior start: control"
+    " periods that would lead outside are cut (a run counts those: periods_cut); should no input of"
+    " one step be found that leads inside, the run ends before it, as exit_foreseen"
+)
+_FORESEEN = (
+    "without disturbances the run does not leave the set at any integration step: control periods"
+    " that would lead outside are cut, and where one step would, the run ends before it, as"
+    " exit_foreseen"
+)
 
 
 def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]:
@@ -32,11 +47,10 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
         ]
     if held is not None and held.promised:
         terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
-        return [
-            "at every control instant every shared constraint holds, from every interior start,"
-            " unless the input of the period before was not found accurately (a run counts those:"
-            " not_accurate)" + (f", provided {' and '.join(terms)}" if terms else "")
-        ]
+        promise = _BETWEEN if held.system.guarded else _AT_INSTANTS
+        return [promise + (f", provided {' and '.join(terms)}" if terms else "")]
+    if held is None and system.guarded and has_ode(system.agents.kind):
+        return [_FORESEEN]
     if not theorem.obstacles:
         return [
             "nothing of this run; the same law in continuous time is covered by the theorem"
@@ -101,7 +115,11 @@ def not_certified(
         found.append(f"{what}: every theorem of the paper is in continuous time, none covers this")
     if held is not None:
         found += [f"[{c.label}] {c.status}: {c.why}" for c in held.conditions if not c.granted]
-        found.append("between two control instants: measured, and reported if the set is left")
+        found.append(
+            "between two integration steps: nothing is looked at there"
+            if held.system.guarded and held.promised
+            else "between two control instants: measured, and reported if the set is left"
+        )
     if theorem.status == CONDITIONAL:
         found.append(
             "that the given epsilon is small enough; and a Lyapunov function: V's decrease is"

@@ -39,11 +39,11 @@ class ZeroOrderHold:
         bound = self.system.disturbance
         return self._influence(0 if bound is None else bound.delay)
 
-    def _influence(self, delay: int) -> Influence | None:
+    def _influence(self, delay: int, steps: int | None = None) -> Influence | None:
         system, clock = self.system, self.clock
         if not has_ode(system.agents.kind):
             return None
-        steps = clock.steps(clock.control_period)
+        steps = clock.steps(clock.control_period) if steps is None else steps
         return influence(system.agents, clock.timestep, system.integrator, steps, delay)
 
     @cached_property
@@ -84,6 +84,7 @@ class ZeroOrderHold:
             "least_slope": None if effect is None else effect.least_slope.tolist(),
             "slope_exact": None if effect is None else effect.exact,
             "tightening": system.game.margins.tolist(),
+            "between": system.between,
             "disturbance": None
             if bound is None
             else {
@@ -109,6 +110,8 @@ class ZeroOrderHold:
             return None
         if self.system.decentralised:
             return 0.0
+        if self.system.guarded:  # more is not left room for at the steps on the way
+            return float(np.min(bound.push))
         besides = Disturbance(np.zeros(m), np.maximum(bound.noise, declared.noise))
         return largest_push(self.system.game, effect, besides, self.system.game.margins)
 
@@ -142,7 +145,9 @@ class ZeroOrderHold:
         return Assumption(label, ASSUMED, "F monotone, which nothing that was looked at refutes")
 
     def _slopes(self) -> Assumption:
-        label, effect = "dy+/du > 0", self.influence
+        label, guarded = "dy+/du > 0", self.system.guarded
+        effect = self._influence(0, 1) if guarded else self.influence
+        span = "an integration step, down to which periods are cut" if guarded else "a period"
         if effect is None:
             return Assumption(
                 label, UNKNOWN, "of MJCF robots no ODE is known: checked in every period of a run"
@@ -152,11 +157,11 @@ class ZeroOrderHold:
             return Assumption(
                 label,
                 MET,
-                f"at least {least:.4g} over a period"
+                f"at least {least:.4g} over {span}"
                 + (", exactly" if effect.exact else ", for all states"),
             )
         if effect.exact:
-            return Assumption(label, FAILS, f"it is {least:.4g} over a period")
+            return Assumption(label, FAILS, f"it is {least:.4g} over {span}")
         return Assumption(
             label, UNKNOWN, "no bound for all states is positive: checked in every period of a run"
         )

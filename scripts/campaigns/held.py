@@ -1,4 +1,7 @@
-"""Random runs of modes implicit and sampled: who leaves the set, when, and whether it is seen."""
+"""Random runs of modes implicit and sampled: who leaves the set, when, and whether it is seen.
+
+With a guard between control instants none of either mode may leave at any integration step.
+"""
 
 import time
 from collections import Counter
@@ -17,29 +20,39 @@ from gne_mj.margins import influence
 RUNS_A_FLEET = 100
 DECADES = (1e-4, 1e-3, 5e-3, 2e-2, 0.1, 0.3, 1.01)  # s, edges of the table's rows
 VARIANTS = ("implicit", "decentralised", "sampled")
+GUARDED = tuple(f"guarded {variant}" for variant in VARIANTS)
 
 
-def campaign(runs: int, seed: int, processes: int) -> tuple[list[str], int, dict[str, int]]:
+def campaign(
+    runs: int, seed: int, processes: int, guarded: bool = False
+) -> tuple[list[str], int, dict[str, int]]:
     """Tables of what came out, how many promises were broken, and all counts."""
     started, total = time.perf_counter(), Counter[tuple[str, str, str]]()
-    jobs = [(seed, job) for job in range(-(-runs // RUNS_A_FLEET))]
+    variants = GUARDED if guarded else VARIANTS
+    jobs = [(seed, job, variants) for job in range(-(-runs // RUNS_A_FLEET))]
     with ProcessPoolExecutor(processes) as pool:
         for counts in progress(pool.map(_fleet, jobs), len(jobs), "fleets"):
             total.update(counts)
     broken = sum(
         n for key, n in total.items()
-        if key[2] in UNSEEN or (key[0] != "sampled" and key[2] == BROKEN)
+        if key[2] in UNSEEN
+        or (key[0] != "sampled" and key[2] == BROKEN)
+        or (guarded and key[2].startswith("left"))
     )  # fmt: skip
-    lines = [*table(total), f"{time.perf_counter() - started:.0f} s; promises broken: {broken}"]
+    lines = [
+        *table(total, variants),
+        f"{time.perf_counter() - started:.0f} s; promises broken: {broken}",
+    ]
     return lines, broken, {" | ".join(key): n for key, n in sorted(total.items())}
 
 
 BROKEN, UNSEEN = "left at an instant, promised", ("silent", "misdated")
 
 
-def _fleet(job: tuple[int, int]) -> Counter[tuple[str, str, str]]:
-    """All variants of the runs of one fleet, counted by (variant, period, outcome)."""
-    fleet = Fleet(np.random.default_rng(list(job)))
+def _fleet(job: tuple[int, int, tuple[str, ...]]) -> Counter[tuple[str, str, str]]:
+    """These variants of the runs of one fleet, counted by (variant, period, outcome)."""
+    *numbers, variants = job
+    fleet = Fleet(np.random.default_rng(numbers))
     counts = Counter[tuple[str, str, str]]()
     plants: dict[str, Any] = {}
     for _ in range(RUNS_A_FLEET):
@@ -53,9 +66,13 @@ def _fleet(job: tuple[int, int]) -> Counter[tuple[str, str, str]]:
             )
         )  # fmt: skip
         row = _row(draw.clock.control_period)
-        for variant in VARIANTS:
-            mode = "sampled" if variant == "sampled" else "implicit"
-            system = replace(draw.system, mode=mode, decentralised=variant == "decentralised")
+        for variant in variants:
+            system = replace(
+                draw.system,
+                mode="sampled" if "sampled" in variant else "implicit",
+                decentralised="decentralised" in variant,
+                between="guarded" if "guarded" in variant else "watched",
+            )
             for outcome in _outcomes(replace(draw, system=system), plants, variant, promised):
                 counts[variant, row, outcome] += 1
     return counts
@@ -89,10 +106,14 @@ def _outcomes(draw: Draw, plants: dict[str, Any], variant: str, promised: bool) 
             found.append("misdated")
         if code == watch.DIVERGED:
             found.append("diverged")
+        elif code == watch.FORESEEN:
+            found.append("ended before it left")
         elif step % period == 0:
             found.append(f"left at an instant, {'promised' if promised else 'not promised'}")
         else:
             found.append("left between instants")
+    if monitor.cut > 0:
+        found.append("with a period cut")
     if monitor.unsolved > 0:
         found.append("not accurate")
     if monitor.not_monotone > 0:
@@ -109,11 +130,11 @@ def _row(period: float) -> str:
     return "other"
 
 
-def table(total: Counter[tuple[str, str, str]]) -> list[str]:
+def table(total: Counter[tuple[str, str, str]], variants: tuple[str, ...]) -> list[str]:
     """Markdown, a table for each variant."""
     lines = []
     rows = [_row(low) for low in DECADES[:-1]]
-    for variant in VARIANTS:
+    for variant in variants:
         outcomes = sorted({key[2] for key in total if key[0] == variant} - {"runs"})
         lines += ["", f"{variant}", "", "| period | runs | " + " | ".join(outcomes) + " |"]
         lines.append("|---" * (len(outcomes) + 2) + "|")

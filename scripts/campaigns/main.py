@@ -15,6 +15,9 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=100_000, help="of each mode")
     parser.add_argument("--margin-runs", type=int, default=10_000, help="under disturbances")
     parser.add_argument("--ratios", action="store_true", help="certified and breaking pushes too")
+    parser.add_argument(
+        "--guarded-runs", type=int, default=10_000, help="of each mode, guarded between instants"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, help="JSON file for the counts of the first part")
@@ -27,6 +30,16 @@ def main() -> int:
         print("\n".join(lines), flush=True)
         if options.out:
             options.out.write_text(json.dumps(counts, indent=2) + "\n", encoding="utf-8")
+    if options.guarded_runs:
+        lines, left, _ = held.campaign(
+            options.guarded_runs, options.seed, options.processes, guarded=True
+        )
+        print("\n".join(lines), flush=True)
+        broken += left
+        few = options.guarded_runs // 5
+        lines, left = margins.campaign(few, options.seed, options.processes, guarded=True)
+        print("\n".join(["", "guarded, within margins", "", *lines]), flush=True)
+        broken += left
     if options.margin_runs:
         lines, left = margins.campaign(options.margin_runs, options.seed, options.processes)
         print("\n".join(["", "within margins", "", *lines]), flush=True)

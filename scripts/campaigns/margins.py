@@ -16,7 +16,7 @@ from gne_mj.faults import Fault, Noise, Push, SensorDelay, sensor_delay
 from gne_mj.games import osnr_game, ten_channels, velocity_game
 from gne_mj.graph import ring
 from gne_mj.loops import monitor as watch
-from gne_mj.margins import Disturbance, influence, tightening
+from gne_mj.margins import Disturbance, with_margin
 from gne_mj.plants import flexible_robot, pi_cascade
 from gne_mj.plants.agents import Agents
 from gne_mj.scenario import load_scenario
@@ -30,10 +30,10 @@ BROKEN_BY = (BROKEN, "ended without an action")
 H = 0.002
 
 
-def campaign(runs: int, seed: int, processes: int) -> tuple[list[str], int]:
+def campaign(runs: int, seed: int, processes: int, guarded: bool = False) -> tuple[list[str], int]:
     """Lines that tell what came out, and how many runs left."""
     started, total = time.perf_counter(), Counter[str]()
-    jobs = [(seed, job) for job in range(-(-runs // RUNS_A_JOB))]
+    jobs = [(seed, job, guarded) for job in range(-(-runs // RUNS_A_JOB))]
     with ProcessPoolExecutor(processes) as pool:
         for counts in progress(pool.map(_job, jobs), len(jobs), "under disturbances"):
             total.update(counts)
@@ -42,15 +42,16 @@ def campaign(runs: int, seed: int, processes: int) -> tuple[list[str], int]:
     return lines, sum(n for key, n in total.items() if key.endswith(BROKEN_BY))
 
 
-def _job(key: tuple[int, int]) -> Counter[str]:
-    rng, counts = np.random.default_rng(list(key)), Counter[str]()
+def _job(job: tuple[int, int, bool]) -> Counter[str]:
+    *key, guarded = job
+    rng, counts = np.random.default_rng(key), Counter[str]()
     kind = ("robots, MuJoCo", "robots, partial information", "channels")[key[1] % 3]
     plant: Any = None
     m = 10 if kind == "channels" else 5
     agents = _channels() if kind == "channels" else _robots(rng)
     while sum(n for name, n in counts.items() if "refused" not in name) < RUNS_A_JOB:
         try:
-            system, clock = _draw(rng, kind, agents, m)
+            system, clock = _draw(rng, kind, agents, m, guarded)
         except InvalidInput:
             counts[f"{kind}, refused (disturbances use up a bound)"] += 1
             continue
@@ -67,7 +68,7 @@ def _job(key: tuple[int, int]) -> Counter[str]:
         code, between = loop.monitor.exit, loop.monitor.exit_between > 0
         how = "inside"
         if code == watch.LEFT_SET:
-            how = "left between instants only" if between else BROKEN
+            how = "left between instants only" if between and not guarded else BROKEN
         elif code != watch.INSIDE:
             how = "ended without an action"
         if how.endswith(BROKEN_BY):
@@ -86,15 +87,17 @@ def _channels() -> Agents:
     return Agents(pi_cascade, np.tile([1.0, 0.5], (10, 1)), np.full(10, np.inf))
 
 
-def _draw(rng: np.random.Generator, kind: str, agents: Agents, m: int) -> tuple[System, Clock]:
+def _draw(
+    rng: np.random.Generator, kind: str, agents: Agents, m: int, guarded: bool
+) -> tuple[System, Clock]:
     channels = kind == "channels"
     push = 10.0 ** rng.uniform(-2, 0) if channels else 10.0 ** rng.uniform(-0.5, 1.3)
     noise = 10.0 ** rng.uniform(-5, -3 if channels else -1.7)
-    delay, steps = int(rng.integers(0, 3)), int(rng.integers(1, 8))
+    delay, steps = int(rng.integers(0, 1 if guarded else 3)), int(rng.integers(1, 8))
+    steps *= 4 if guarded else 1
     bound = Disturbance(np.full(m, push), np.full(m, noise), delay)
     game = osnr_game(**ten_channels()) if channels else velocity_game(5, 3.0, 3.0)
-    effect = influence(agents, H, "euler", steps, delay)
-    game = game.tightened(tightening(game, effect.of(bound)))
+    game = with_margin(game, agents, bound, H, "euler", steps, guarded)
     if channels:
         room = np.min(game.margins[:10]), 2.5 - game.margins[10]
         share = rng.dirichlet(np.ones(11))[:10] * 0.98
@@ -114,6 +117,7 @@ def _draw(rng: np.random.Generator, kind: str, agents: Agents, m: int) -> tuple[
         integrator="euler", engine="mujoco" if "MuJoCo" in kind else "ode",
         memory=law.initial_memory(y), faults=tuple(_faults(rng, push, noise, delay, period, m)),
         seed=int(rng.integers(2**31)), disturbance=bound,
+        between="guarded" if guarded else "watched",
     ), Clock(150 * period, H, period, 150 * period)  # fmt: skip
 
 

@@ -17,17 +17,16 @@ from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
-from gne_mj.loops import apart, functions, joint, link, local
+from gne_mj.loops import apart, functions, guard, implicit, joint, link, local
 from gne_mj.loops.feedback import Order
-from gne_mj.loops.newton import solver_length
 from gne_mj.loops.ode import IMPLICIT
 from gne_mj.margins import influence
-from gne_mj.plants import zero_order_hold
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.base import Plant
 from gne_mj.plants.ode import OdePlant
 from gne_mj.system.clock import Clock
 from gne_mj.system.data import SystemData
+from gne_mj.system.guard import acting, room_for
 from gne_mj.system.modes.mode import Array, Figure, Mode, entry, seen_or_none
 
 
@@ -38,6 +37,7 @@ class Implicit(Mode):
     native = IMPLICIT
     promises = True
     keeps_apart = True
+    guards = True
     section = "implicit"
     figures = (
         Figure("solutions", entry("solutions")),
@@ -55,21 +55,13 @@ class Implicit(Mode):
 
     def prediction(self, system: SystemData) -> Mapping[int, Any]:
         """The law's barrier-free part, the equation's solver, and what a control instant does."""
-        plant: ModuleType = zero_order_hold
-        at: Any = ()
-        if not has_ode(system.agents.kind):
-            from gne_mj.plants import (
-                mjcf_prediction,
-                native_mujoco,
-            )  # late: MuJoCo is slow to import
-
-            plant, at = mjcf_prediction, native_mujoco.offsets()
         equation = self.equation(system)
         alone = equation.ALONE
+        find = guard.act if system.guarded else implicit.act
         return {
             **link.of_implicit(system.law.kernels, system.game.kernels, alone),
             functions.SOLVE: link.solve(equation),
-            functions.ACT: link.act(plant, system.fault_kernels, at),
+            functions.ACT: acting(system, find),
         }
 
     def rows(self, system: SystemData) -> Order:
@@ -88,13 +80,7 @@ class Implicit(Mode):
 
     def solver_length(self, system: SystemData, rows: Order) -> int:
         """Newton's arrays."""
-        game = system.game
-        return int(
-            solver_length(
-                game.actions, game.constraints_count, len(game.actions_in_constraints[1]),
-                system.agents.states, int(rows.band[0]),
-            )
-        )  # fmt: skip
+        return room_for(system, rows)
 
     def shares_slack(self, system: SystemData) -> bool:
         """Under the paper's laws whose barriers are at what is measured."""

@@ -49,6 +49,7 @@ class Mode:
         promises: whether inputs are solved for such that the outputs which they lead to are inside
             (:mod:`gne_mj.theory.zero_order_hold` says when that is certain).
         keeps_apart: whether agents can keep apart in it (:mod:`gne_mj.loops.separation`).
+        guards: whether it can cut periods before they lead outside (:mod:`gne_mj.loops.guard`).
         section: of a run's report, for :meth:`report`; empty for none.
         figures: that batches keep of each run.
     """
@@ -58,8 +59,13 @@ class Mode:
     held: ClassVar[bool] = True
     promises: ClassVar[bool] = False
     keeps_apart: ClassVar[bool] = False
+    guards: ClassVar[bool] = False
     section: ClassVar[str] = ""
     figures: ClassVar[tuple[Figure, ...]] = ()
+
+    def native_of(self, system: SystemData) -> int:
+        """What this system's loop does."""
+        return self.native
 
     # ------------------------------------------------------------------------- what it solves
 
