@@ -79,7 +79,7 @@ class Assembly(SystemData):
         assert isinstance(law.graph, ChangingGraph)
 
         def propagator(lists: GraphData) -> Propagator:
-            return law.propagator(clock.control_period, lists)
+            return law.propagator(self._moved_by(clock), lists)
 
         return ChangingNetworkLoop(
             loop, setup, law.graph, self.places, propagator if held else None, self.seed
@@ -158,7 +158,7 @@ class Assembly(SystemData):
         mode.check_period(self, clock)
         settings = self.law_settings(self.rho)
         with named(period="clock.control_period"):
-            moved = clock.timestep if self.guarded else clock.control_period
+            moved = self._moved_by(clock)
             propagator = self.law.propagator(moved) if mode.held else no_propagator()
         problem = Problem(
             data=self.game.data,
@@ -188,6 +188,10 @@ class Assembly(SystemData):
             *self._sizes,
             rtol=self.rtol,
         )
+
+    def _moved_by(self, clock: Clock) -> float:
+        """How long in s a law's memory moves at once in the held modes."""
+        return clock.timestep if self.guarded else clock.control_period
 
     @property
     def typical_sizes(self) -> NDArray[np.float64]:
