@@ -129,13 +129,7 @@ def certify_run(
     (settled,) = run_metrics.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     holding = kept_apart.holding(system, time, action, (status, duration, tolerance))
-    message += kept_apart.held_text(holding)
-    between = int(np.sum(np.any(np.isnan(inputs), axis=1)))
-    if between and monitor.exit == watch.INSIDE:
-        message += (
-            f"; at {between} sample times the state interpolated between two integration steps is"
-            " outside, though both steps are inside"
-        )
+    message += kept_apart.held_text(holding) + _interpolated_text(inputs, monitor)
     return Certificate(
         status=status,
         message=message,
@@ -156,6 +150,17 @@ def certify_run(
         steps=int(monitor.steps),
         end_time=float(time[-1]),
         wall_time=wall_time,
+    )
+
+
+def _interpolated_text(inputs: NDArray[np.float64], monitor: Any) -> str:
+    """What is added to a status where samples between steps have no input."""
+    missing = int(np.sum(np.any(np.isnan(inputs), axis=1)))
+    if not missing or monitor.exit != watch.INSIDE:
+        return ""
+    return (
+        f"; at {missing} sample times the state interpolated between two integration steps is"
+        " outside, though both steps are inside"
     )
 
 
