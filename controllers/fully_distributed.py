@@ -4,7 +4,9 @@ epsilon z_i' = y_i - z_i, epsilon d/dt **y**^i_-i = -S_i sum_j (**y**^i - **y**^
 u_i = -k [dJ_i/dy_i(y_i, **y**^i_-i) + dphi/dy_i(z_i, **y**^i_-i)]. The barrier is evaluated at
 estimates, which can leave the interior: then no action exists, and that is reported.
 
-The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`), then z (m,).
+The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`), then z (m,). Where
+agents keep only the estimates that matter, kernels and memory are those of
+:mod:`gne_mj.controllers.distributed_kept`.
 """
 
 import sys
@@ -22,15 +24,17 @@ from gne_mj.controllers.estimates import (
     move_estimates,
     prepare,
 )
+from gne_mj.controllers.kept import Kept
 from gne_mj.controllers.law import (
     ESTIMATES,
+    KEPT_ESTIMATES,
     Law,
     MemoryPart,
     check_positive,
     initial_estimates,
 )
 from gne_mj.controllers.settings import EPSILON, GAIN
-from gne_mj.controllers.table import NetworkTable
+from gne_mj.controllers.table import EstimatesTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
@@ -48,6 +52,7 @@ class FullyDistributed(Law):
         graph: over which agents communicate.
         epsilon: time constant of estimates and z in s, positive.
         gain: k, positive.
+        kept: which estimates agents keep; all if left out.
     """
 
     information: ClassVar[str] = "distributed"
@@ -65,14 +70,22 @@ class FullyDistributed(Law):
     graph: Graph = field()  # these two hide the base class's defaults
     epsilon: float = field()
     gain: float = 1.0
+    kept: Kept | None = None
 
     def __post_init__(self) -> None:
         check_positive(self, "epsilon", "gain")
+        if self.kept is not None:
+            parts = KEPT_ESTIMATES, self.memory_parts[1]
+            vars(self).update(memory_parts=parts, rosenbrock=False)
 
     @property
     def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
+        """This module; of kept estimates that for these."""
+        if self.kept is None:
+            return sys.modules[__name__]
+        from gne_mj.controllers import distributed_kept  # which uses this module
+
+        return distributed_kept
 
     def settings(self, rho: float) -> NDArray[np.float64]:
         """See the base class."""
@@ -99,7 +112,10 @@ class FullyDistributed(Law):
                 f"shape {z.shape}",
                 f"it must be one number or a list of {len(y)}",
             )
-        estimates = initial_estimates(self.graph.agents, y, estimate)
+        if self.kept is None:
+            estimates = initial_estimates(self.graph.agents, y, estimate)
+        else:
+            estimates = self.kept.initial(y, estimate)
         return np.concatenate([estimates, np.broadcast_to(z, y.shape)])
 
     def barrier_profiles(
@@ -107,8 +123,13 @@ class FullyDistributed(Law):
     ) -> NDArray[np.float64]:
         """(z_i, **y**^i_-i) of all agents."""
         agents, m = self.graph.agents, len(game_actions)
-        profiles = memory[: agents * m].reshape(agents, m).copy()
-        profiles[game_actions, np.arange(m)] = memory[agents * m :]
+        z = memory[-m:]
+        if self.kept is None:
+            profiles = memory[: agents * m].reshape(agents, m).copy()
+        else:  # of what an agent does not keep its barrier has nothing
+            profiles = np.tile(z, (agents, 1))
+            profiles[self.kept.holder, self.kept.action] = memory[: self.kept.size]
+        profiles[game_actions, np.arange(m)] = z
         return profiles
 
 
@@ -231,7 +252,7 @@ def storage(problem, memory):
 
 
 @LAWS.register
-class DistributedController(NetworkTable):
+class DistributedController(EstimatesTable):
     """Neighbours' messages and nothing else [eq:CenterFeedback]"""
 
     information: Literal["distributed"]
@@ -242,4 +263,6 @@ class DistributedController(NetworkTable):
 
     def build(self, game: Game) -> Law:
         """The law."""
-        return FullyDistributed(self.network(game.agents), self.epsilon, self.gain)
+        graph = self.network(game.agents)
+        kept = self.kept_of(game, graph, constraints=True)
+        return FullyDistributed(graph, self.epsilon, self.gain, kept)

@@ -36,6 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers import settings
+from gne_mj.controllers.kept import EVERYTHING, Kept, KeptData
 from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput, named
@@ -51,14 +52,18 @@ class MemoryPart(NamedTuple):
         name, long_name: of the variable.
         rows: whether it is a row of all actions for each agent, (N, m): what each takes them to
             be, its own entries being no matter; else one row, (m,).
+        kept: which of these rows' entries there are, if not all: those of the law's ``kept``, and
+            room for a profile behind them.
     """
 
     name: str
     long_name: str
     rows: bool = False
+    kept: bool = False
 
 
 ESTIMATES = MemoryPart("estimate", "what each agent takes the actions to be", rows=True)
+KEPT_ESTIMATES = MemoryPart("estimate", "what an agent takes an action to be", kept=True)
 
 
 class Law(ABC):
@@ -78,6 +83,7 @@ class Law(ABC):
         alone: in mode implicit, whether each agent solves alone because its barrier is at what it
             takes for the profile. Others may (``decentralised``), or solve all together.
         rosenbrock: whether integrator rosenbrock knows its Jacobian.
+        kept: the estimates that it keeps, where these are not all.
         propagates: whether its memory can be propagated, as mode sampled needs.
         guarded: whether the barrier's whole gradient at the measured outputs is part of the input,
             so that outputs which are measured and driven as they should be cannot leave the set in
@@ -94,6 +100,7 @@ class Law(ABC):
     memory_parts: ClassVar[tuple[MemoryPart, ...]] = ()
     alone: ClassVar[bool] = False
     rosenbrock: ClassVar[bool] = False
+    kept: Kept | None = None
     propagates: bool = True
     guarded: ClassVar[bool] = False
 
@@ -106,7 +113,7 @@ class Law(ABC):
     @property
     def has_estimates(self) -> bool:
         """Whether agents hold estimates of each other's actions."""
-        return any(part.rows for part in self.memory_parts)
+        return any(part.rows or part.kept for part in self.memory_parts)
 
     @property
     def implicit(self) -> bool:
@@ -122,6 +129,34 @@ class Law(ABC):
     def graph_data(self) -> GraphData:
         """The graph for native code; nobody hears anybody without one."""
         return self.graph.data if self.graph is not None else _NOBODY
+
+    @property
+    def kept_data(self) -> KeptData:
+        """Which estimates it keeps, for native code; empty where these are all, or none."""
+        return EVERYTHING if self.kept is None else self.kept.data
+
+    @property
+    def listeners(self) -> NDArray[np.int64]:
+        """How many neighbours each agent's action is coupled to, (N,)."""
+        assert self.graph is not None
+        return np.diff(self.graph.data.pointer) if self.kept is None else self.kept.links
+
+    def estimates_in(
+        self, memory: NDArray[np.float64], owner: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """All estimates in a memory, (k,): of which entry of a profile each is, and what it says.
+
+        Args:
+            memory: the law's.
+            owner: the agent that each entry of a profile belongs to, (m,).
+        """
+        if self.kept is not None:
+            others = self.kept.estimated
+            return self.kept.action[others], memory[: self.kept.size][others]
+        agents, m = int(owner[-1]) + 1, len(owner)
+        others = owner != np.arange(agents)[:, None]
+        rows = memory[: agents * m].reshape(agents, m)
+        return np.broadcast_to(np.arange(m), (agents, m))[others], rows[others]
 
     @property
     def estimate_rate(self) -> float:
@@ -178,6 +213,8 @@ class Law(ABC):
         if self.graph is None:
             return no_propagator()
         with named(duration="period"):
+            if self.kept is not None:
+                return self.kept.propagator(self.estimate_rate * period)
             return propagator(lists or self.graph_data, self.estimate_rate * period)
 
 

@@ -7,7 +7,9 @@ takes away the inertia that estimates add to the agents: each of them acts on ag
 mass tied to it. The storage function is that of the agents plus tau/2 times the squared distance
 of all estimates from the equilibrium, and decreases as with tau = 1.
 
-The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`).
+The law's memory: N rows of estimates (see :mod:`gne_mj.controllers.estimates`); or, where agents
+keep only those that matter, what :mod:`gne_mj.controllers.kept` has, and the kernels are those of
+:mod:`gne_mj.controllers.partial_kept`.
 """
 
 import sys
@@ -20,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from gne_mj.barrier import weighted_gradient
+from gne_mj.controllers import partial_kept
 from gne_mj.controllers.estimates import (
     clear_others,
     estimate_rates,
@@ -27,15 +30,17 @@ from gne_mj.controllers.estimates import (
     move_estimates,
     prepare,
 )
+from gne_mj.controllers.kept import Kept
 from gne_mj.controllers.law import (
     ESTIMATES,
+    KEPT_ESTIMATES,
     Law,
     MemoryPart,
     check_positive,
     initial_estimates,
 )
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
-from gne_mj.controllers.table import NetworkTable
+from gne_mj.controllers.table import EstimatesTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.game_model import Game
 from gne_mj.graph import Graph
@@ -54,6 +59,7 @@ class PartialInformation(Law):
         graph: over which agents communicate.
         coupling: c, positive.
         time_constant: tau in s, positive.
+        kept: which estimates agents keep; all if left out.
     """
 
     information: ClassVar[str] = "partial"
@@ -67,14 +73,17 @@ class PartialInformation(Law):
     graph: Graph = field()  # hides the base class's default
     coupling: float = 1.0
     time_constant: float = 1.0
+    kept: Kept | None = None
 
     def __post_init__(self) -> None:
         check_positive(self, "coupling", "time_constant")
+        if self.kept is not None:
+            vars(self).update(memory_parts=(KEPT_ESTIMATES,))
 
     @property
     def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
+        """This module; of kept estimates that for these."""
+        return sys.modules[__name__] if self.kept is None else partial_kept
 
     @property
     def estimate_rate(self) -> float:
@@ -95,6 +104,8 @@ class PartialInformation(Law):
     ) -> NDArray[np.float64]:
         """See the base class."""
         super().initial_memory(y, filtered=filtered)
+        if self.kept is not None:
+            return self.kept.initial(y, estimate)
         return initial_estimates(self.graph.agents, y, estimate)
 
 
@@ -178,7 +189,7 @@ def storage(problem, memory):
 
 
 @LAWS.register
-class PartialController(NetworkTable):
+class PartialController(EstimatesTable):
     """Costs at estimates that neighbours exchange [eq:nonlinearPIFeedback]"""
 
     information: Literal["partial"]
@@ -189,4 +200,6 @@ class PartialController(NetworkTable):
 
     def build(self, game: Game) -> Law:
         """The law."""
-        return PartialInformation(self.network(game.agents), self.coupling, self.time_constant)
+        graph = self.network(game.agents)
+        kept = self.kept_of(game, graph, constraints=False)
+        return PartialInformation(graph, self.coupling, self.time_constant, kept)

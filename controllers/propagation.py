@@ -20,7 +20,7 @@ from gne_mj.native import kernel
 BLOCK = 64
 # The series ends where what is left out is below this, relative to the errors' size.
 _LEFT_OUT = 1e-15
-_LONGEST = 1e8  # half the bound times s: some 90,000 terms
+LONGEST = 1e8  # half the bound times s: some 90,000 terms
 
 
 class Propagator(NamedTuple):
@@ -31,6 +31,10 @@ class Propagator(NamedTuple):
     # of the Chebyshev polynomials in 2 L_j / bound - 1
     coefficients: Annotated[np.ndarray, "n"]
     numbers: Annotated[np.ndarray, "3"]  # [bound on the spectrum of L_j, s, exp(-s)]
+    # Where only some keep estimates of j: the map among these, one behind the other, and where
+    # each begins; -1 if a series stands for it (gne_mj.controllers.kept_propagation)
+    blocks: Annotated[np.ndarray, "n"] = np.zeros(0)
+    starts: Annotated[np.ndarray, "n", int] = np.zeros(0, dtype=np.int64)
 
 
 @kernel
@@ -61,19 +65,24 @@ def propagator(lists: GraphData, duration: float) -> Propagator:
     few = agents <= 64  # so that their maps stay small
     if few and half > 100.0:
         return Propagator(_dense(lists, duration), np.zeros(0), numbers)
-    if half > _LONGEST:
-        raise InvalidInput(
-            "duration",
-            f"{duration:.3g} time constants of the estimates",
-            f"{agents} agents on this graph allow at most {2.0 * _LONGEST / bound:.3g}",
-        )
-    coefficients = _series(half)
+    check_duration(agents, bound, duration)
+    coefficients = series_of(half)
     if few and agents * agents <= len(coefficients) * (agents + len(lists.neighbour)):
         return Propagator(_dense(lists, duration), np.zeros(0), numbers)
     return Propagator(np.zeros((0, 0, 0)), coefficients, numbers)
 
 
-def _series(half: float) -> np.ndarray:
+def check_duration(agents: int, bound: float, duration: float) -> None:
+    """Refuse a period for which the series would have too many terms."""
+    if 0.5 * bound * duration > LONGEST:
+        raise InvalidInput(
+            "duration",
+            f"{duration:.3g} time constants of the estimates",
+            f"{agents} agents on this graph allow at most {2.0 * LONGEST / bound:.3g}",
+        )
+
+
+def series_of(half: float) -> np.ndarray:
     """Coefficients of exp(-half (1 + x)) in T_0(x), T_1(x), ... on [-1, 1]."""
     from scipy.special import ive  # slow to load, and for laws with estimates only
 

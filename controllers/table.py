@@ -5,8 +5,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gne_mj.changing_graph import disc, switching
+from gne_mj.changing_graph import ChangingGraph, disc, switching
+from gne_mj.controllers.keepers import fewest, given, readers
+from gne_mj.controllers.kept import Kept
 from gne_mj.controllers.law import Law
+from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.graph import NAMED, Graph
 from gne_mj.registry import MODES
@@ -94,3 +97,41 @@ def _fixed(given: GraphKey, count: int) -> Graph:
     if isinstance(given, str):
         return NAMED[given](count)
     return Graph(count, tuple((i - 1, j - 1) for i, j in given))
+
+
+class EstimatesTable(NetworkTable):
+    """A law whose agents keep estimates of one another."""
+
+    estimates: Literal["all", "needed"] | list[list[int]] = Field(
+        "all",
+        description="of whom agents keep estimates: all, those that costs (and barriers at"
+        " estimates) need and what must be passed on of them, or a list of agents numbered from 1"
+        " for each agent",
+    )
+
+    def kept_of(self, game: Game, graph: Graph, *, constraints: bool) -> Kept | None:
+        """What agents keep; None where that is everything.
+
+        Args:
+            game: what is played.
+            graph: over which agents communicate.
+            constraints: whether agents' own constraints are at estimates too.
+
+        Raises:
+            InvalidInput: lists of one's own that do not do.
+        """
+        if self.estimates == "all":
+            return None
+        if isinstance(graph, ChangingGraph):
+            raise InvalidInput(
+                "estimates",
+                self.estimates,
+                "who must pass on what changes with the graph: it must be 'all' over a graph that"
+                " changes",
+            )
+        wanted = readers(game.data, constraints=constraints)
+        if self.estimates == "needed":
+            keepers = fewest(graph, wanted)
+        else:
+            keepers = given(graph, wanted, [[j - 1 for j in row] for row in self.estimates])
+        return None if keepers.everyone else Kept(graph, game.data.offsets, keepers)

@@ -173,6 +173,13 @@ def coordinates_of(system: SystemData, time: NDArray[np.float64]) -> dict[str, A
     if axis_of(system) == "action":
         coordinates["owner"] = ("action", game.agent_of_action + 1)
         coordinates["axis"] = ("action", np.array(game.axis_of_action))
+    kept = system.law.kept
+    if kept is not None:
+        of = kept.action[kept.estimated]
+        coordinates["by_agent"] = ("kept", kept.holder[kept.estimated] + 1)
+        coordinates["of_agent"] = ("kept", game.agent_of_action[of] + 1)
+        if axis_of(system) == "action":
+            coordinates["of_axis"] = ("kept", np.array(game.axis_of_action)[of])
     return coordinates
 
 
@@ -304,7 +311,12 @@ def _memory(system: SystemData) -> Iterator[Variable]:
     game, at = system.game, 0
     for part in system.law.memory_parts:
         size = game.actions * (game.agents if part.rows else 1)
-        yield _estimates(part, at) if part.rows else _row(part, slice(at, at + size))
+        if part.kept:
+            assert system.law.kept is not None
+            yield _kept(part, np.flatnonzero(system.law.kept.estimated))
+            size += system.law.kept.size  # room for a profile is behind them
+        else:
+            yield _estimates(part, at) if part.rows else _row(part, slice(at, at + size))
         at += size
     if not at and len(system.loop_memory):
         yield Variable(
@@ -318,6 +330,13 @@ def _estimates(part: MemoryPart, at: int) -> Variable:
         part.name, ("time", "estimating_agent", AXIS),
         lambda rows: estimates_of(rows.system.game, rows.y, rows.samples.memory[:, at:]),
         unit=_action_unit, long_name=part.long_name, page="estimates",
+    )  # fmt: skip
+
+
+def _kept(part: MemoryPart, entries: NDArray[np.int64]) -> Variable:
+    return Variable(
+        part.name, ("time", "kept"), lambda rows: rows.samples.memory[:, entries],
+        unit=_action_unit, long_name=part.long_name,
     )  # fmt: skip
 
 

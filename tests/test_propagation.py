@@ -56,7 +56,7 @@ def series(graph, duration):
     found = propagator(graph.data, duration)
     if len(found.coefficients):
         return found
-    terms = propagation._series(0.5 * found.numbers[0] * duration)
+    terms = propagation.series_of(0.5 * found.numbers[0] * duration)
     return Propagator(np.zeros((0, 0, 0)), terms, found.numbers)
 
 

@@ -22,6 +22,7 @@ from gne_mj.interface.tables import made
 from gne_mj.python_objects import LawFunctions, PythonLaw, keep
 
 Network = Graph | str | Sequence[tuple[int, int]]
+Estimates = str | Sequence[Sequence[int]]
 
 
 @answering
@@ -44,6 +45,7 @@ def partial_information(
     *,
     coupling: float = 1.0,
     time_constant: float = 1.0,
+    estimates: Estimates = "all",
     mode: str = "continuous",
     decentralised: bool = False,
     between: str = "watched",
@@ -54,6 +56,8 @@ def partial_information(
         graph: over which agents communicate.
         coupling: c; the paper has 1.
         time_constant: tau of the estimates in s; the paper has 1.
+        estimates: of whom agents keep some: "all", the "needed" ones, or for each agent a list of
+            agents, numbered from 1.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
         between: "guarded" cuts periods of held modes before they lead outside.
@@ -67,6 +71,7 @@ def fully_distributed(
     *,
     epsilon: float,
     gain: float = 1.0,
+    estimates: Estimates = "all",
     mode: str = "continuous",
     decentralised: bool = False,
 ) -> LawTable:
@@ -76,6 +81,8 @@ def fully_distributed(
         graph: over which agents communicate.
         epsilon: time constant of estimates and z in s.
         gain: k.
+        estimates: of whom agents keep some: "all", the "needed" ones, or for each agent a list of
+            agents, numbered from 1.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
     """

@@ -11,6 +11,7 @@ memory has what came last over every link, and behind it a ring of the rows that
 import numpy as np
 
 from gne_mj import game_functions as games
+from gne_mj.controllers import kept_estimates
 from gne_mj.controllers.settings import LINKS
 from gne_mj.loops.faultless import begins as begins
 from gne_mj.loops.faultless import elapse as elapse
@@ -140,16 +141,22 @@ def read_sensors(parts, step, state):
 @kernel
 def corrupt(problem, clock, step, memory):
     """Shift an agent's estimates, once, at the first control instant from a fault's start on."""
-    faults, m, time = problem.faults, len(problem.data.owner), step * clock.h
+    faults, kept, m, time = problem.faults, problem.kept, len(problem.data.owner), step * clock.h
     for f in range(faults.pointer[CORRUPTION], faults.pointer[CORRUPTION + 1]):
         row = fault(faults, f)
         long = clock.h if clock.mode == 0 else clock.h * clock.period
         if row.start <= time + 5e-10 and time + 5e-10 < row.start + long:
             i = int(row.target)
-            for r in range(m):
+            first, last = 0, m
+            if len(kept.pointer) > 0:
+                first, last = kept.row_pointer[i], kept.row_pointer[i + 1]
+            for q in range(first, last):
+                r, at = q, i * m + q
+                if len(kept.pointer) > 0:
+                    r, at = kept.action[q], kept.entry[q]
                 if problem.data.owner[r] != i:
                     shift = 2.0 * uniform(faults.numbers.seed, row.stream, i * m + r, 0) - 1.0
-                    memory[i * m + r] += row.amount * shift
+                    memory[at] += row.amount * shift
 
 
 @kernel
@@ -186,15 +193,19 @@ def count_messages(faults, h, period, first, last, out):
 @kernel
 def exchange(problem, clock, step, memory, work):
     """Send all rows; over each link comes what was sent some periods ago, or nothing."""
-    data, graph, faults = problem.data, problem.graph, problem.faults
+    data, graph, kept, faults = problem.data, problem.graph, problem.kept, problem.faults
     agents, m, time = len(data.offsets) - 1, len(work.y), step * clock.h
-    count = count_of(clock, step)
-    links = int(problem.settings[LINKS])
-    ring, slots = links + len(graph.neighbour) * m, int(faults.numbers.message_delay) + 1
-    at = ring + (count % slots) * agents * m
-    for r in range(m):
-        memory[data.owner[r] * m + r] = work.measurement[r]
-    copy(memory[: agents * m], memory[at : at + agents * m])
+    count, links = count_of(clock, step), int(problem.settings[LINKS])
+    slots, all_kept = int(faults.numbers.message_delay) + 1, len(kept.pointer) == 0
+    size = agents * m if all_kept else kept_estimates.room(kept)
+    ring = links + (len(graph.neighbour) * m if all_kept else kept.came[len(kept.came) - 1])
+    if all_kept:
+        for r in range(m):
+            memory[data.owner[r] * m + r] = work.measurement[r]
+    else:
+        kept_estimates.prepare(problem, 0, agents, work.measurement, memory)
+    at = ring + (count % slots) * size
+    copy(memory[:size], memory[at : at + size])
     for link in range(len(graph.neighbour)):
         delay = 0
         for f in range(faults.pointer[LATE], faults.pointer[LATE + 1]):
@@ -202,8 +213,12 @@ def exchange(problem, clock, step, memory, work):
             if row.target == link and active(row, time):
                 delay = max(delay, int(row.amount))
         if comes(faults, time, count, link) and count >= delay:
-            sent = ring + ((count - delay) % slots) * agents * m + graph.neighbour[link] * m
-            copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
+            sent = ring + ((count - delay) % slots) * size
+            if all_kept:
+                sent += graph.neighbour[link] * m
+                copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
+            else:
+                kept_estimates.receive(kept, link, memory[sent : sent + size], memory[links:])
 
 
 @kernel

@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gne_mj import game_functions as games
+from gne_mj.controllers.kept import EVERYTHING, KeptData
 from gne_mj.controllers.propagation import Propagator, scratch_length
 from gne_mj.controllers.settings import RHO, Now
 from gne_mj.game_model import GameData
@@ -83,6 +84,7 @@ class Problem(NamedTuple):
     separation: Annotated[np.ndarray, "3"] = np.zeros(3)
     # where control periods may end early, of every step and constraint: gne_mj.loops.guard
     ahead: Annotated[np.ndarray, "n"] = np.zeros(0)
+    kept: KeptData = EVERYTHING  # the estimates that the law keeps, where these are not all
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
     parameter_block: int = 0

@@ -168,6 +168,7 @@ class Assembly(SystemData):
             equilibrium=self.centre,
             size=self.typical_sizes,
             propagator=propagator,
+            kept=self.law.kept_data,
             schedule=np.zeros(3) if self.schedule is None else self.schedule.numbers,
             order=self.rows,
             separation=np.zeros(3) if self.separation is None else self.separation.numbers,

@@ -28,7 +28,8 @@ ESTIMATES = 8
 def check_estimates(game: Game, law: Law) -> None:
     """Refuse laws whose agents' estimates, and what a loop makes of them, fill the memory."""
     if law.graph is not None:
-        size = ESTIMATES * game.agents * game.actions
+        kept = game.agents * game.actions if law.kept is None else law.kept.size
+        size = ESTIMATES * kept
         what = f"what {game.agents} agents estimate of each other"
         check_room("agents.count", game.agents, size, what)
 
@@ -91,8 +92,13 @@ def check_lists(system: SystemData, problem: Problem) -> None:
             f"neighbours {(neighbour[:6] + 1).tolist()}",
             f"there must be {pointer[-1]} of them, agents 1 to {agents}",
         )
-    maps, coefficients, _ = problem.propagator
-    if mode_of(system).held and not len(coefficients) and maps.shape != (agents,) * 3:
+    maps, coefficients = problem.propagator.maps, problem.propagator.coefficients
+    if (
+        system.law.kept is None
+        and mode_of(system).held
+        and not len(coefficients)
+        and maps.shape != (agents,) * 3
+    ):
         raise InvalidInput(
             key,
             f"a propagator of shape {maps.shape}",
@@ -186,8 +192,8 @@ def check_engine(system: SystemData) -> None:
         raise InvalidInput(
             "integrator",
             system.integrator,
-            "it is for engine 'ode', the distributed law and mode 'continuous'; use 'rk4' or"
-            " 'euler'",
+            "it is for engine 'ode', the distributed law with all estimates and mode"
+            " 'continuous'; use 'rk4' or 'euler'",
         )
 
 
@@ -244,6 +250,15 @@ def check_faults(system: SystemData) -> None:
     m, graph = system.game.actions, system.law.graph
     kept = (sensor_delay(system.faults) + 1) * m * (system.agents.states + 1)
     if strikes_messages(system.faults) and graph is not None:
-        kept += (2 * len(graph.edges) + (message_delay(system.faults) + 1) * graph.agents) * m
+        kept += _messages(system)
     check_room(key, "late", ESTIMATES * kept, "what was sent or measured before")
     mode_of(system).check_faults(system)
+
+
+def _messages(system: SystemData) -> int:
+    """Entries of what came last over every link, and of what was sent before."""
+    law, slots = system.law, message_delay(system.faults) + 1
+    assert law.graph is not None
+    if law.kept is not None:
+        return law.kept.heard_size + slots * law.kept.size
+    return (2 * len(law.graph.edges) + slots * law.graph.agents) * system.game.actions

@@ -141,5 +141,8 @@ class SystemData:
             return memory
         assert self.law.graph is not None
         m = self.game.actions
-        heard = links_memory(self.law.graph, m, memory, message_delay(self.faults))
+        delay = message_delay(self.faults)
+        if self.law.kept is not None:
+            return np.concatenate([memory, self.law.kept.heard(memory, delay)])
+        heard = links_memory(self.law.graph, m, memory, delay)
         return np.concatenate([memory, heard])

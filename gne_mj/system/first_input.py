@@ -53,6 +53,7 @@ def problem_at_start(system: System) -> Problem:
         limit=system.agents.input_limit,
         equilibrium=np.ascontiguousarray(system.start),  # nothing is measured from it here
         propagator=no_propagator(),
+        kept=system.law.kept_data,
         size=system.typical_sizes,
         functions=system.functions,
     )

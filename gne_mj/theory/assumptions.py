@@ -98,7 +98,7 @@ def plants(system: System) -> Assumption:
 
 def graph(system: System) -> Assumption:
     """[asmp:graph]: undirected and connected."""
-    found = system.law.graph
+    found, kept = system.law.graph, system.law.kept
     assert found is not None
     if isinstance(found, DiscGraph):
         return Assumption(
@@ -107,7 +107,10 @@ def graph(system: System) -> Assumption:
     if isinstance(found, SwitchingGraph):
         each = f"each of the {len(found.graphs)} graphs is undirected and connected"
         return Assumption("asmp:graph", MET, each)
-    return Assumption("asmp:graph", MET, f"undirected and connected, {len(found.edges)} edges")
+    why = f"undirected and connected, {len(found.edges)} edges"
+    if kept is not None:
+        why += "; so are the agents that keep each action, with its own agent"
+    return Assumption("asmp:graph", MET, why)
 
 
 def output_to_state(gain: Gain) -> Assumption:

@@ -11,14 +11,19 @@ mu |p|^2 - (theta_1 + theta_2) |p| |w| + (c lambda_2 - theta_2) |w|^2, which is 
 mu (c lambda_2 - theta_2) > theta_2^2, leaves theta_1 out: the *printed* one. Where F is affine, or
 the rows of dF/dy only change in length, the form itself is looked at, with what every such matrix
 has at least. That it is positive definite is sufficient for V to fall.
+
+Where agents keep only some estimates, all this holds column by column: L is that of the graph of
+those that keep the action, and lambda_2 the least of these graphs'.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.controllers.kept import Kept
 from gne_mj.graph import Graph
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.spectra import positive_definite
@@ -83,16 +88,22 @@ def needed_connectivity(slopes: Slopes) -> tuple[float, float]:
     return theta_2**2 / mu + theta_2, (theta_1 + theta_2) ** 2 / (4.0 * mu) + theta_2
 
 
-def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
-    """What the gain c must exceed on a graph, and whether it does; on the worst of one that
-    changes."""
-    connectivity = graph.algebraic_connectivity
+def coupling(slopes: Slopes, graph: Graph, gain: float, kept: Kept | None = None) -> Coupling:
+    """What the gain c must exceed on a graph, and whether it does.
+
+    Args:
+        slopes: what is known of dF/dy.
+        graph: over which agents communicate; of one that changes the worst counts.
+        gain: c.
+        kept: which estimates there are; all if left out.
+    """
+    connectivity = graph.algebraic_connectivity if kept is None else kept.connectivity
     sure = slopes.monotone
 
     def condition(least: float, certified: bool) -> Condition:
         return Condition(least, bool(gain > least), certified)
 
-    if graph.agents == 1:  # nobody to estimate
+    if graph.agents == 1 or connectivity == np.inf:  # nobody to estimate
         nothing = condition(0.0, sure)
         return Coupling(gain, nothing, nothing, None, slopes.label)
     printed, rigorous = (needed / connectivity for needed in needed_connectivity(slopes))
@@ -102,7 +113,8 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
         owner = slopes.game.agent_of_action
         if len(members) * len(_entries(bound.base, bound.loss, owner)[0]) ** 3 <= _WORK:
             least = max(
-                least_coupling(bound.base, each, owner, loss=bound.loss) for each in members
+                least_coupling(bound.base, each, owner, loss=bound.loss, kept=kept)
+                for each in members
             )
             quadratic = condition(least, sure)
     return Coupling(
@@ -111,7 +123,12 @@ def coupling(slopes: Slopes, graph: Graph, gain: float) -> Coupling:
 
 
 def least_coupling(
-    slope: Array, graph: Graph, owner: NDArray[np.int64], *, loss: Array | None = None
+    slope: Array,
+    graph: Graph,
+    owner: NDArray[np.int64],
+    *,
+    loss: Array | None = None,
+    kept: Kept | None = None,
 ) -> float:
     """The c above which the quadratic form with this dF/dy is positive definite.
 
@@ -127,6 +144,7 @@ def least_coupling(
         graph: of N >= 2 agents.
         owner: the agent that each action belongs to, (m,).
         loss: (m, m) rows w_r, by each of which w_r w_r' is taken from the part of r's owner.
+        kept: which estimates there are; all if left out.
 
     Returns:
         infinity if no c suffices.
@@ -138,7 +156,7 @@ def least_coupling(
         loss = np.zeros_like(slope)
     agent, column = _entries(slope, loss, owner)
     part = _second_term(slope, loss, owner, agent, column)
-    apart = _disagreements(graph, agent, column)
+    apart = _disagreements(_inverses(graph, owner, kept), agent, column)
     consensus = csr_array((np.ones(len(agent)), (np.arange(len(agent)), column)))
     try:
         factor = cho_factor((consensus.T @ part @ consensus).toarray())
@@ -186,20 +204,41 @@ def _second_term(
     return csr_array(entries, shape=shape)
 
 
+# Of an action and some of the agents that keep it, the part of the Laplacian's pseudo-inverse
+_Inverses = Callable[[int, NDArray[np.int64]], NDArray[Any]]
+
+
+def _inverses(graph: Graph, owner: NDArray[np.int64], kept: Kept | None) -> _Inverses:
+    """Pseudo-inverses but for a constant, which differences do not see."""
+    if kept is None:
+        inverse = np.linalg.inv(graph.laplacian + 1.0 / graph.agents)
+        return lambda _, known: inverse[np.ix_(known, known)]
+    found: dict[int, NDArray[Any]] = {}  # by graph, which many actions share
+
+    def of_keepers(r: int, known: NDArray[np.int64]) -> NDArray[Any]:
+        j = int(owner[r])
+        among, keepers = kept.among(j), kept.keepers.of[j]
+        if id(among) not in found:
+            found[id(among)] = np.linalg.inv(among.laplacian + 1.0 / among.agents)
+        order = np.argsort(keepers)
+        at = order[np.searchsorted(keepers, known, sorter=order)]
+        return found[id(among)][np.ix_(at, at)]
+
+    return of_keepers
+
+
 def _disagreements(
-    graph: Graph, agent: NDArray[np.int64], column: NDArray[np.int64]
+    inverse: _Inverses, agent: NDArray[np.int64], column: NDArray[np.int64]
 ) -> "csr_array":
     """The bases V_r side by side, (entries, entries - m)."""
     from scipy.linalg import helmert
     from scipy.sparse import block_diag, csr_array
 
-    # The pseudo-inverse but for a constant, which differences do not see
-    inverse = np.linalg.inv(graph.laplacian + 1.0 / graph.agents)
     bases = []
     for r in range(int(column[-1]) + 1):
         known = agent[column == r]
         apart = helmert(len(known)).T if len(known) > 1 else np.zeros((1, 0))
-        bases.append(apart @ np.linalg.cholesky(apart.T @ inverse[np.ix_(known, known)] @ apart))
+        bases.append(apart @ np.linalg.cholesky(apart.T @ inverse(r, known) @ apart))
     return csr_array(block_diag(bases))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
 from gne_mj.changing_graph import ChangingGraph
+from gne_mj.controllers.kept import Kept
 from gne_mj.errors import part_of
 from gne_mj.game_model import Box
 from gne_mj.graph import Graph
@@ -97,7 +98,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
             "continuous": theorem.continuous,
         },
         constants=_constants(theorem),
-        graph=None if law.graph is None else _graph(law.graph),
+        graph=None if law.graph is None else _graph(law.graph, law.kept),
         coupling=_coupling(theorem),
         gain=None if theorem.gain is None else asdict(theorem.gain),
         epsilon=None
@@ -151,12 +152,20 @@ def _system(system: System) -> dict[str, Any]:
     }
 
 
-def _graph(graph: Graph) -> dict[str, Any]:
+def _graph(graph: Graph, kept: Kept | None) -> dict[str, Any]:
     return {
         "edges": len(graph.edges),
         "lambda_2": graph.algebraic_connectivity,
         "lambda_max": graph.largest_eigenvalue,
         "changes": isinstance(graph, ChangingGraph),
+        "kept": None
+        if kept is None
+        else {
+            "estimates": len(kept.keeper) - graph.agents,
+            "of": graph.agents * (graph.agents - 1),
+            "lambda_2": kept.connectivity,
+            "smallest": bool(np.all(kept.keepers.smallest)),
+        },
     }
 
 
@@ -210,9 +219,8 @@ def _start(system: System, box: Box | None) -> dict[str, Any]:
             "margin": -float(values[agent, constraint]),
         }
     elif system.law.has_estimates:
-        away = np.abs(system.memory.reshape(game.agents, game.actions) - system.start)
-        away[game.agent_of_action, np.arange(game.actions)] = 0.0  # own blocks are no estimates
-        distance = float(np.max(away))
+        of, values = system.law.estimates_in(system.memory, game.agent_of_action)
+        distance = float(np.max(np.abs(values - system.start[of]), initial=0.0))
         found["estimates"] = {"largest_distance_from_actions": distance}
     return found
 

@@ -45,7 +45,7 @@ def linear_period(system: System, y: Array) -> float | None:
     game, law = system.game, system.law
     matrix = law.gain * (system.barrier.hessian(y) + game.pseudo_gradient_jacobian(y))
     if law.coupling and law.graph is not None:
-        neighbours = np.diff(law.graph.data.pointer)[game.agent_of_action]
+        neighbours = law.listeners[game.agent_of_action]
         matrix += law.coupling * np.diag(neighbours)
     values = spectra.eigenvalues(inverse[:, None] * matrix)
     values = values[values.real > 0]

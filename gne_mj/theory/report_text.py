@@ -41,6 +41,8 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f"lambda_2 = {graph['lambda_2']:.6g}, lambda_max = {graph['lambda_max']:.6g},"
             f" {graph['edges']} edges" + ", of the worst that it becomes" * graph["changes"],
         )
+        if graph["kept"] is not None:
+            yield "estimates", _kept(graph["kept"])
     if g["coupling"] is not None:
         yield from _coupling(g["coupling"])
     if g["gain"] is not None:
@@ -177,6 +179,15 @@ def _epsilon(epsilon: dict[str, Any], status: str) -> str:
         text += f", {outside:.4g} s does not"
     text += "; values between and beyond those tried are not known"
     return text + (f" ({search['note']})" if search["note"] else "")
+
+
+def _kept(kept: dict[str, Any]) -> str:
+    """How many of all estimates agents keep, and how well these are connected."""
+    fewest = ", the fewest that will do" if kept["smallest"] else ""
+    worst = (
+        "" if kept["lambda_2"] is None else f"; least lambda_2 of keepers {kept['lambda_2']:.6g}"
+    )
+    return f"{kept['estimates']} of {kept['of']} kept{fewest}{worst}"
 
 
 def _estimates(estimates: dict[str, Any]) -> str:

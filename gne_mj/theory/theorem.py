@@ -76,7 +76,7 @@ class Theorem:
         if not self._at_estimates:
             return None
         assert law.graph is not None
-        return coupling(self.slopes, law.graph, law.coupling)
+        return coupling(self.slopes, law.graph, law.coupling, law.kept)
 
     @cached_property
     def under_partial_information(self) -> tuple[str, Coupling] | None:
@@ -202,10 +202,8 @@ def _with_estimates(system: System) -> Box | None:
     if box is None:
         return None
     lower, upper = (bound.copy() for bound in box)
-    rows = system.memory.reshape(system.game.agents, system.game.actions)
-    for i, row in enumerate(rows):
-        others = system.game.agent_of_action != i
-        lower[others] = np.minimum(lower[others], row[others])
-        upper[others] = np.maximum(upper[others], row[others])
+    of, values = system.law.estimates_in(system.memory, system.game.agent_of_action)
+    np.minimum.at(lower, of, values)
+    np.maximum.at(upper, of, values)
     error = estimate_error(system)
     return lower - error, upper + error
