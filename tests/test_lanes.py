@@ -11,6 +11,7 @@ from gne_mj.batches import Sweep, make_plan
 from gne_mj.batches.chunk import Runner
 from gne_mj.elementary import arctangent, logarithm
 from gne_mj.lanes import WIDTH, empty, lanes_at, where
+from gne_mj.loops import monitor as watch
 from gne_mj.loops import ode_batch
 from gne_mj.loops.batch import Span
 
@@ -34,6 +35,13 @@ SYSTEMS = {
                                          "simulation.integrator": "euler"}),
     "partial": ("velocity-sync", {**ODE, **NEAR, "controller.information": "partial",
                                   "controller.graph": "ring"}),
+    "adaptive": ("velocity-sync", {**ODE, **NEAR, "simulation.integrator": "tsit5"}),
+    "adaptive, limited, partial": ("velocity-sync", {
+        **ODE, "simulation.integrator": "tsit5", "agents.input_limit": 0.5,
+        "initial.appendage_velocity": [-2.0, 3.0, 8.0, 3.0, -2.0],
+        "controller.information": "partial", "controller.graph": "ring"}),
+    "adaptive, channels": ("osnr", {**OSNR, "agents": {"type": "pi-cascade", "count": 10},
+                                    "plant": {"engine": "ode", "integrator": "tsit5"}}),
     "integrators": ("osnr", {**OSNR, "agents": {"type": "integrator", "count": 10}}),
     "PI cascades": ("osnr", {**OSNR, "agents": {"type": "pi-cascade", "count": 10}}),
     "firms": ("cournot", ODE),
@@ -128,10 +136,14 @@ def check(name, monkeypatch):
     return cases, loop, span, alone
 
 
-def test_runs_in_lanes_are_as_alone_however_they_are_put_together(monkeypatch):
-    cases, loop, span, alone = check("robots", monkeypatch)
-    assert np.any(alone.monitors.divided > 0)
-    assert np.any(alone.monitors.divided == 0)
+@pytest.mark.parametrize("name", ["robots", pytest.param("adaptive", marks=pytest.mark.slow)])
+def test_runs_in_lanes_are_as_alone_however_they_are_put_together(name, monkeypatch):
+    cases, loop, span, alone = check(name, monkeypatch)
+    if name == "robots":
+        assert np.any(alone.monitors.divided > 0)
+        assert np.any(alone.monitors.divided == 0)
+    else:
+        assert len(set(alone.monitors.steps)) > 3  # lanes are at different times
     sizes = st.lists(st.integers(0, len(cases) - 1), min_size=1, max_size=20, unique=True)
 
     @given(sizes)
@@ -144,6 +156,8 @@ def test_runs_in_lanes_are_as_alone_however_they_are_put_together(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in SYSTEMS if name != "robots"])
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if name not in ("robots", "adaptive")])
 def test_runs_in_lanes_are_as_alone_for_all_laws_games_and_agents(name, monkeypatch):
-    check(name, monkeypatch)
+    *_, alone = check(name, monkeypatch)
+    if name == "adaptive, limited, partial":  # some leave, others do not
+        assert 0 < np.sum(alone.monitors.exit != watch.INSIDE) < len(alone.monitors)

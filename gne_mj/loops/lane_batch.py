@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.lanes import WIDTH, empty
-from gne_mj.loops import functions, lanes, lanes_held
+from gne_mj.loops import adaptive_lanes, functions, lanes, lanes_held
 from gne_mj.loops import monitor as watch
+from gne_mj.loops.adaptive import TSIT5
 from gne_mj.loops.layout import Setup, Steps
 from gne_mj.loops.ode import CONTINUOUS, SAMPLED
 from gne_mj.loops.one_loop import Native
@@ -43,14 +44,14 @@ def modules_for(
 ) -> Any:
     """The modules of runs whose common steps can be taken in lanes, else None.
 
-    That is in mode continuous with Runge-Kutta 4, and in mode sampled under laws without memory. A
-    module says that lanes can go through its kernels by ``LANES = True``.
+    That is in mode continuous with Runge-Kutta 4 or adaptive steps, and in mode sampled under laws
+    without memory. A module says that lanes can go through its kernels by ``LANES = True``.
     """
     modules = Modules(agent, law, game)
     clock, linked = setup.clock, setup.problem.functions
     able = not INTERPRETED and all(getattr(each, "LANES", False) for each in modules)
     able = able and (
-        (clock.mode == CONTINUOUS and clock.method == RK4)
+        (clock.mode == CONTINUOUS and clock.method in (RK4, TSIT5))
         or (clock.mode == SAMPLED and memory == 0)
     )
     able = able and not hasattr(game, "pseudo_gradient")  # whose sums have another order
@@ -230,6 +231,8 @@ class LaneLoop:
     def __init__(self, modules: Modules, sizes: Steps, native: Native, alone: int) -> None:
         self._modules = modules
         kind = lanes if sizes.mode == CONTINUOUS else lanes_held
+        if sizes.method == TSIT5:
+            kind = adaptive_lanes
         self._loop, self._alone = int(kind.build(*modules).address), alone
         self._marks = marks_of(native, sizes)
         self._room = self._marks.length + lanes.scratch_length(sizes.actions)

@@ -240,17 +240,28 @@ def take_stages(agent, law, game, parts, vectors, known, piece):
 
 
 @kernel
+def behind(address, length, s):
+    """The scratch behind a workspace of so many lanes at an address."""
+    flat = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
+    return scratch_in(flat, 0, s.actions)
+
+
+@kernel
+def parts_of(block, s, loop):
+    """The parts of eight runs, from the address of their block, its sizes and their workspace."""
+    problem = problem_in_lanes(block, s.agents)
+    channels = channels_in_lanes(block, s.actions, s.output, -1)
+    h, monitor = floats_at(address_in(lanes(block, H)), 1)[0], loop.monitor
+    clock = LoopClock(h, s.period, s.mode, s.method)
+    return Parts(problem, channels, clock, monitor.numbers, monitor, loop.u, loop.work)
+
+
+@kernel
 def laid_out(block, address, s):
     """A loop's workspace, its scratch behind that, and its parts, by addresses and sizes."""
     length = ode_workspace_length(s)
     workspace = ode_workspace_in(lanes_at(address, length), s)
-    behind = lanes_at(address + 8 * WIDTH * length, scratch_length(s.actions))
-    problem = problem_in_lanes(block, s.agents)
-    channels = channels_in_lanes(block, s.actions, s.output, -1)
-    h, loop = floats_at(address_in(lanes(block, H)), 1)[0], workspace.loop
-    clock, monitor = LoopClock(h, s.period, s.mode, s.method), loop.monitor
-    parts = Parts(problem, channels, clock, monitor.numbers, monitor, loop.u, loop.work)
-    return workspace, scratch_in(behind, 0, s.actions), parts
+    return workspace, behind(address, length, s), parts_of(block, s, workspace.loop)
 
 
 @cache
