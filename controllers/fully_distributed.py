@@ -33,7 +33,7 @@ from gne_mj.controllers.law import (
     check_positive,
     initial_estimates,
 )
-from gne_mj.controllers.settings import EPSILON, GAIN
+from gne_mj.controllers.settings import EPSILON, FAST_WEIGHT, GAIN
 from gne_mj.controllers.table import EstimatesTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
@@ -53,6 +53,9 @@ class FullyDistributed(Law):
         epsilon: time constant of estimates and z in s, positive.
         gain: k, positive.
         kept: which estimates agents keep; all if left out.
+        fast_weight: omega of W = V + omega V_fast, V_fast being half the squared errors of
+            estimates and z; positive. The law does not read it: W is what epsilon* is computed for
+            (:mod:`gne_mj.theory.epsilon_star`) and what a run monitors.
     """
 
     information: ClassVar[str] = "distributed"
@@ -71,9 +74,10 @@ class FullyDistributed(Law):
     epsilon: float = field()
     gain: float = 1.0
     kept: Kept | None = None
+    fast_weight: float = 3.0
 
     def __post_init__(self) -> None:
-        check_positive(self, "epsilon", "gain")
+        check_positive(self, "epsilon", "gain", "fast_weight")
         if self.kept is not None:
             parts = KEPT_ESTIMATES, self.memory_parts[1]
             vars(self).update(memory_parts=parts, rosenbrock=False)
@@ -91,6 +95,7 @@ class FullyDistributed(Law):
         """See the base class."""
         numbers = super().settings(rho)
         numbers[GAIN], numbers[EPSILON] = self.gain, self.epsilon
+        numbers[FAST_WEIGHT] = self.fast_weight
         return numbers
 
     @property
@@ -247,8 +252,18 @@ def propagate(problem, y, memory, scratch):
 
 @kernel
 def storage(problem, memory):
-    """Nothing is claimed of the estimates."""
-    return 0.0
+    """omega V_fast: half the squared errors of all estimates and z, times their weight.
+
+    The rows must have their own actions in place.
+    """
+    owner, at = problem.data.owner, problem.data.offsets
+    agents, m, total = len(at) - 1, len(owner), 0.0
+    for r in range(m):
+        y = memory[owner[r] * m + r]
+        total += (memory[agents * m + r] - y) ** 2
+        for i in range(agents):
+            total += (memory[i * m + r] - y) ** 2
+    return 0.5 * problem.settings[FAST_WEIGHT] * total
 
 
 @LAWS.register
@@ -260,9 +275,14 @@ class DistributedController(EstimatesTable):
         gt=0, description="time constant of estimates and z"
     )
     gain: float = Field(1.0, gt=0, description="k")
+    fast_weight: float = Field(
+        3.0,
+        gt=0,
+        description="weight of the squared errors of estimates and z in the Lyapunov function",
+    )
 
     def build(self, game: Game) -> Law:
         """The law."""
         graph = self.network(game.agents)
         kept = self.kept_of(game, graph, constraints=True)
-        return FullyDistributed(graph, self.epsilon, self.gain, kept)
+        return FullyDistributed(graph, self.epsilon, self.gain, kept, self.fast_weight)

@@ -79,6 +79,7 @@ class Law(ABC):
         coupling: c, the factor of the Laplacian of all profiles in the input; 0 without.
         time_constant: tau of the estimates in s, where the input has a Laplacian.
         epsilon: time constant of fast estimates in s; None without.
+        fast_weight: weight of their squared errors in the Lyapunov function; 0 without.
         memory_parts: what its memory begins with, one part after the other.
         alone: in mode implicit, whether each agent solves alone because its barrier is at what it
             takes for the profile. Others may (``decentralised``), or solve all together.
@@ -97,6 +98,7 @@ class Law(ABC):
     coupling: float = 0.0
     time_constant: float = 1.0
     epsilon: float | None = None
+    fast_weight: float = 0.0
     memory_parts: ClassVar[tuple[MemoryPart, ...]] = ()
     alone: ClassVar[bool] = False
     rosenbrock: ClassVar[bool] = False

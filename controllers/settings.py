@@ -10,7 +10,8 @@ TIME_CONSTANT = 4  # tau of the estimates under partial information, in s
 RATE = 5  # estimates follow d/dt = -RATE times their disagreement, in 1/s
 LINKS = 6  # where in the memory what was last heard over each link begins; 0: rows are read
 GUARDED = 7  # 1: the whole barrier is at measured outputs, which hence stay inside
-COUNT = 8
+FAST_WEIGHT = 8  # omega of W = V + omega V_fast, under the fully distributed law
+COUNT = 9
 
 
 class Now(Numbers):

@@ -13,8 +13,8 @@ class LawTheorem:
         at_estimates: F is evaluated at estimates, so that its constants are needed where these can
             be, and the coupling gain must exceed what they ask for.
         singular_perturbation: estimates and z are fast. The theorem is for every epsilon below one
-            that it does not compute, asks for k > beta / mu [asmp:OSSPassive], and its Lyapunov
-            function is that of the reduced system alone.
+            that it does not compute (:mod:`gne_mj.theory.epsilon_star` does), and asks for
+            k > beta / mu [asmp:OSSPassive].
     """
 
     name: str

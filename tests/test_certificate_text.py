@@ -5,7 +5,6 @@ from importlib import import_module
 import pytest
 
 from gne_mj.summary import bounds_text
-from gne_mj.theory.theorem import CONDITIONAL
 
 words = import_module("gne_mj.theory.report_text")  # the function of this name hides the module
 
@@ -115,18 +114,28 @@ def test_a_gain_says_what_it_must_be(least, rate, text):
 
 
 def test_epsilon_says_what_was_tried():
-    assert words._epsilon({"given": 0.05, "search": None}, CONDITIONAL) == (
-        "0.05 s given; the theorem says that some epsilon* is small enough, and computes none"
+    none = {"given": 0.05, "star": None, "no_star": None, "search": None}
+    assert words._epsilon(none) == "0.05 s given (--search-epsilon tries)"
+    assert words._epsilon(none | {"no_star": "y* was not found"}) == (
+        "0.05 s given; some epsilon* is small enough, and none is computed: y* was not found"
         " (--search-epsilon tries)"
+    )
+    star = {
+        "star": 0.0025, "label": "certified, sufficient", "fast_weight": 3.0,
+        "kept": {"floor": [0.5, 0.25], "constraint": "gap"},
+    }  # fmt: skip
+    assert words._epsilon(none | star) == (
+        "0.05 s given; epsilon* = 0.0025 s (certified, sufficient): for all up to it"
+        " W = V + 3 V_fast falls, and no slack falls below 0.25 (gap) (--search-epsilon tries)"
     )
     search = {"inside": None, "outside": 0.0125, "trials": [1], "note": ""}
     end = "values between and beyond those tried are not known"
-    assert words._epsilon({"given": 0.05, "search": search}, "") == (
+    assert words._epsilon(none | {"search": search}) == (
         "0.05 s given. By 1 trial run from this start: none stayed inside, 0.0125 s does not;"
         f" {end}"
     )
     search = {"inside": 0.01, "outside": None, "trials": [1, 2], "note": "stopped"}
-    assert words._epsilon({"given": 0.05, "search": search}, "") == (
+    assert words._epsilon(none | {"search": search}) == (
         f"0.05 s given. By 2 trial runs from this start: 0.01 s stays inside; {end} (stopped)"
     )
 

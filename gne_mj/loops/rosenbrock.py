@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from gne_mj.controllers.settings import EPSILON
 from gne_mj.graph import Graph
+from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.estimate_modes import Modes, modes_of, to_modes
 from gne_mj.loops.feedback import feedback
-from gne_mj.loops.functions import observe_positions
 from gne_mj.loops.layout import (
     Setup,
     clock_in,
@@ -95,7 +95,9 @@ def parts() -> list[Any]:
             vector = floats_at(state, fixed.channels.equilibrium_state.size)
             delivered = floats_at(u, len(run.u))
             storage = agents_functions.stored(fixed.channels, vector, run.solver.system.known)
-            observe_positions(fixed.problem, run.work, run.monitor, time, vector)
+            memory = vector[fixed.channels.equilibrium_state.size :]
+            storage += functions.storage(fixed.problem, memory)
+            functions.observe_positions(fixed.problem, run.work, run.monitor, time, vector)
             watch.observe(run.monitor, run.figures, time, run.work, delivered, delivered, storage)
         return good
 

@@ -5,7 +5,8 @@ an action of m_i entries is m_i such channels. It defines PARAMETERS (their name
 and units; an empty unit stands for the action's), OUTPUT (which of them is y; the others are
 recorded under their names), INPUT_UNIT (empty: the action's per second), ``is_passive`` (whether
 given parameters meet the theory's assumption), and the kernels below; x' is affine in u. It may
-define ``energy_balance``, from which the theory's rates follow, FLEET (the module of its fleets in
+define ``energy_balance``, from which the theory's rates follow, LINEAR (x' is linear in x and u,
+which adds to y', and V is what the balance says), FLEET (the module of its fleets in
 MuJoCo, which has a ``PLANT``: :mod:`gne_mj.plants.fleet_plant`), PLACED (the state that is a
 place, at which agents start apart), POSITION (the state that is a position which follows the
 output, :mod:`gne_mj.plants.lookahead`), DERIVED (what follows from its states, as triples of name,
@@ -32,6 +33,7 @@ PARAMETERS: tuple[str, ...] = ()
 STATES = (("action", ""),)
 OUTPUT = 0
 INPUT_UNIT = ""
+LINEAR = True
 
 
 def is_passive(parameters: NDArray[np.float64]) -> bool:

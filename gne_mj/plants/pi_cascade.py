@@ -27,6 +27,7 @@ PARAMETERS = ("decay_rate", "integral_gain")
 STATES = (("action", ""), ("integral", ""))
 OUTPUT = 0
 INPUT_UNIT = ""
+LINEAR = True
 
 
 def is_passive(parameters: NDArray[np.float64]) -> bool:

@@ -1,6 +1,6 @@
 """The largest epsilon that keeps a start inside, by trial [lemma:centreInv].
 
-The theorem says that some epsilon* > 0 exists and computes none. Each trial runs the system for
+What is certain is far smaller (:mod:`gne_mj.theory.epsilon_star`). Each trial runs the system for
 the clock's duration. Nothing assures that every epsilon below one that works works too.
 """
 

@@ -103,7 +103,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         gain=None if theorem.gain is None else asdict(theorem.gain),
         epsilon=None
         if law.epsilon is None
-        else {"given": law.epsilon, "star": None, "search": None},
+        else {"given": law.epsilon, **_star(theorem), "search": None},
         start=_start(system, theorem.slopes.box),
         equilibrium={
             "penalised": None if known is None else known.action.tolist(),
@@ -199,6 +199,13 @@ def _coupling(theorem: Theorem) -> dict[str, Any] | None:
     if conditions is None:
         return None
     return {**asdict(conditions), "time_constant": theorem.system.law.time_constant}
+
+
+def _star(theorem: Theorem) -> dict[str, Any]:
+    """What is certain of small epsilon; None of a theorem that does not apply."""
+    if theorem.epsilon_bound is None or theorem.obstacles:
+        return dict.fromkeys(("star", "label", "fast_weight", "no_star", "kept"))
+    return theorem.epsilon_bound.report()
 
 
 def _start(system: System, box: Box | None) -> dict[str, Any]:

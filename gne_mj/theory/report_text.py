@@ -6,7 +6,6 @@ from typing import Any
 
 from gne_mj.summary import bounds_text
 from gne_mj.theory.guarantees import Guarantees
-from gne_mj.theory.theorem import CONDITIONAL
 
 _WIDTH = 20
 
@@ -48,7 +47,7 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if g["gain"] is not None:
         yield "gain k", _gain(g["gain"])
     if g["epsilon"] is not None:
-        yield "epsilon", _epsilon(g["epsilon"], g["status"])
+        yield "epsilon", _epsilon(g["epsilon"])
     start = g["start"]
     yield "start", f"strictly inside, least margin {start['margin']:.6g} ({start['constraint']})"
     if start["estimates"] is not None:
@@ -164,10 +163,16 @@ def _gain(gain: dict[str, Any]) -> str:
     return text
 
 
-def _epsilon(epsilon: dict[str, Any], status: str) -> str:
+def _epsilon(epsilon: dict[str, Any]) -> str:
     text = f"{epsilon['given']:g} s given"
-    if status == CONDITIONAL:
-        text += "; the theorem says that some epsilon* is small enough, and computes none"
+    if epsilon["star"] is not None:
+        text += (
+            f"; epsilon* = {epsilon['star']:.4g} s ({epsilon['label']}): for all up to it"
+            f" W = V + {epsilon['fast_weight']:g} V_fast falls, and no slack falls below"
+            f" {min(epsilon['kept']['floor']):.4g} ({epsilon['kept']['constraint']})"
+        )
+    elif epsilon["no_star"] is not None:
+        text += f"; some epsilon* is small enough, and none is computed: {epsilon['no_star']}"
     search = epsilon["search"]
     if search is None:
         return text + " (--search-epsilon tries)"

@@ -20,6 +20,7 @@ from gne_mj.theory.constants import Slopes
 from gne_mj.theory.convexity import convex_constraints, own_convexity
 from gne_mj.theory.coupling import Coupling, coupling
 from gne_mj.theory.disturbances import estimate_error
+from gne_mj.theory.epsilon_star import EpsilonBound
 from gne_mj.theory.gain import Gain, required_gain
 from gne_mj.theory.spectra import DENSE
 
@@ -119,6 +120,11 @@ class Theorem:
         return required_gain(self.system.agents, mu, self.system.law.gain)
 
     @cached_property
+    def epsilon_bound(self) -> EpsilonBound | None:
+        """How small epsilon must be at most, where estimates are fast."""
+        return EpsilonBound(self.system) if self.singular_perturbation else None
+
+    @cached_property
     def assumptions(self) -> tuple[Assumption, ...]:
         """All that the theorem assumes of game, agents, graph and start."""
         proven = self.system.law.theorem
@@ -180,19 +186,18 @@ class Theorem:
         """Whether a run follows the law in continuous time up to the integrator's error."""
         return not mode_of(self.system).departure(self.system)
 
-    @property
+    @cached_property
     def status(self) -> str:
         """Whether the system as it is set up is certified."""
         if self.obstacles or not self.continuous:
             return NOT_CERTIFIED
-        return CONDITIONAL if self.singular_perturbation else CERTIFIED
+        bound = self.epsilon_bound
+        return CERTIFIED if bound is None or bound.given else CONDITIONAL
 
     @property
     def lyapunov(self) -> bool:
-        """Whether V is claimed never to rise, as long as no actuator's limit is met.
-
-        Where it is for small epsilon, there is a Lyapunov function of the reduced system only.
-        """
+        """Whether V, or W with fast estimates, is claimed never to rise, as long as no actuator's
+        limit is met."""
         return self.status == CERTIFIED
 
 

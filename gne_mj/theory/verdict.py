@@ -39,8 +39,11 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
             f"the Lyapunov function never rises{as_long}{provided}",
         ]
     if theorem.status == CONDITIONAL:
+        assert theorem.epsilon_bound is not None
+        star = theorem.epsilon_bound.star
+        small = "below some epsilon* > 0" if star is None else f"up to {star.epsilon:.4g} s"
         return [
-            "for all epsilon below some epsilon* > 0, in continuous time, every shared constraint"
+            f"for all epsilon {small}, in continuous time, every shared constraint"
             f" holds for all time{as_long}{provided}",
             f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}"
             f"{provided}",
@@ -88,7 +91,7 @@ def measured(theorem: Theorem, pieces: Pieces | None = None) -> list[str]:
             " not do, the run ends as step_too_small"
         )
     if theorem.status == CONDITIONAL:
-        found.append("whether the given epsilon is below epsilon*: from this start, by running")
+        found.append("whether the given epsilon is small enough: from this start, by running")
     return found
 
 
@@ -122,8 +125,8 @@ def not_certified(
         )
     if theorem.status == CONDITIONAL:
         found.append(
-            "that the given epsilon is small enough; and a Lyapunov function: V's decrease is"
-            " claimed of the limit epsilon -> 0 only"
+            "that the given epsilon is small enough; and a Lyapunov function: that W falls is"
+            " claimed of certified epsilon only"
         )
     if theorem.system.agents.contacts:
         found.append("anything once bodies of two agents have touched: a run counts contacts")
