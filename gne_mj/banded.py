@@ -7,10 +7,12 @@ b = n - 1 it is a dense matrix.
 
 import numpy as np
 
+from gne_mj.linear import add_part
 from gne_mj.native import kernel
 
 # Columns that a dense matrix is factorised by, and from how many on
 BLOCK, LARGE = 32, 128
+FEW = 4  # entries, of which a vector is not worth its beginning
 
 
 @kernel
@@ -31,7 +33,11 @@ def factorise(band, n, b, pivots):
 
 @kernel
 def eliminate(band, first, last, width, n, b, pivots):
-    """Eliminate some columns, up to ``last``, from columns up to ``width``; False if singular."""
+    """Eliminate some columns, up to ``last``, from columns up to ``width``; False if singular.
+
+    Diagonals are left as their reciprocals.
+    """
+    flat, long = band.reshape(band.size), band.shape[1]
     for k in range(first, last):
         lowest = min(k + b, n - 1)
         pivot, largest = k, abs(band[k, b])
@@ -45,12 +51,18 @@ def eliminate(band, first, last, width, n, b, pivots):
         end = min(k + 2 * b, width - 1)
         swap(band, k, pivot, k, end + 1, b)
         inverse = 1.0 / band[k, b]
+        band[k, b] = inverse
         for r in range(k + 1, lowest + 1):
             factor = band[r, k - r + b] * inverse
             band[r, k - r + b] = factor
-            if factor != 0.0:
+            if factor == 0.0:
+                continue
+            if end - k < FEW:
                 for c in range(end - k):
                     band[r, k + 1 - r + b + c] -= factor * band[k, 1 + b + c]
+            else:
+                target = r * long + k + 1 - r + b
+                add_part(-factor, flat, k * long + b + 1, flat, target, end - k)
     return True
 
 
@@ -106,20 +118,38 @@ def reduce_row(band, r, first, last, n, b):
 
 @kernel
 def solve(band, n, b, pivots, x):
-    """Replace the right-hand side in x by the solution; band and pivots from ``factorise``."""
+    """Replace the right-hand side in x by the solution; band and pivots from ``factorise``.
+
+    Each entry waits for the one before. It is therefore handed on as a number, and is what enters
+    the next one last.
+    """
+    if n == 0:
+        return
+    ahead = x[0]
     for k in range(n):
         pivot = pivots[k]
-        value = x[pivot]
+        value = ahead
         if pivot != k:
-            x[pivot] = x[k]
-            x[k] = value
-        for r in range(k + 1, min(k + b, n - 1) + 1):
+            value = x[pivot]
+            x[pivot] = ahead
+        x[k] = value
+        last = min(k + b, n - 1)
+        if k + 1 < n:
+            ahead = x[k + 1]
+        if k < last:
+            ahead -= band[k + 1, b - 1] * value
+        for r in range(k + 2, last + 1):
             x[r] -= band[r, k - r + b] * value
-    for k in range(n - 1, -1, -1):
+    found = x[n - 1] * band[n - 1, b]
+    x[n - 1] = found
+    for k in range(n - 2, -1, -1):
         value = x[k]
-        for c in range(k + 1, min(k + 2 * b, n - 1) + 1):
+        for c in range(min(k + 2 * b, n - 1), k + 1, -1):
             value -= band[k, c - k + b] * x[c]
-        x[k] = value / band[k, b]
+        if b > 0:
+            value -= band[k, b + 1] * found
+        found = value * band[k, b]
+        x[k] = found
 
 
 @kernel

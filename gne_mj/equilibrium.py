@@ -205,7 +205,7 @@ class EquilibriumSolver:
         known = isinstance(start, Equilibrium)
         y = self._profile(start.action if isinstance(start, Equilibrium) else start)
         with self._lock:
-            self._y[:] = y
+            self._y[...] = y
             if isinstance(start, Equilibrium):
                 self._multipliers[:] = start.multipliers
             ended = self._run(self._address, -1, known, rho, last_rho, tolerance)
@@ -356,7 +356,10 @@ def order(game: Game) -> tuple[NDArray[np.int64], int]:
     position = first[game.agent_of_action] + np.arange(game.actions)
     position -= game.data.offsets[game.agent_of_action]
     row, column = np.repeat(np.arange(game.agents), np.diff(coupled[0])), coupled[1]
-    return position, int(np.max(first[row] + sizes[row] - 1 - first[column], initial=0))
+    half_band = int(np.max(first[row] + sizes[row] - 1 - first[column], initial=0))
+    if half_band == game.actions - 1:  # no order makes it narrower
+        position = np.arange(game.actions)
+    return position, half_band
 
 
 def _coupled(game: Game) -> list[list[int]]:

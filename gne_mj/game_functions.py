@@ -19,7 +19,7 @@ from gne_mj.native import address_in, call_integer, call_number, callback, kerne
 from gne_mj.parameter_block import floats_at, integers_at
 
 _COST, _GRADIENT, _ROW, _CONSTRAINT, _SLOPE, _CURVATURE = range(6)
-_EVALUATE, _VALUES, _GRADIENTS, _SLOPES = range(6, 10)
+_EVALUATE, _VALUES, _GRADIENTS, _SLOPES, _ROWS = range(6, 11)
 
 _whole, _real = types.int64, types.float64
 _OF_Y = _real(_whole, _whole, _whole, _whole, _whole, _whole, _whole)
@@ -68,7 +68,8 @@ def _compiled(game: ModuleType) -> list[Any]:
 
 def _made(game: ModuleType) -> list[Any]:
     source = source_key(game)
-    return [*_own_functions(game, source), *_functions_of_many(game, source)]
+    many = [*_functions_of_many(game, source), _cost_rows(game, source)]
+    return [*_own_functions(game, source), *many]
 
 
 def _own_functions(game: ModuleType, source: str) -> list[Any]:
@@ -167,6 +168,28 @@ def _functions_of_many(game: ModuleType, source: str) -> list[Any]:
     ]
 
 
+def _cost_rows(game: ModuleType, source: str) -> Any:
+    """All rows of dF/dy in one call."""
+
+    def rows(q, size, agents, count, offsets, stride, y, m, out):
+        _ = source
+        which, at, profile = (
+            integers_at(agents, count),
+            integers_at(offsets, m + 1),
+            floats_at(y, m),
+        )
+        for entry in range(count):
+            i = which[entry]
+            for a in range(at[i], at[i + 1]):
+                row = floats_at(out + 8 * a * stride, m)
+                for c in range(m):
+                    row[c] = 0.0
+                game.add_cost_hessian(floats_at(q, size), i, a, profile, 1.0, row)
+        return 0
+
+    return callback(_OF_MANY, rows)
+
+
 @kernel
 def _at_profile(data, function, number, a, b, y):
     q = data.parameters
@@ -257,3 +280,9 @@ def slopes(data, constraints, rows, columns, y, out):
     """Fill out with dg_l/dy_a, in compressed rows: of the k-th of these constraints for each a in
     columns[rows[k]:rows[k + 1]]."""
     _for_many(data, _SLOPES, constraints, address_in(rows), address_in(columns), y, out)
+
+
+@kernel
+def cost_rows(data, y, stride, out):
+    """Fill out, from a * stride on for each a, with dF_a/dy (m,)."""
+    _for_many(data, _ROWS, data.everyone, address_in(data.offsets), stride, y, out)

@@ -25,11 +25,13 @@ from numba import types
 
 from gne_mj import best_response, lines, scales
 from gne_mj.native import call_integer, callback, compiled, copy, kernel, source_key
+from gne_mj.predictor import Fall, correct_fall, gentle_fall, may_fall, next_length
 from gne_mj.primal_dual import (
     accept,
     evaluate,
     find_entries,
     inside,
+    local_length,
     longest,
     longest_entry,
     move,
@@ -51,7 +53,6 @@ DECREASE = 1e-4  # of the merit, relative to the step's length
 MERIT = 0.1  # weight of the stationarity residual in it, for the length of a profile
 ROUNDING = 1e-14  # of the terms of g
 NEAR = 1e-6  # error below which rounding can hide progress, and full steps are taken as they are
-SHRINK = 0.1  # of rho, from one equilibrium to the next
 # So many steps in a row shorter than SHORT make the method careful: damped steps at one rho,
 # multipliers rho / s, until a step's length in the barrier's own norm is within CENTRED; each
 # LONG steps that this takes, rho grows by GROW.
@@ -70,6 +71,7 @@ class Path(NamedTuple):
     tolerance: float
     spread: float
     to_zero: bool  # last_rho is a share of the costs' size, and no bound is to look blurred there
+    gently: bool  # follow it closely: other stationary points are not to be jumped to
 
 
 @kernel
@@ -133,15 +135,6 @@ def complementarity(constraints, point):
 
 
 @kernel
-def local_length(constraints, point, work):
-    """Length of the step relative to the distances to the bounds, all together."""
-    total = 0.0
-    for k in range(constraints):
-        total += (work.step_slack[k] / point.slack[k]) ** 2
-    return np.sqrt(total)
-
-
-@kernel
 def begin(data, free, count, b, path, known, point, work):
     """Fill slacks and unknown multipliers, and evaluate; the first rho, 0 if y is not inside.
 
@@ -186,6 +179,15 @@ def centre(data, free, rho, point, work):
 
 
 @kernel
+def last_of(path, size, first, last):
+    """The path's last rho, which was ``first`` at first and is now ``last``."""
+    if not path.to_zero:
+        return last
+    there = min(path.last_rho * size, first)  # near y = 0 costs look small
+    return last if 0.5 * last <= there <= 10.0 * last else there
+
+
+@kernel
 def follow(memory, free, half_band, path, known):
     """Follow the path to path.last_rho, from point's y; the point becomes its end."""
     data, point, work, report = memory.data, memory.point, memory.work, memory.report
@@ -198,37 +200,37 @@ def follow(memory, free, half_band, path, known):
     first = last = path.last_rho * size if path.to_zero else path.last_rho
     distance, before, stalled, slow, still, careful = np.inf, np.inf, 0, 0, False, False
     for iteration in range(LARGEST_COUNT):
-        near_enough, residual = False, stationarity_error(count, work)
+        near_enough, falls, residual = False, False, stationarity_error(count, work)
         off = spread(constraints, rho, point, work)
-        if path.to_zero:  # never above what it was at first; near y = 0 costs look small
-            there = min(path.last_rho * size, first)
-            last = last if 0.5 * last <= there <= 10.0 * last else there
+        last = last_of(path, size, first, last)
+        fall = Fall(count, rho, last, length, size, residual)
         if not careful:
-            lower = lower_rho(constraints, rho, last, size, residual, path, point, work)
-            if lower < rho:
-                highest, rho, off = 0.0, lower, spread(constraints, lower, point, work)
+            falls = may_fall(constraints, fall, path.tolerance, point, work)
             error = max(residual, off * (path.tolerance / path.spread))
             report.iterations, report.stationarity, report.rho = iteration, residual, rho
             report.error, report.complementarity = error, complementarity(constraints, point)
             if rho <= last:
                 stalled = stalled + 1 if error > 0.5 * before else 0
                 near_enough = is_near_enough(path, residual, off, distance, still)
-                # A residual that is small beside steep terms, as by a pole, does not tell enough.
-                centred = error <= path.tolerance and distance <= CENTRED
-                done = centred or (stalled >= 2 and near_enough)
+                done = stalled >= 2 and near_enough
+                if error <= path.tolerance:
+                    ahead = next_length(free, fall, distance, point, b, work)
+                    done = done or min(distance, ahead) <= CENTRED
                 if done and not sharper(constraints, free, path, length, point, work):
                     return CONVERGED
                 before, stalled = (np.inf, 0) if done else (error, stalled)
         length = max(least, scales.largest_free(data, free, point.y))
-        size = newton(data, free, count, rho, length, point, b, work)
+        if falls and path.gently:
+            highest, off, rho, falls = 0.0, np.inf, gentle_fall(fall), False
+        size = newton(data, free, count, last if falls else rho, length, point, b, work)
         if size < 0.0:
             return SINGULAR
+        if falls:
+            highest, off, rho = 0.0, np.inf, correct_fall(data, free, fall, point, b, work)
         distance = local_length(constraints, point, work)
         still = distance <= CENTRED and longest_entry(count, work.step) <= ROUNDING * length
-        keep, factor, share = CENTRED, 1.0, 1.0 / (1.0 + distance)
-        if not careful:
-            keep, factor = min(TO_BOUNDARY, max(rho / size, residual)), np.inf
-            share = longest(constraints, keep, point, work)
+        close = max(rho / size, residual)
+        keep, factor, share = reach(constraints, careful, distance, close, point, work)
         search = Search(count, rho, length, keep, factor, careful or max(residual, off) <= NEAR)
         share, found = search_along(data, free, search, share, point, work)
         if not found and near_enough:
@@ -241,24 +243,11 @@ def follow(memory, free, half_band, path, known):
             lost, higher = careful and slow >= LONG, GROW * rho
         else:
             careful = lost = slow >= PATIENCE or not found
-            higher = max(rho, highest)
+            higher = max(fall.rho, highest)
         if lost:
-            rho, slow = higher, 0
+            rho, slow, distance = higher, 0, np.inf
             centre(data, free, rho, point, work)
     return TOO_MANY
-
-
-@kernel
-def lower_rho(constraints, rho, last, size, residual, path, point, work):
-    """The lowest rho, ``last`` or higher, near whose place on the path the point is.
-
-    On the way only nearness to the path matters.
-    """
-    while last < rho < np.inf and spread(constraints, rho, point, work) <= 0.9:
-        if not residual <= max(10.0 * rho / size, path.tolerance):
-            break
-        rho = max(last, rho * min(SHRINK, np.sqrt(rho / size)))
-    return rho
 
 
 @kernel
@@ -273,6 +262,15 @@ def is_near_enough(path, residual, off, distance, still):
 def sharper(constraints, free, path, length, point, work):
     """Whether shares of rho were lowered, where rho is to fall to 0: the path goes on."""
     return path.to_zero and scales.sharpen(constraints, free, path.last_rho, length, point, work)
+
+
+@kernel
+def reach(constraints, careful, distance, close, point, work):
+    """How a step is bounded, as :class:`Search` has it, and its share to begin with."""
+    if careful:
+        return CENTRED, 1.0, 1.0 / (1.0 + distance)
+    keep = min(TO_BOUNDARY, close)
+    return keep, np.inf, longest(constraints, keep, point, work)
 
 
 class Search(NamedTuple):
@@ -317,9 +315,9 @@ def build() -> SimpleNamespace:
         _ = source
         sizes = sizes_in(block)
         memory = memory_in(block, sizes.actions)
-        path = Path(rho, last_rho, tolerance, tolerance, False)
+        path = Path(rho, last_rho, tolerance, tolerance, False, agent >= 0)
         if last_rho == 0.0:
-            path = Path(rho, LOWEST, tolerance, HALF, True)
+            path = Path(rho, LOWEST, tolerance, HALF, True, agent >= 0)
         copy(memory.point.y, memory.work.trial.y)
         free = free_in(memory, agent)
         return follow(memory, free, sizes.half_band, path, known != 0)

@@ -73,8 +73,7 @@ def lowest(data, i, own, holes, y, direction, trial, found):
 
     Where the set may have ``holes``, the parts of the line beyond them count too.
     """
-    length = scales.largest(y)
-    length = length if length > 0.0 else 1.0
+    length = scales.length_of(y)
     copy(y, trial)
     found.line_cost, found.line_place = games.cost(data, i, y), 0.0
     for side in range(2):
@@ -107,8 +106,7 @@ def to_middle(data, y, direction, trial):
             if shared:
                 own = data.own_index[data.own_pointer[i] : data.own_pointer[i + 1]]
             for a in range(data.offsets[i], data.offsets[i + 1]):
-                length = scales.largest(y)
-                length = length if length > 0.0 else 1.0
+                length = scales.length_of(y)
                 direction[a] = 1.0
                 above = end(data, i, own, y, direction, 1.0, length, trial)
                 below = end(data, i, own, y, direction, -1.0, length, trial)

@@ -17,11 +17,13 @@ import numpy as np
 
 from gne_mj import banded, scales
 from gne_mj import game_functions as games
+from gne_mj.linear import add_part
 from gne_mj.native import kernel
 
 # What is added to the diagonal of a matrix that is singular, or whose step is longer than FAR
 # profiles, relative to the rows' own slopes: SHIFT, and so many times HIGHER.
 SHIFT, HIGHER, SHIFTS, FAR = 1e-12, 1e3, 5, 1e6
+FEW = 4  # actions, of which adding a constraint's slopes row by row does not pay
 
 
 class Free(NamedTuple):
@@ -53,6 +55,8 @@ class NewtonScratch(NamedTuple):
     # the free actions in one constraint after the other
     column: Annotated[np.ndarray, "entries", int]
     owned: Annotated[np.ndarray, "entries", int]  # 1 if the constraint is that action's agent's own
+    # of a constraint whose actions have one row after the other the first of these; -1 of others
+    first: Annotated[np.ndarray, "q", int]
     jacobian: Annotated[np.ndarray, "entries"]  # dg_l/dy_a for them
     stationarity: Annotated[np.ndarray, "m"]  # F + sum_l lambda_l dg_l, the first n entries
     terms: Annotated[np.ndarray, "m"]  # sum of the magnitudes of its terms, likewise
@@ -63,6 +67,9 @@ class NewtonScratch(NamedTuple):
     step: Annotated[np.ndarray, "m"]  # n entries
     step_slack: Annotated[np.ndarray, "q"]
     step_multipliers: Annotated[np.ndarray, "q"]
+    # what is known of the steps' second order in lambda_l s_l; zero between uses
+    bend: Annotated[np.ndarray, "q"]
+    beyond: Annotated[np.ndarray, "q"]  # g along a step
     hessian_row: Annotated[np.ndarray, "m"]  # zero between uses
     band: Annotated[np.ndarray, "m, n // m"]  # n rows of 3 b + 1 entries or more
     pivots: Annotated[np.ndarray, "m", int]  # n entries
@@ -96,11 +103,25 @@ def find_entries(data, free, work):
                     work.owned[entry] = owned
                     entry += 1
     work.row[len(free.constraints)] = entry
+    for k in range(len(free.constraints)):
+        work.first[k] = first_row(free, work.column[work.row[k] : work.row[k + 1]])
     count = 0
     for member in range(len(free.agents)):
         i = free.agents[member]
         count += at[i + 1] - at[i]
     return count
+
+
+@kernel
+def first_row(free, columns):
+    """The first of some actions' rows, if these are one after the other; else -1."""
+    if len(columns) < FEW:
+        return -1
+    first = last = free.position[columns[0]]
+    for entry in range(len(columns)):
+        first = min(first, free.position[columns[entry]])
+        last = max(last, free.position[columns[entry]])
+    return first if last - first == len(columns) - 1 else -1
 
 
 @kernel
@@ -145,27 +166,54 @@ def assemble(data, free, count, length, shift, point, b, work):
 
     ``shift`` is added to the diagonal, relative to the rows' own slopes.
     """
-    position, band = free.position, work.band
+    band = work.band
     size = scales.add_costs(data, free, length, point.y, b, work)
     if shift > 0.0:
         for r in range(count):
             band[r, b] += shift * work.unit[r] / length
     for k in range(len(free.constraints)):
-        l = free.constraints[k]
-        weight = point.multipliers[k]
-        ratio = weight / point.slack[k]
-        for entry in range(work.row[k], work.row[k + 1]):
-            if work.owned[entry] == 0:
-                continue
-            a = work.column[entry]
-            r = position[a]
-            slope = ratio * work.jacobian[entry]
-            for other in range(work.row[k], work.row[k + 1]):
-                c, term = work.column[other], slope * work.jacobian[other]
-                if work.curved[l] != 0:
-                    term += weight * games.constraint_hessian(data, l, a, c, point.y)
-                band[r, position[c] - r + b] += term
+        if work.first[k] >= 0 and work.curved[free.constraints[k]] == 0:
+            add_block(free, k, point, b, work)
+        else:
+            add_pairs(data, free, k, point, b, work)
     return size
+
+
+@kernel
+def add_pairs(data, free, k, point, b, work):
+    """Add constraint k's part of Newton's matrix, entry by entry."""
+    position, band = free.position, work.band
+    l = free.constraints[k]
+    weight = point.multipliers[k]
+    ratio = weight / point.slack[k]
+    for entry in range(work.row[k], work.row[k + 1]):
+        if work.owned[entry] == 0:
+            continue
+        a = work.column[entry]
+        r = position[a]
+        slope = ratio * work.jacobian[entry]
+        for other in range(work.row[k], work.row[k + 1]):
+            c, term = work.column[other], slope * work.jacobian[other]
+            if work.curved[l] != 0:
+                term += weight * games.constraint_hessian(data, l, a, c, point.y)
+            band[r, position[c] - r + b] += term
+
+
+@kernel
+def add_block(free, k, point, b, work):
+    """The same, row by row, of a constraint without second derivatives and with rows in a block."""
+    position, band, slopes, first = free.position, work.band, work.step, work.first[k]
+    flat, long = band.reshape(band.size), band.shape[1]
+    count = work.row[k + 1] - work.row[k]
+    ratio = point.multipliers[k] / point.slack[k]
+    for entry in range(work.row[k], work.row[k + 1]):
+        slopes[position[work.column[entry]] - first] = work.jacobian[entry]
+    for entry in range(work.row[k], work.row[k + 1]):
+        if work.owned[entry] != 0:
+            r = position[work.column[entry]]
+            add_part(
+                ratio * work.jacobian[entry], slopes, 0, flat, r * long + first - r + b, count
+            )  # fmt: skip
 
 
 @kernel
@@ -182,13 +230,19 @@ def newton(data, free, count, rho, length, point, b, work):
         shift = max(SHIFT, HIGHER * shift)
     if not solved:
         return -1.0
+    complete(free, point, work)
+    return size
+
+
+@kernel
+def complete(free, point, work):
+    """Fill the steps of s, and add to lambda's what y's does."""
     for k in range(len(free.constraints)):
         along = 0.0
         for entry in range(work.row[k], work.row[k + 1]):
             along += work.jacobian[entry] * work.step[free.position[work.column[entry]]]
         work.step_slack[k] = -(work.g[k] + point.slack[k]) - along
         work.step_multipliers[k] += point.multipliers[k] / point.slack[k] * along
-    return size
 
 
 @kernel
@@ -208,13 +262,23 @@ def solve(free, count, rho, length, point, b, work):
     for r in range(count):
         work.step[r] = -work.stationarity[r]
     for k in range(len(free.constraints)):
-        change = (work.share[k] * rho + point.multipliers[k] * work.g[k]) / point.slack[k]
+        change = work.share[k] * rho - work.bend[k] + point.multipliers[k] * work.g[k]
+        change /= point.slack[k]
         work.step_multipliers[k] = change
         for entry in range(work.row[k], work.row[k + 1]):
             if work.owned[entry] != 0:
                 work.step[free.position[work.column[entry]]] -= change * work.jacobian[entry]
     banded.solve(work.band, count, b, work.pivots, work.step)
     return longest_entry(count, work.step) <= FAR * length
+
+
+@kernel
+def local_length(constraints, point, work):
+    """Length of the step relative to the distances to the bounds, all together."""
+    total = 0.0
+    for k in range(constraints):
+        total += (work.step_slack[k] / point.slack[k]) ** 2
+    return np.sqrt(total)
 
 
 @kernel

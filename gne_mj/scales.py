@@ -16,6 +16,7 @@ from gne_mj.native import kernel
 
 WIDEST = 1e6  # profiles; a bound farther than that says nothing of the length
 NARROWEST = 1e-5  # of the first length, below which a length does not fall
+NOTHING = 1e-30  # a profile that is nowhere greater is zero, in whatever unit
 ALIGNED = 0.7  # cosine between -F and dphi from which on a point counts as near the path
 SHARP = 10.0  # times the share of the costs' size that rho falls to
 
@@ -27,6 +28,13 @@ def largest(y):
     for a in range(len(y)):
         value = max(value, abs(y[a]))
     return value
+
+
+@kernel
+def length_of(y):
+    """Greatest magnitude, 1 of a profile that is zero."""
+    length = largest(y)
+    return length if length > NOTHING else 1.0
 
 
 @kernel
@@ -76,8 +84,8 @@ def length_at(count, constraints, free, y, work):
             width = min(width, own)
     length = largest(y)
     if width < np.inf:
-        length = max(length, min(width, WIDEST * length) if length > 0.0 else width)
-    return length if length > 0.0 else 1.0
+        length = max(length, min(width, WIDEST * length) if length > NOTHING else width)
+    return length if length > NOTHING else 1.0
 
 
 @kernel
@@ -114,6 +122,8 @@ def balance(count, constraints, free, highest, work):
 @kernel
 def add_costs(data, free, length, y, b, work):
     """Fill the band with the costs' second derivatives and the rows' sizes; the costs' size."""
+    if len(work.step) == b + 1 and len(free.agents) == len(data.everyone):
+        return add_all_costs(data, length, y, b, work)
     at, greatest = data.offsets, 0.0
     for entry in range(len(free.agents)):
         i = free.agents[entry]
@@ -122,6 +132,21 @@ def add_costs(data, free, length, y, b, work):
             games.add_cost_hessian(data, i, a, y, 1.0, work.hessian_row)
             work.unit[r] = work.terms[r] + length * take_row(data, free, i, r, b, work)
             greatest = max(greatest, work.unit[r])
+    return greatest * length if greatest > 0.0 else 1.0
+
+
+@kernel
+def add_all_costs(data, length, y, b, work):
+    """The same where everyone is free and no band is narrower than the matrix, in its own order."""
+    m, stride, greatest = len(y), work.band.shape[1] - 1, 0.0
+    flat = work.band.reshape(work.band.size)[b:]
+    games.cost_rows(data, y, stride, flat)
+    for r in range(m):
+        slopes = 0.0
+        for c in range(r * stride, r * stride + m):
+            slopes += abs(flat[c])
+        work.unit[r] = work.terms[r] + length * slopes
+        greatest = max(greatest, work.unit[r])
     return greatest * length if greatest > 0.0 else 1.0
 
 

@@ -137,6 +137,8 @@ def test_a_saddle_of_an_own_cost_is_no_equilibrium():
     assert np.allclose(point.action, 0.0, atol=1e-9)
     assert examine(game, point).not_minima == (0, 1)
     assert measured_epsilon(game, point.action) == pytest.approx([1.0, 1.0], abs=1e-6)
+    almost = [1e-63, 0.0, 2e-63, 0.0]  # so small a profile is no length to look by
+    assert measured_epsilon(game, almost) == pytest.approx([1.0, 1.0], abs=1e-6)
 
 
 @pytest.mark.parametrize(("bend", "minimum"), [(1.0, True), (3.0, False)])

@@ -24,14 +24,14 @@ from reference_agents import Integrator
 from scipy.integrate import solve_ivp
 
 import reference
-from gne_mj import banded, native
+from gne_mj import banded, linear, native
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
 from gne_mj.errors import InfeasibleStart
 from gne_mj.game_model import Game
 from gne_mj.games import osnr_game, ten_channels
-from gne_mj.loops import linear, rodas
 from gne_mj.loops import monitor as watch
+from gne_mj.loops import rodas
 from gne_mj.plants.agents import Agents
 from gne_mj.system import System
 
@@ -111,6 +111,22 @@ def test_small_systems():
 @native.compiled
 def sum_rows(out, matrix, weights):
     linear.weighted_sum(out, matrix, weights)
+
+
+@native.compiled
+def add_part(factor, source, first, target, begin, count):
+    linear.add_part(factor, source, first, target, begin, count)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 17])
+def test_parts_of_rows(count):
+    """To the bit what is written, and nothing beside it."""
+    source, target = np.random.default_rng(3).normal(size=(2, 40))
+    expected = target.copy()
+    linear.add_part(1.7, source, 3, expected, 11, count)
+    assert np.all((expected != target) == ((np.arange(40) >= 11) & (np.arange(40) < 11 + count)))
+    add_part(1.7, source, 3, target, 11, count)
+    assert np.array_equal(target, expected)
 
 
 @pytest.mark.parametrize(("count", "width"), [(0, 3), (1, 1), (2, 7), (9, 10), (3, 16), (4, 17)])

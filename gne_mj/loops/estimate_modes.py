@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.graph import Graph
-from gne_mj.loops.linear import weighted_sum
+from gne_mj.linear import weighted_sum
 from gne_mj.native import kernel
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from gne_mj.linear import add_multiple, add_multiples
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.estimate_modes import Modes, from_modes
 from gne_mj.loops.feedback import StepScratch
@@ -17,7 +18,6 @@ from gne_mj.loops.layout import (
     problem_in,
     steps_in,
 )
-from gne_mj.loops.linear import add_multiple, add_multiples
 from gne_mj.loops.rodas import ADDING, ORDER, STAGES, Method
 from gne_mj.loops.stage_system import (
     Fixed,

@@ -21,9 +21,9 @@ from gne_mj import banded
 from gne_mj import game_functions as games
 from gne_mj.controllers.settings import EPSILON, GAIN, RHO
 from gne_mj.game_model import GameData
+from gne_mj.linear import add_multiples
 from gne_mj.loops.estimate_modes import Modes, from_modes
 from gne_mj.loops.feedback import Problem
-from gne_mj.loops.linear import add_multiples
 from gne_mj.loops.rodas import GAMMA, STAGES, Method
 from gne_mj.native import copy, kernel
 from gne_mj.plants import functions

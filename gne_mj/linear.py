@@ -5,9 +5,10 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-from gne_mj.native import intrinsic_or, kernel
+from gne_mj.native import intrinsic_or, kernel, kernel_as
 
 LANES = 8  # numbers that are added at once
 
@@ -74,6 +75,47 @@ def weighted_sum(typingctx: Any, out: Any, matrix: Any, weights: Any) -> Any:
     return types.none(out, matrix, weights), codegen
 
 
+def add_part(factor: float, source: Any, first: int, target: Any, begin: int, count: int) -> None:
+    """target[begin + c] += factor * source[first + c] for c < count, of flat arrays.
+
+    Native code does it as :func:`weighted_sum`, and looks at no number.
+    """
+    for c in range(count):
+        target[begin + c] += factor * source[first + c]
+
+
+@intrinsic
+def _add_part(
+    typingctx: Any, factor: Any, source: Any, first: Any, target: Any, begin: Any, count: Any
+) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        scale, given, first, taken, begin, count = arguments
+        rows, out = (
+            make_array(signature.args[k])(context, builder, value).data
+            for k, value in ((1, given), (3, taken))
+        )
+        vectors, whole = _Vectors(builder), cgutils.intp_t
+        scales = vectors.everywhere(scale)
+        with cgutils.for_range_slice(builder, whole(0), count, whole(LANES)) as (c, _):
+            mask = vectors.below(builder.sub(count, c))
+            at = builder.add(begin, c)
+            old = vectors.load(out, at, mask)
+            more = vectors.load(rows, builder.add(first, c), mask)
+            vectors.store(builder.fadd(old, builder.fmul(scales, more)), out, at, mask)
+        return context.get_dummy_value()
+
+    place = types.intp
+    return types.none(types.float64, source, place, target, place, place), codegen
+
+
+@kernel
+def _add_native(factor, source, first, target, begin, count):
+    _add_part(factor, source, first, target, begin, count)
+
+
+kernel_as(_add_native, add_part)
+
+
 class _Vectors:
     """LLVM code for LANES numbers at once."""
 
@@ -88,11 +130,14 @@ class _Vectors:
         """Which lanes are among the first ``count``."""
         lanes = ir.VectorType(cgutils.intp_t, LANES)
         numbers = ir.Constant(lanes, [cgutils.intp_t(lane) for lane in range(LANES)])
-        one = self.builder.insert_element(
-            ir.Constant(lanes, ir.Undefined), count, ir.IntType(32)(0)
-        )
+        return self.builder.icmp_signed("<", numbers, self.everywhere(count))
+
+    def everywhere(self, value: Any) -> Any:
+        """A vector that has a value in each place."""
+        kind = ir.VectorType(value.type, LANES)
+        one = self.builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.IntType(32)(0))
         first = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        return self.builder.icmp_signed("<", numbers, self.builder.shuffle_vector(one, one, first))
+        return self.builder.shuffle_vector(one, one, first)
 
     def load(self, data: Any, at: Any, mask: Any) -> Any:
         """Those entries from ``at`` on that the mask has, zeros elsewhere."""
