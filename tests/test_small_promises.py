@@ -6,20 +6,24 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from batch_plans import ODE, all_chunks
 from builders import FIVE, clock, integrators, robot_state, robot_system, run_loop
 from own_games import boxed, plain_game
 
 from gne_mj import certificate, user_files
+from gne_mj.batches import make_plan
 from gne_mj.controllers import FullInformation
 from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
 from gne_mj.games import edges
 from gne_mj.games.platoon import _check_monotone
+from gne_mj.graph import ring
 from gne_mj.loops import division
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Case, EachLoop, Span
 from gne_mj.system import System
+from gne_mj.system.steps import largest_step
 from gne_mj.theory import Slopes, assumptions, convexity, search_push, theorem, trials
 from gne_mj.theory.assumption import MET, UNKNOWN
 from gne_mj.theory.gain import Gain, decay_rate
@@ -264,3 +268,21 @@ def test_a_period_whose_equation_was_not_solved_is_not_counted_as_solved():
     )  # fmt: skip
     *_, loop = run_loop(system, 1.0, 1)
     assert loop.monitor.unsolved == loop.monitor.solutions > 0.0
+
+
+def test_a_law_without_estimates_allows_any_step_whoever_hears_whom():
+    law = FullInformation()
+    object.__setattr__(law, "graph", ring(5))
+    assert law.estimate_rate == 0.0
+    assert largest_step(robot_system(robot_state(FIVE), law=law)) == np.inf
+
+
+def test_a_batch_draws_what_goes_wrong_by_the_seed_of_each_run():
+    """Two runs that differ in their seeds alone, as each would be alone."""
+    noise = {"type": "noise", "amplitude": 0.1}
+    changes = {**ODE, "faults": [noise], "simulation.duration": 0.1, "recording.period": 0.05}
+    plan = make_plan("velocity-sync", changes, starts=2)
+    ends = all_chunks(plan, 1)["final_action"][1]
+    for run in range(2):
+        alone = plan.alone(run).simulation_object().run()["robots"]["action"].to_numpy()[-1]
+        assert np.array_equal(ends[run], alone)
