@@ -23,7 +23,7 @@ from builders import (
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from test_division import NEAR, robots_outputs
+from test_division import NEAR, near_darkness, robots_outputs
 
 import reference
 from gne_mj import graph as graphs
@@ -232,6 +232,17 @@ def test_a_law_that_cannot_keep_the_set_leaves_it_and_that_is_said():
     assert len(found[0].advance(5, 1).input) == 0  # it has ended
 
 
+def test_an_exit_that_shorter_steps_have_too_is_told_at_its_time():
+    """With this epsilon outputs leave in continuous time: the barrier is at z, far from y."""
+    times = []
+    for how, h in (("tsit5", 0.01), ("tsit5", 0.002), ("rk4", 0.002)):
+        monitor = run_loop(replace(near_darkness(0.01), integrator=how), h, 50)[3].monitor
+        assert monitor.exit == watch.LEFT_SET
+        assert 0.0 <= monitor.exit_value < 1e-9
+        times.append(monitor.exit_time)
+    assert times == pytest.approx([times[-1]] * 3, abs=1e-7)
+
+
 def test_runs_do_not_depend_on_how_they_are_cut():
     whole, parts = (robots().closed_loop(clock(0.01)) for _ in range(2))
     one = whole.advance(40, 5)
@@ -276,6 +287,13 @@ def test_a_run_goes_on_from_where_it_is_with_other_numbers():
     slow.advance(10, 50)
     slow.adopt(robot_system(system.state, UNEQUAL, rho=0.5).setup(clock(1e-3)))
     assert np.max(np.abs(got - slow.advance(10, 50).state)) < 1e-9
+
+
+def test_estimates_too_fast_for_the_shortest_step_are_refused():
+    system = osnr_system(pi_cascades(10), distributed("line", 1e-6, 0.01), 0.1, integrator="tsit5")
+    system.closed_loop(clock(1e-3))
+    with pytest.raises(InvalidInput, match=r"'tsit5' can follow with timesteps of at most 0.003"):
+        system.closed_loop(clock(0.01))
 
 
 @pytest.mark.parametrize(

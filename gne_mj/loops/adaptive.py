@@ -97,7 +97,7 @@ def goes_on(faults, parts, pace, length, h):
     if length > h * SHORTEST or (deeper and pace.deep < division.PIECES):
         watch.forget_exit(monitor)
         return True
-    which, most, start = 0, 0.0, work.stages.g
+    which, most, start = 0, 0.0, work.stages.g  # the slack that has changed most
     for k in range(len(work.g)):
         slack = -start[k] - problem.data.tightening[k]
         part = abs(work.g[k] - start[k]) / slack
@@ -106,8 +106,6 @@ def goes_on(faults, parts, pace, length, h):
     if left and (guarded or deeper):
         which = int(monitor.exit_constraint)
         watch.forget_exit(monitor)
-    elif monitor.exit == watch.INSIDE and most < division.LITTLE:  # the set is not why
-        watch.leave(monitor, watch.DIVERGED, pace.end, -1, -1, np.inf, STAGES)
     watch.leave(monitor, watch.STEP_TOO_SMALL, pace.end, -1, which, start[which], 0)
     return False
 

@@ -4,31 +4,41 @@ import numpy as np
 
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput
+from gne_mj.loops.division import PIECES
 from gne_mj.system.clock import Clock
 from gne_mj.system.data import SystemData
 from gne_mj.system.modes import mode_of
 
 # Largest step times rate of decay that a method is stable for, on the negative real axis
-STABLE = {"rk4": 2.785, "euler": 2.0}
+STABLE = {"rk4": 2.785, "euler": 2.0, "tsit5": 3.506}
 
 
 def largest_step(system: SystemData) -> float:
-    """Largest step in s that the estimates allow under the integrator, mode continuous.
+    """Largest timestep in s that the estimates allow under the integrator, mode continuous.
 
     Explicit methods are stable for c lambda_max / tau (or lambda_max / epsilon) times the step
     up to a constant of the method; lambda_max bounds the grounded Laplacians' eigenvalues.
     Under partial information the action pulls an agent of mass M as an estimate of mass tau is
-    pulled, so that the lesser of both counts.
+    pulled, so that the lesser of both counts. Of "tsit5" it is the shortest piece of a timestep
+    that must be stable.
     """
-    law = system.law
-    if law.graph is None or law.estimate_rate == 0.0 or not mode_of(system).divides(system):
+    rate = estimates_rate(system)
+    if rate == 0.0 or system.integrator not in STABLE:
         return np.inf
+    return STABLE[system.integrator] * (PIECES if system.integrator == "tsit5" else 1) / rate
+
+
+def estimates_rate(system: SystemData) -> float:
+    """The greatest rate in 1/s at which estimates follow each other; 0 where it sets no limit."""
+    law = system.law
+    if law.graph is None or law.estimate_rate == 0.0 or mode_of(system).held:
+        return 0.0
     # z has the rate of an eigenvalue 1, which a graph with an edge exceeds
     fastest = max(1.0, law.graph.largest_eigenvalue)
     rate = law.estimate_rate
     if system.agents.mobility is not None:
         rate = max(rate, law.coupling * float(np.max(system.agents.mobility)))
-    return STABLE[system.integrator] / (fastest * rate)
+    return fastest * rate
 
 
 def check_step(system: SystemData, clock: Clock) -> None:
@@ -42,8 +52,8 @@ def check_step(system: SystemData, clock: Clock) -> None:
             "clock.timestep",
             clock.timestep,
             f"the estimates of '{system.name}' follow each other at up to"
-            f" {STABLE[system.integrator] / largest:.4g} /s, which '{system.integrator}' can follow"
-            f" with steps of at most {_rounded_down(largest):.3g} s; {others}",
+            f" {estimates_rate(system):.4g} /s, which '{system.integrator}' can follow"
+            f" with timesteps of at most {_rounded_down(largest):.3g} s; {others}",
         )
 
 
