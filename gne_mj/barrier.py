@@ -196,6 +196,12 @@ def halving(start, elapsed):
     return start * 2.0 ** -np.floor(elapsed)
 
 
+@kernel
+def unchanging(start, elapsed):
+    """A penalty that does not change, beside a game that does."""
+    return start
+
+
 for _fall in (exponential, reciprocal, halving):
     SCHEDULES.register(Fall(_fall.__name__, _fall))
 

@@ -77,13 +77,15 @@ class Runs:
 
     @cached_property
     def equilibrium(self) -> NDArray[np.float64]:
-        """(m,) y*; not a number where it is not known."""
-        return variables.equilibrium_of(self.system)
+        """(m,) y*, of a game that moves that of the end; not a number where it is not known."""
+        return self.system.equilibria(self.time[-1:])[0]
 
     @cached_property
     def distance(self) -> NDArray[np.float64]:
         """(runs, rows) max |y - y*|."""
-        greatest: NDArray[np.float64] = np.max(np.abs(self.y - self.equilibrium), axis=2)
+        greatest: NDArray[np.float64] = np.max(
+            np.abs(self.y - self.system.equilibria(self.time)), axis=2
+        )
         return greatest
 
     @cached_property

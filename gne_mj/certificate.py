@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import kept_apart, run_metrics
+from gne_mj import kept_apart, run_metrics, tracking
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
+from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
 from gne_mj.run_metrics import EXITS, SUCCESSES, TAIL
@@ -34,7 +35,11 @@ class Certificate:
         worst_constraint: the least margin -g over all constraints and integration steps, and
             ``each`` constraint's own.
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
-        equilibrium: penalised and variational, and how far from them the run ended.
+        equilibrium: penalised and variational, and how far from them the run ended; of a game that
+            moves those of the end, as is epsilon, and settling and ``converged`` are of the
+            distance to y*(t).
+        tracking: of games or penalties that move, the distance to y*(t) beside its bound
+            (:func:`gne_mj.tracking.report`); None of others.
         epsilon: what agents could gain at the penalised equilibrium, against
             :func:`gne_mj.epsilon.epsilon_bounds`.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
@@ -68,6 +73,7 @@ class Certificate:
     worst_constraint: dict[str, Any] | None
     worst_gap: dict[str, Any] | None
     equilibrium: dict[str, Any]
+    tracking: dict[str, Any] | None
     epsilon: dict[str, Any]
     settling_time: float | None
     lyapunov: dict[str, Any]
@@ -109,6 +115,7 @@ def certify_run(
     interrupted: bool = False,
     intervened: bool = False,
     network: dict[str, Any] | None = None,
+    period: float | None = None,
 ) -> Certificate:
     """Put together what a run of ``system`` showed.
 
@@ -123,9 +130,9 @@ def certify_run(
         wall_time: real time that it took.
         interrupted: the user stopped it.
         intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
+        period: control period in s; not asked for in mode continuous.
     """
-    known = system.known_equilibrium
-    distance = np.max(np.abs(action - (np.nan if known is None else known.action)), axis=1)
+    distance = np.max(np.abs(action - system.equilibria(time)), axis=1)
     (settled,) = run_metrics.settling_time(time, distance[None])
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
     holding = kept_apart.holding(system, time, action, (status, duration, tolerance))
@@ -135,8 +142,9 @@ def certify_run(
         message=message,
         worst_constraint=_worst_constraint(system, monitor),
         worst_gap=_worst_gap(system, monitor),
-        equilibrium=_equilibrium(system, action[-1]),
-        epsilon=_epsilon(system),
+        equilibrium=_equilibrium(system, action[-1], time[-1]),
+        tracking=tracking.report(system, time, action, period, _spoilt(monitor, intervened)),
+        epsilon=_epsilon(system, time[-1]),
         settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor, intervened),
         actuators=_actuators(system, monitor),
@@ -204,13 +212,15 @@ def _status(
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
     (tail,) = run_metrics.tail_distance(time, distance[None], duration)
     (word,) = run_metrics.status(watch.together([monitor]), np.array([tail]), tolerance)
+    moves = motion_of(system.game) is not None
+    which = "penalised equilibrium of each time" if moves else "penalised equilibrium"
     if word == "converged":
         return (
             "converged",
-            f"within {tail:.2g} of the penalised equilibrium over the last"
+            f"within {tail:.2g} of the {which} over the last"
             f" {TAIL * duration:g} s (tolerance {tolerance:g})",
         )
-    if system.known_equilibrium is None:
+    if system.equilibrium_at(end) is None:
         return (
             "completed",
             f"ran its {duration:g} s inside the set; no penalised equilibrium was found, so that"
@@ -218,8 +228,8 @@ def _status(
         )
     return (
         "completed",
-        f"ran its {duration:g} s inside the set; {distance[-1]:.3g} from the penalised"
-        f" equilibrium at the end (tolerance {tolerance:g})",
+        f"ran its {duration:g} s inside the set; {distance[-1]:.3g} from the"
+        f" {'moving ' * moves}penalised equilibrium at the end (tolerance {tolerance:g})",
     )
 
 
@@ -251,6 +261,12 @@ def _exit(system: System, monitor: Any) -> tuple[str, str]:
             EXITS[code],
             f"1/{PIECES} of the timestep is still too long next to constraint '{constraint}' {at}"
             f" (g = {value:.6g}): {_instead(system)} can go on there",
+        )
+    if code == watch.MOVED_PAST:
+        return (
+            EXITS[code],
+            f"constraint '{constraint}' moves past the present outputs within the control period"
+            f" that begins {at}: g = {value:.6g} at its end, not negative",
         )
     if monitor.exit_between > 0:
         at += ", between two control instants"
@@ -393,6 +409,10 @@ def _worst_gap(system: System, monitor: Any) -> dict[str, Any] | None:
     bounds = system.game.gap_bounds
     if bounds is None or not np.any(np.isfinite(worst)):
         return None
+    motion = motion_of(system.game)
+    others = () if motion is None else [each.gap_bounds for each in motion.others]
+    if not all(each is not None and np.array_equal(each, bounds) for each in others):
+        return None  # bounds that move
     gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
     index = int(np.argmax(gaps / bounds))
     return {
@@ -406,8 +426,17 @@ def _worst_gap(system: System, monitor: Any) -> dict[str, Any] | None:
     }
 
 
-def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
-    penalised = system.known_equilibrium
+def _spoilt(monitor: Any, intervened: bool) -> str:
+    """What was met in a run so that nothing is certain of how it tracks y*."""
+    if intervened:
+        return "agents were pushed or numbers changed meanwhile"
+    if monitor.saturated:
+        return f"an input met its limit at {monitor.saturated_time:g} s"
+    return "some inputs were not accurate" if monitor.unsolved else ""
+
+
+def _equilibrium(system: System, last: NDArray[np.float64], end: float) -> dict[str, Any]:
+    penalised = system.equilibrium_at(end)
     if penalised is None:
         keys = (
             "penalised", "multipliers", "residual", "final_distance", "variational",
@@ -421,7 +450,7 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
     try:
-        variational = variational_equilibrium(of_the_set(system.game), penalised)
+        variational = variational_equilibrium(of_the_set(system.game_at(end)), penalised)
         result["variational"] = variational.action.tolist()
         result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
     except SolverError:
@@ -429,21 +458,22 @@ def _equilibrium(system: System, last: NDArray[np.float64]) -> dict[str, Any]:
     return result
 
 
-def _epsilon(system: System) -> dict[str, Any]:
+def _epsilon(system: System, end: float) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
-    known, gains = system.known_equilibrium, None
+    known, gains, game = system.equilibrium_at(end), None, system.game_at(end)
     if known is not None:
         with suppress(SolverError):
-            gains = measured_epsilon(of_the_set(system.game), known.action)
+            gains = measured_epsilon(of_the_set(game), known.action)
     return {
         "measured": None if gains is None else float(np.max(gains)),
-        **epsilon_bounds(system.game, system.rho, known, gains=gains),
+        **epsilon_bounds(game, system.rho, known, gains=gains),
     }
 
 
 def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:
     start, rise = float(monitor.storage_start), float(monitor.storage_rise)
-    about = system.known_equilibrium is not None  # V is about y*
+    still = motion_of(system.game) is None
+    about = still and system.known_equilibrium is not None  # V is about y*
     known = about and system.agents.knows_storage
     unhindered = bool(monitor.started) and not monitor.saturated
     claimed = known and unhindered and not intervened and Theorem(system).lyapunov

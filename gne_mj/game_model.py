@@ -107,6 +107,7 @@ class Game:
             their second derivatives the same everywhere) or "convex"; None says nothing.
         smooth: whether the author says that F is twice continuously differentiable.
         equalities: which constraints are bands about an equality.
+        motion: how its numbers move, a :class:`gne_mj.motion.Motion`; None if they stand still.
         tested: whether the author's own tests compare the functions with each other and with what
             is declared here. The package's games say so: comparing them again at every load would
             only cost time. Of others :mod:`gne_mj.game_check` compares at load, and what they
@@ -144,6 +145,7 @@ class Game:
     tested: bool = False
     owners: Sequence[Sequence[int]] | None = None
     equalities: tuple[Equality, ...] = ()
+    motion: object = None
     written: Written = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

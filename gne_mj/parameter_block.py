@@ -26,19 +26,20 @@ class ParameterBlock:
 
     Attributes:
         arrays: as they were given.
+        kept_alive: what native code knows by addresses in them.
         modules: those of the run's kernels, where lanes can go through all of them
             (:mod:`gne_mj.loops.lane_batch`).
     """
 
     modules: Any = None
 
-    def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
+    def __init__(self, arrays: Sequence[NDArray[Any]], kept_alive: Any = None) -> None:
         for array in arrays:
             if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
                 raise EngineError(
                     f"native code reads contiguous arrays of 8-byte items, not {array.dtype}"
                 )
-        self.arrays = tuple(arrays)
+        self.arrays, self.kept_alive = tuple(arrays), kept_alive
         pairs = [(array.ctypes.data, array.size) for array in arrays]
         self._pairs = np.array(pairs, dtype=np.int64).reshape(-1)
 

@@ -1,4 +1,4 @@
-"""Games and laws of this Python process, which a scenario's tables name in place of a file.
+"""Games, laws and functions of time of this Python process, which tables name in place of a file.
 
 A scenario is text, so that it can be changed, swept and kept with results. What was made in a
 program or a notebook's cell is kept here under a name of its own, and the tables have that name.
@@ -9,6 +9,7 @@ has the same name.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from secrets import token_hex
+from types import FunctionType
 from typing import Any, Literal, TypeVar
 
 from pydantic import Field
@@ -19,7 +20,8 @@ from gne_mj.errors import InvalidInput
 from gne_mj.fingerprint import fingerprint
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
-from gne_mj.registry import GAMES, LAWS
+from gne_mj.registry import GAMES, LAWS, TIMES
+from gne_mj.time_functions import Signal, TimeTable, called
 from gne_mj.user_files import plain_law
 
 T = TypeVar("T")
@@ -81,6 +83,18 @@ class PythonGame(GameTable):
         if game.agents != count:
             raise InvalidInput("count", count, f"the {game.called} has {game.agents} agents")
         return game
+
+
+@TIMES.register
+class PythonFunction(TimeTable):
+    """A function of the time in s that a program made"""
+
+    type: Literal["python"]
+    object: str = Field(description=f"a function {OBJECT}")
+
+    def build(self) -> Signal:
+        """See the base class."""
+        return called(kept(self.object, FunctionType))
 
 
 @LAWS.register

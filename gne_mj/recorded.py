@@ -142,7 +142,7 @@ def _quantity(data: "xarray.Dataset", name: str) -> Quantity:
     """A quantity with its bounds, of values that are recorded and not found anew."""
     variable = data[name]
     bounds = {key: data[f"{name}_{key}"].to_numpy() for key in ("bound", "lower_bound")
-              if f"{name}_{key}" in data}  # fmt: skip
+              if f"{name}_{key}" in data and "time" not in data[f"{name}_{key}"].dims}  # fmt: skip
     about = {"long_name": name, "units": "", "symbol": "", **variable.attrs}
     return Quantity(
         name=name,

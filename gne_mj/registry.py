@@ -1,4 +1,4 @@
-"""What scenario files can name: games, agent types, laws, faults, modes and schedules.
+"""What scenario files can name: games, agent types, laws, faults, time functions, modes, schedules.
 
 Things with keys of their own are named by their tables, which register beside what they make:
 
@@ -66,6 +66,10 @@ class Registry:
     def __iter__(self) -> Iterator[str]:
         return iter(self._tables)
 
+    def __getitem__(self, tag: str) -> type[Table]:
+        """The table that has this literal."""
+        return self._tables[tag]
+
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """As an annotation: any one of the tables that are registered by then."""
         tables = tuple(self._tables.values())
@@ -120,7 +124,7 @@ class Names(Generic[N]):
         return name
 
 
-GAMES, AGENTS, FAULTS = Registry(), Registry(), Registry()
+GAMES, AGENTS, FAULTS, TIMES = Registry(), Registry(), Registry(), Registry()
 LAWS = Registry("information")
 MODES: Names[Any] = Names("mode")
 SCHEDULES: Names[Any] = Names("kind")

@@ -21,6 +21,7 @@ EXITS = {
     watch.FORCES_LOST: "forces_left_out",
     watch.TOO_NEAR: "too_near",
     watch.FORESEEN: "exit_foreseen",
+    watch.MOVED_PAST: "bound_moved_past",
 }
 STATUS = "<U28"  # dtype that holds every status, infeasible_start too
 SETTLED = 0.02  # of the initial distance

@@ -13,6 +13,7 @@ from typing import Any
 from gne_mj.bounds import check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game_model import Game
+from gne_mj.games.table import functions_in
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.scenario_tables.changes import change, complaint, full_key, plain, validated
 from gne_mj.trajectory import Trajectory
@@ -123,12 +124,18 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     systems = tables.get("systems")
     for system in systems.values() if isinstance(systems, dict) else ():
         for table in system.values() if isinstance(system, dict) else ():
-            given = table.get("file") if isinstance(table, dict) else None
-            if isinstance(given, str):
-                table["file"] = _absolute(folder, given)
-            elif isinstance(given, list):
-                table["file"] = [_absolute(folder, str(name)) for name in given]
+            _resolve_in(table, folder)
+        for _, function in functions_in(system.get("game") if isinstance(system, dict) else None):
+            _resolve_in(function, folder)
     return tables
+
+
+def _resolve_in(table: Any, folder: Path) -> None:
+    given = table.get("file") if isinstance(table, dict) else None
+    if isinstance(given, str):
+        table["file"] = _absolute(folder, given)
+    elif isinstance(given, list):
+        table["file"] = [_absolute(folder, str(name)) for name in given]
 
 
 def _absolute(folder: Path, name: str) -> str:

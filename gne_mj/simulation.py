@@ -17,6 +17,7 @@ from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput, named, part_of
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Present, Samples
+from gne_mj.motion import motion_of
 from gne_mj.plain import raise_pending
 from gne_mj.run_metrics import check_numbers
 from gne_mj.system import Clock, System
@@ -176,6 +177,11 @@ class Simulation:
         self._remade = remade
 
     def _change(self, system: System, what: str, about: Mapping[str, Any]) -> None:
+        if motion_of(system.game) is not None or motion_of(self._runs[system.name].system.game):
+            raise InvalidInput(
+                "changes", what or system.name,
+                "a game that moves stays as it is while it runs: change the scenario, and run it",
+            )  # fmt: skip
         with part_of("system", "clock"):
             self._runs[system.name].change(system)
         self._note(system.name, what, about)
@@ -292,7 +298,7 @@ class SystemRun:
             samples = self.loop.finish()
         state = samples.state[0]
         y = state[:, self.system.agents.kind.OUTPUT].copy()
-        constraint = self.system.game.constraints(y)
+        constraint = self.system.game_at(time).constraints(y)
         return Snapshot(time, y, samples.input[0], constraint, state, samples.memory[0])
 
     def advance(self, steps: int) -> None:
@@ -434,6 +440,7 @@ class SystemRun:
             interrupted=interrupted,
             intervened=intervened,
             network=self.loop.network,
+            period=self.clock.control_period,
         )
         return parts, certificate
 

@@ -283,7 +283,8 @@ def summary(solution: Solution) -> list[str]:
     game, variational, found = solution.game, solution.variational, solution.optimality
     unit = f" {game.action_unit}" if game.action_unit else ""
     kind = "GNE" if game.private else "variational GNE"
-    lines = [f"{solution.name}: {game.called}, {game.agents} agents"]
+    moves = ", as it is at time 0, and it moves" * (game.motion is not None)
+    lines = [f"{solution.name}: {game.called}, {game.agents} agents{moves}"]
     for point in solution.penalised:
         numbers = _compared(game, point)
         epsilon = numbers["epsilon"]

@@ -100,11 +100,26 @@ def _convergence(report: dict[str, Any]) -> dict[str, str]:
     away = f"{distances['final_distance']:.3g} to the penalised equilibrium"
     if distances["final_distance_to_variational"] is not None:
         away += f", {distances['final_distance_to_variational']:.3g} to the vGNE"
+    tracking = report.get("tracking")  # which older results do not have
     return {
         "settling time": "not settled" if settling is None else f"{settling:.4g} s",
         "distance at the end": away,
-        "Lyapunov function": _lyapunov(report["lyapunov"]),
+        "Lyapunov function": "not followed: y* moves"
+        if tracking is not None and tracking["game"]
+        else _lyapunov(report["lyapunov"]),
+        **({} if tracking is None else {"tracking": _tracking(tracking)}),
     }
+
+
+def _tracking(seen: dict[str, Any]) -> str:
+    text = (
+        f"at most {seen['largest_distance']:.3g} from y*(t), at {seen['largest_distance_time']:.4g}"
+        f" s, which moves at up to {seen['largest_rate']:.3g} per s"
+    )
+    if seen["not_known"] is not None:
+        return f"{text}; no bound: {seen['not_known']}"
+    inside = "within its bound at all samples" if seen["within"] else "BEYOND its bound"
+    return f"{text}; {inside}, at the end {seen['final_distance']:.3g} <= {seen['final_bound']:.3g}"
 
 
 def _lyapunov(seen: dict[str, Any]) -> str:

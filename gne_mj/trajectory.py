@@ -39,6 +39,7 @@ _ORDER = (
     "too_near",
     "left_feasible_set",
     "exit_foreseen",
+    "bound_moved_past",
     "estimate_left_feasible_set",
     "step_too_small",
     "interrupted",

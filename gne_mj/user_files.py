@@ -37,7 +37,8 @@ from gne_mj.plain import check_arguments
 from gne_mj.plants.agent_type import complete
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
-from gne_mj.registry import AGENTS, GAMES, LAWS
+from gne_mj.registry import AGENTS, GAMES, LAWS, TIMES
+from gne_mj.time_functions import Signal, TimeTable, called
 from gne_mj.toml_table import Fills, PerAgent, Sizes, dimension_of, per_agent
 
 # What the functions of a plain law are called, and take besides the scenario's parameters; and
@@ -228,6 +229,24 @@ class CustomGame(GameTable):
     def build(self, count: int) -> Game:
         """The game for ``count`` agents."""
         return load_game(self.file, count, self.parameters)
+
+
+@TIMES.register
+class FunctionTable(TimeTable):
+    """A Python function of the time in s, which returns a number"""
+
+    type: Literal["function"]
+    file: Annotated[str, Fills("path")] = Field(description="Python file that defines it")
+    function: str = Field(description="its name there")
+
+    def build(self) -> Signal:
+        """See the base class."""
+        found = getattr(load_module(self.file), self.function, None)
+        if not callable(found):
+            name = Path(self.file).name
+            raise InvalidInput("function", self.function, f"{name} must define it")
+        check_arguments("function", Path(self.file).name, found, self.function, ("t",))
+        return called(found)
 
 
 @LAWS.register

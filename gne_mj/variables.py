@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import moving_values
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.loops.base import Samples
+from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position, has_ode
 from gne_mj.quantity import Quantity
 from gne_mj.separation import nearest_distances
@@ -280,24 +282,69 @@ def _state(index: int, name: str, unit: str) -> Variable:
 
 def _quantities(system: SystemData) -> Iterator[Variable]:
     """What the game derives from its actions, with the bounds that it states."""
-    return (
-        _quantity(system.game.entries(quantity), quantity) for quantity in system.game.quantities
-    )
+    game = system.game
+    for index, quantity in enumerate(game.quantities):
+        bounds = quantity.bounds(game.entries(quantity))
+        moves = moving_values.bounds_move(game, index)
+        yield _quantity(index, quantity, {} if moves else bounds)
+        for name in bounds if moves else ():
+            yield _moving_bound(name, index, quantity)
 
 
-def _quantity(entries: tuple[int, ...], quantity: Quantity) -> Variable:
+def _quantity(index: int, quantity: Quantity, bounds: Mapping[str, Array]) -> Variable:
     return Variable(
         quantity.name,
-        ("time", *((quantity.each,) if quantity.each else ())),
-        lambda rows: quantity.at(rows.y, entries),
+        _dimensions(quantity),
+        lambda rows: moving_values.quantity(rows.system, index, rows.time, rows.y),
         unit=quantity.unit,
         long_name=quantity.long_name,
         symbol=quantity.symbol,
         more=_drawn(quantity),
-        bounds=lambda system: quantity.bounds(entries),
+        bounds=lambda system: bounds,
         figure=True,
         page="line",
     )
+
+
+def _moving_bound(name: str, index: int, quantity: Quantity) -> Variable:
+    return Variable(
+        name,
+        _dimensions(quantity),
+        lambda rows: moving_values.bounds(rows.system, index, rows.time)[name],
+        unit=quantity.unit,
+    )
+
+
+def _dimensions(quantity: Quantity) -> tuple[str, ...]:
+    return ("time", *((quantity.each,) if quantity.each else ()))
+
+
+def _equilibrium(system: SystemData) -> Iterator[Variable]:
+    """y*, over time where the game moves."""
+    yield Variable(
+        "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
+        there=lambda system: motion_of(system.game) is None,
+        unit=_action_unit, long_name="y*", batch=False,
+        runs=(
+            Variable(
+                "equilibrium", ("run", AXIS),
+                lambda runs: np.tile(runs.equilibrium, (len(runs.monitors), 1)),
+                unit=_action_unit, long_name="y*",
+            ),
+        ),
+    )  # fmt: skip
+    yield Variable(
+        "equilibrium", ("time", AXIS), lambda rows: rows.system.equilibria(rows.time),
+        there=lambda system: motion_of(system.game) is not None,
+        unit=_action_unit, long_name="y*(t)",
+        runs=(
+            Variable(
+                "final_equilibrium", ("run", AXIS),
+                lambda runs: np.tile(runs.equilibrium, (len(runs.monitors), 1)),
+                unit=_action_unit, long_name="y* at the end",
+            ),
+        ),
+    )  # fmt: skip
 
 
 def _drawn(quantity: Quantity) -> dict[str, str]:
@@ -401,17 +448,7 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         "state", ("time", AXIS, "component"), lambda rows: rows.samples.state,
         unit=_state_units, page="behind", batch=False,  # whose rows have its components
     ),
-    Variable(
-        "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
-        unit=_action_unit, long_name="y*", batch=False,
-        runs=(
-            Variable(
-                "equilibrium", ("run", AXIS),
-                lambda runs: np.tile(runs.equilibrium, (len(runs.monitors), 1)),
-                unit=_action_unit, long_name="y*",
-            ),
-        ),
-    ),
+    _equilibrium,
     _states,
     _quantities,
     Variable(
@@ -421,7 +458,8 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         bounds=_least_distances, figure=True, page="line",
     ),
     Variable(
-        "constraint", ("time", "constraint"), lambda rows: rows.system.game.constraints(rows.y),
+        "constraint", ("time", "constraint"),
+        lambda rows: moving_values.constraints(rows.system, rows.time, rows.y),
         long_name="constraint, negative inside the set", symbol="g_l",
         bounds=lambda system: {"constraint_bound": np.zeros(system.game.constraints_count)},
         figure=True, page="line",

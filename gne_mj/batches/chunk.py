@@ -23,6 +23,7 @@ from gne_mj.errors import InfeasibleStart, part_of
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.batch import Case, Outcome
 from gne_mj.loops.layout import Setup
+from gne_mj.motion import motion_of
 from gne_mj.plain import raise_pending
 from gne_mj.system import Clock, System
 from gne_mj.toml_table import per_action
@@ -202,7 +203,10 @@ class Runner:
                     yield None
                     continue
             parameter_block = shared
-            if system.faults and seed != system.seed:  # what is random in them
+            if motion_of(system.game) is not None:  # numbers that each run moves for itself
+                own = system.setup(combination.clock)
+                parameter_block = structure.parameter_block(system, _seeded(own, seed))
+            elif system.faults and seed != system.seed:  # what is random in them
                 parameter_block = structure.parameter_block(system, _seeded(setup, seed))
             yield Case(
                 state=state,

@@ -12,6 +12,7 @@ from gne_mj.environment.physics import FleetPhysics
 from gne_mj.environment.task import FleetEnvironment, FleetTask, Start, finite_costs
 from gne_mj.errors import InvalidInput, named, nearest, part_of
 from gne_mj.graph import NAMED, Graph
+from gne_mj.motion import motion_of
 from gne_mj.plants.fleet_plant import build_fleet
 from gne_mj.scenario import load_scenario
 from gne_mj.starts import random_starts
@@ -106,6 +107,8 @@ def _check(system: System) -> None:
     """Refuse what an environment does not have."""
     if system.engine != "mujoco":
         raise InvalidInput("system.engine", system.engine, "an environment is of engine 'mujoco'")
+    if motion_of(system.game) is not None:
+        raise InvalidInput("system.game", "numbers that move", "an environment's stand still")
     if system.faults:
         raise InvalidInput(
             "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
+from gne_mj.motion import motion_of
 from gne_mj.system import System
 
 Policy = Callable[[dm_env.TimeStep], NDArray[np.float64]]
@@ -27,6 +28,10 @@ def law_policy(system: System) -> Policy:
             "system.schedule",
             system.schedule.kind,
             "the policy does not know the time: leave the schedule out",
+        )
+    if motion_of(system.game) is not None:
+        raise InvalidInput(
+            "system.game", "numbers that move", "the policy does not know the time: let them stand"
         )
     game, barrier, limit = system.game, system.barrier, system.agents.input_limit
 

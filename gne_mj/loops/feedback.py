@@ -12,6 +12,7 @@ from gne_mj.game_model import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
+from gne_mj.motion import STANDING, Moving
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers
 from gne_mj.records import in_array
@@ -85,6 +86,7 @@ class Problem(NamedTuple):
     # where control periods may end early, of every step and constraint: gne_mj.loops.guard
     ahead: Annotated[np.ndarray, "n"] = np.zeros(0)
     kept: KeptData = EVERYTHING  # the estimates that the law keeps, where these are not all
+    motion: Moving = STANDING  # of the game's numbers, which functions.PENALTY moves too
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)
     parameter_block: int = 0

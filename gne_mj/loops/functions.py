@@ -12,8 +12,8 @@ ACTION, RATE, PROPAGATE, STORAGE = range(4)
 PREPARE, BARRIER_FREE_TERMS, ADD_BARRIER_FREE_SLOPE, OWN_PROFILE, MEMORY_OUTPUTS, SOLVE, ACT = (
     range(4, 11)
 )
-# For penalties that change in time, agents whose positions follow their outputs, bodies that
-# collide, and agents that keep apart
+# For penalties and games that change in time, agents whose positions follow their outputs, bodies
+# that collide, and agents that keep apart
 PENALTY, POSITIONS, CONTACTS, KEEP_APART, PUSH_APART, COUNT = range(11, 17)
 
 
@@ -31,7 +31,8 @@ def action(problem, y, weights, memory, work, u):
 
 @kernel
 def penalty(problem, time, rho):
-    """The penalty at a time in s: rho, or what the schedule says."""
+    """The penalty at a time in s: rho, or what the schedule says; a game that moves is brought to
+    that time."""
     if problem.functions[PENALTY] == 0:
         return rho
     return call_number(problem.functions[PENALTY], (problem.parameter_block, time))

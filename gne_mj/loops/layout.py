@@ -87,6 +87,7 @@ class Setup(NamedTuple):
     solver: int = 0
     separation: int = 0
     rtol: float = 0.0  # integrator tsit5
+    kept_alive: Any = None  # what native code knows by address
 
 
 def parameter_arrays(
@@ -136,7 +137,7 @@ def parameter_arrays(
 def ode_parameter_block(setup: Setup, agents: Agents, memory: int) -> ParameterBlock:
     """The parameter block of a run of ODE agents; ``memory`` is the length of the law's."""
     nothing = [np.zeros(0)] * PLANT_BLOCK
-    return ParameterBlock(parameter_arrays(nothing, setup, agents, memory, 1))
+    return ParameterBlock(parameter_arrays(nothing, setup, agents, memory, 1), setup.kept_alive)
 
 
 def steps_of(parameter_block: ParameterBlock) -> Steps:

@@ -27,6 +27,7 @@ from gne_mj.loops.layout import (
 )
 from gne_mj.loops.monitor import MonitorNumbers
 from gne_mj.loops.newton import solver_in
+from gne_mj.motion import move
 from gne_mj.native import callback, kernel, source_key
 from gne_mj.numbers import names_of, numbers_in
 from gne_mj.parameter_block import floats_at
@@ -163,6 +164,20 @@ def penalty(fall: Callable[[float, float], float]) -> Any:
     def penalty(block, time):
         _ = source
         return scheduled(fall, problem_in(block).schedule, time)
+
+    return callback(_real(_whole, _real), penalty)
+
+
+@cache
+def penalty_of_moving(fall: Callable[[float, float], float]) -> Any:
+    """The same of a game that moves, whose numbers are brought to that time."""
+    source = source_key(sys.modules[fall.__module__])
+
+    def penalty(block, time):
+        _ = source
+        problem = problem_in(block)
+        move(problem.motion, time)
+        return scheduled(fall, problem.schedule, time)
 
     return callback(_real(_whole, _real), penalty)
 
@@ -305,6 +320,7 @@ def solve(equation: ModuleType) -> Any:
 def act(
     plant: ModuleType,
     faults: ModuleType,
+    game: ModuleType,
     at: Any,
     find: Callable[..., Any] = implicit.act,
 ) -> Any:
@@ -313,20 +329,24 @@ def act(
     Args:
         plant: module that predicts, :mod:`gne_mj.plants.zero_order_hold` and its like.
         faults: :mod:`gne_mj.loops.faultless` or one of those in its place.
+        game: :mod:`gne_mj.loops.standing` or :mod:`gne_mj.loops.moving`.
         at: where MuJoCo keeps what, for a plant that asks it.
         find: the kernel that finds the input: :func:`gne_mj.loops.implicit.act`, or one of
             :mod:`gne_mj.loops.guard`.
     """
-    source = source_key(plant, faults)
+    source = source_key(plant, faults, game)
 
     def act(block, workspace, time, step, state, memory, model, data):
         _ = source
         steps = steps_in(block)
         parts = parts_at(block, workspace, steps)
+        if not game.to_period_end(parts, time):
+            return 0
         good = find(
             faults, plant, (at, model, data, block), parts, Instant(time, step, 0),
             floats_at(state, steps.actions * steps.states), floats_at(memory, steps.memory),
         )  # fmt: skip
+        game.back(parts, time)
         return 1 if good else 0
 
     return callback(_whole(_whole, _whole, _real, *[_whole] * 5), act)

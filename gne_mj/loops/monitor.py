@@ -92,9 +92,11 @@ class Monitor(NamedTuple):
 # TOO_NEAR: two agents are; exit_agent and exit_constraint say which, as they do where a step is too
 # small for two agents
 # FORESEEN: the input that there is leads outside within one step, and is not given
+# MOVED_PAST: a bound moves past the outputs within the control period that begins at exit_time
 INSIDE, LEFT_SET, ESTIMATE_LEFT, DIVERGED, STEP_TOO_SMALL, FORCES_LOST, TOO_NEAR, FORESEEN = range(
     8
 )
+MOVED_PAST = 8
 
 
 def fresh(actions: int, constraints: int, *runs: int) -> Any:

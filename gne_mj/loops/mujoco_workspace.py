@@ -127,7 +127,7 @@ def mujoco_parameter_block(
     arrays = parameter_arrays(
         plant.arrays_for(agents), setup, agents, memory, STAGES[plant.integrator]
     )
-    return ParameterBlock(arrays)
+    return ParameterBlock(arrays, setup.kept_alive)
 
 
 def put_start(

@@ -132,7 +132,11 @@ def _drawn(data: "xarray.Dataset", name: str) -> "Figure":
         each = "\neach " if len(numbers) > 1 else " "
         label: str | None = f"bound of{each}{words.split(',')[0]}"
         for bound in (f"{name}_bound", f"{name}_lower_bound"):
-            if bound in data:
+            if bound in data and "time" in data[bound].dims:
+                limit = data[bound].to_numpy().reshape(len(variable), -1)[:, mine]
+                _moving_bounds(panel, data["time"].to_numpy(), limit, numbers, label)
+                label = None
+            elif bound in data:
                 _bounds(panel, data[bound].to_numpy().reshape(-1)[mine], numbers, label)
                 label = None
         # trajectories hold no symbol of the action
@@ -156,6 +160,21 @@ def _lines(
     for index, number in enumerate(numbers):
         label = labels[index] if labels else None
         axes.plot(time, values[:, index], label=label, **line_style(int(number)))
+
+
+def _moving_bounds(
+    axes: "Axes",
+    time: NDArray[np.float64],
+    bounds: NDArray[np.float64],
+    numbers: NDArray[np.int64],
+    label: str | None,
+) -> None:
+    """The same of bounds (time, lines) that move."""
+    for index, number in enumerate(numbers):
+        colour = line_style(int(number))["color"] if len(numbers) > 1 else "black"
+        dashes = (0, (4, 3))
+        axes.plot(time, bounds[:, index], color=colour, lw=0.9, linestyle=dashes, label=label)
+        label = None
 
 
 def _bounds(

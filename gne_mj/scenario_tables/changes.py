@@ -115,7 +115,7 @@ def full_key(tables: Mapping[str, Any], key: str, value: Any = None) -> list[str
 
 
 def plain(value: Any) -> Any:
-    """A value as scenario files have it: objects become their tables, arrays lists."""
+    """A value as scenario files have it: objects and functions become tables, arrays lists."""
     if isinstance(value, Table):
         return value.model_dump(mode="json", exclude_none=True)
     if isinstance(value, Game):
@@ -130,6 +130,9 @@ def plain(value: Any) -> Any:
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
+    if callable(value):
+        name = getattr(value, "__name__", "function")
+        return {"type": "python", "object": keep(value, name, value)}
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -194,6 +197,10 @@ def complaint(error: ValidationError) -> InvalidInput:
     value = detail["input"]
     context = detail.get("ctx", {})
     kind = detail["type"]
+    if kind == "time_function":
+        return InvalidInput(
+            ".".join([*where, str(context["key"])]), context["value"], context["expected"]
+        )
     if kind == "unknown_key":
         return InvalidInput(
             ".".join([*where, str(context["key"])]),

@@ -296,6 +296,12 @@ class SystemTable(Table):
         disturbance = self._disturbance(game)
         if disturbance is None:
             return game, agents
+        if self.game.moving:
+            raise InvalidInput(
+                "margin",
+                "given",
+                f"no margin is known for a game that moves (game.{self.game.moving[0]})",
+            )
         if not MODES[self.controller.mode].promises:
             raise InvalidInput(
                 "margin", "given", "it is for mode 'implicit', where a margin is a promise"
@@ -315,7 +321,7 @@ class SystemTable(Table):
 
     def _game(self) -> Game:
         with part_of("game"):
-            return self.game.build(self.agents.count)
+            return self.game.game(self.agents.count)
 
     def _disturbance(self, game: Game) -> Disturbance | None:
         if self.margin is None:

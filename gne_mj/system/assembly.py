@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.barrier import unchanging
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.propagation import Propagator, no_propagator
 from gne_mj.controllers.settings import GUARDED, LINKS
@@ -21,10 +22,11 @@ from gne_mj.loops.changing_network import ChangingNetworkLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
-from gne_mj.loops.link import link, penalty, positions, separation
+from gne_mj.loops.link import link, penalty, penalty_of_moving, positions, separation
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.loops.one_loop import OneLoop
 from gne_mj.loops.separation import neighbours_length
+from gne_mj.motion import STANDING, Motion, motion_of
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
 
 _METHODS = {**METHODS, "tsit5": TSIT5}
+_LOOKED_AT = 200  # sample times at which a game that moves must have an interior, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +119,11 @@ class Assembly(SystemData):
     @property
     def _others(self) -> dict[int, Any]:
         found = dict(mode_of(self).prediction(self))
-        if self.schedule is not None:
-            found[functions.PENALTY] = penalty(self.schedule.fall)
+        fall = unchanging if self.schedule is None else self.schedule.fall
+        if motion_of(self.game) is not None:
+            found[functions.PENALTY] = penalty_of_moving(fall)
+        elif self.schedule is not None:
+            found[functions.PENALTY] = penalty(fall)
         if self.start_positions is not None:
             found[functions.POSITIONS] = positions()
         if self.agents.contacts:
@@ -160,16 +166,21 @@ class Assembly(SystemData):
         with named(period="clock.control_period"):
             moved = self._moved_by(clock)
             propagator = self.law.propagator(moved) if mode.held else no_propagator()
+        motion = motion_of(self.game)
+        frame = None if motion is None else motion.frame()
+        if motion is not None:
+            self._check_motion(clock, motion)
         problem = Problem(
-            data=self.game.data,
             graph=self.graph_at_start,
+            data=self.game.data if frame is None else frame.data,
+            motion=STANDING if frame is None else frame.moving,
             settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.centre,
             size=self.typical_sizes,
             propagator=propagator,
             kept=self.law.kept_data,
-            schedule=np.zeros(3) if self.schedule is None else self.schedule.numbers,
+            schedule=self._penalty_numbers,
             order=self.rows,
             separation=np.zeros(3) if self.separation is None else self.separation.numbers,
             ahead=room_ahead(self, clock),
@@ -188,11 +199,25 @@ class Assembly(SystemData):
             ),
             *self._sizes,
             rtol=self.rtol,
+            kept_alive=frame,
         )
 
     def _moved_by(self, clock: Clock) -> float:
         """How long in s a law's memory moves at once in the held modes."""
         return clock.timestep if self.guarded else clock.control_period
+
+    def _check_motion(self, clock: Clock, motion: Motion) -> None:
+        """Refuse sets that are known to be empty at some time of a run, with the time."""
+        every = max(1, round(clock.duration / clock.sample_period) // _LOOKED_AT)
+        times = np.arange(0.0, clock.duration, every * clock.sample_period).tolist()
+        for time in sorted({*times, *(t for t in motion.knots if t <= clock.duration)}):
+            self.path.at(time)
+
+    @property
+    def _penalty_numbers(self) -> NDArray[np.float64]:
+        if self.schedule is not None:
+            return self.schedule.numbers
+        return np.array([self.rho, 0.0, 0.0]) if motion_of(self.game) else np.zeros(3)
 
     @property
     def typical_sizes(self) -> NDArray[np.float64]:

@@ -8,11 +8,12 @@ import numpy as np
 
 from gne_mj.bounds import check_room
 from gne_mj.changing_graph import ChangingGraph, DiscGraph
-from gne_mj.controllers import Law
+from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import for_native, message_delay, sensor_delay, strikes_messages
 from gne_mj.game_model import Game
 from gne_mj.loops.feedback import Problem
+from gne_mj.motion import motion_of
 from gne_mj.native import INTERPRETED
 from gne_mj.plants.agent_type import has_ode, in_mujoco
 from gne_mj.system.data import ADAPTIVE, SystemData
@@ -55,6 +56,11 @@ def check_parts(system: SystemData) -> None:
             system.law.graph.agents,
             f"the game has {system.game.agents} agents",
         )
+    if motion_of(system.game) is not None and isinstance(system.law, PlainLaw):
+        raise InvalidInput(
+            "law", "plain functions", "they are given a game that stands still: let its numbers"
+            " stand, or write the law as kernels",
+        )  # fmt: skip
     mode = mode_of(system)
     mode.check_law(system)
     if system.decentralised and not mode.shares_slack(system):
@@ -154,6 +160,10 @@ def check_engine(system: SystemData) -> None:
             "integrator",
             system.integrator,
             "it is for a penalty that does not change in time; use 'rk4'",
+        )
+    if motion_of(system.game) is not None and system.integrator == "rosenbrock":
+        raise InvalidInput(
+            "integrator", system.integrator, "it is for games whose numbers stand still; use 'rk4'"
         )
     kind = system.agents.kind
     if system.engine == "mujoco" and INTERPRETED:

@@ -11,13 +11,22 @@ from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import Law
 from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
+from gne_mj.equilibrium_path import EquilibriumPath
 from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
 from gne_mj.game_model import Game
 from gne_mj.graph import GraphData
-from gne_mj.loops import faultless, faultless_apart, guarded, guarded_faults
+from gne_mj.loops import (
+    faultless,
+    faultless_apart,
+    guarded,
+    guarded_faults,
+    moving,
+    standing,
+)
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance
+from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position, placed_state
 from gne_mj.plants.agents import Agents
 from gne_mj.separation import Separation
@@ -124,6 +133,43 @@ class SystemData:
         if self.faults:
             return native_faults
         return faultless if self.separation is None else faultless_apart
+
+    @property
+    def moves(self) -> bool:
+        """Whether its game or its penalty changes in time."""
+        return self.schedule is not None or motion_of(self.game) is not None
+
+    @cached_property
+    def path(self) -> EquilibriumPath:
+        """Where the penalised equilibrium is while game or penalty move."""
+        falling = self.schedule
+
+        def penalty(time: float) -> float:
+            return self.rho if falling is None else float(falling.at(time))
+
+        return EquilibriumPath(self.game, penalty, self.start)
+
+    def game_at(self, time: float) -> Game:
+        """The game at a time in s, until it is asked for at another one."""
+        return self.game if motion_of(self.game) is None else self.path.game(time)
+
+    def equilibrium_at(self, time: float) -> Equilibrium | None:
+        """What runs are judged by at a time in s: y*, of a game that moves that of the time."""
+        still = motion_of(self.game) is None
+        return self.known_equilibrium if still else self.path.at(time).equilibrium
+
+    def equilibria(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same of times (samples,): (samples, m), not a number where it is not known."""
+        if motion_of(self.game) is not None:
+            return self.path.actions(times)
+        known = self.known_equilibrium
+        middle = np.full(self.game.actions, np.nan) if known is None else known.action
+        return np.broadcast_to(middle, (len(times), self.game.actions))
+
+    @property
+    def game_kernels(self) -> ModuleType:
+        """The module that brings the game to a period's end in this system's loops."""
+        return standing if motion_of(self.game) is None else moving
 
     @property
     def recorded(self) -> int:

@@ -13,6 +13,7 @@ from gne_mj.loops import link
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.newton import solver_length
 from gne_mj.margins import errors_ahead, tightening
+from gne_mj.motion import motion_of
 from gne_mj.plants import zero_order_hold
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.registry import MODES
@@ -44,6 +45,8 @@ def check_guard(system: SystemData) -> None:
             key, value, "agents that keep apart look at each other at the clock's own control"
             " instants: leave it out, or [separation]",
         )  # fmt: skip
+    if motion_of(system.game) is not None:
+        raise InvalidInput(key, value, "it looks at bounds that stand still, and the game moves")
     late = system.disturbance is not None and system.disturbance.delay > 0
     if late or sensor_delay(system.faults) > 0:
         raise InvalidInput(
@@ -60,7 +63,7 @@ def acting(system: SystemData, find: Callable[..., Any]) -> Any:
         from gne_mj.plants import mjcf_prediction, native_mujoco  # late: MuJoCo is slow to import
 
         plant, at = mjcf_prediction, native_mujoco.offsets()
-    return link.act(plant, system.fault_kernels, at, find)
+    return link.act(plant, system.fault_kernels, system.game_kernels, at, find)
 
 
 def room_for(system: SystemData, rows: Order) -> int:

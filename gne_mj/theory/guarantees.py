@@ -17,6 +17,7 @@ from gne_mj.theory import verdict
 from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.constants import SAMPLED, told
 from gne_mj.theory.coupling import needed_connectivity
+from gne_mj.theory.moving import moving
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
 from gne_mj.theory.positions import positions_of
@@ -51,6 +52,7 @@ class Guarantees:
     held: dict[str, Any] | None
     positions: dict[str, Any] | None
     separation: dict[str, Any] | None
+    moving: dict[str, Any] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
     measured: list[str]
@@ -87,7 +89,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
     held = ZeroOrderHold(system, clock) if mode_of(system).promises else None
     law, pieces = system.law, forecast(system, clock)
     positions, apart = positions_of(system, clock), kept_apart(theorem, held, clock)
-    known = system.known_equilibrium
+    motion, known = moving(system, clock), system.known_equilibrium
     return Guarantees(
         system=_system(system),
         status=HELD if held is not None and held.promised else theorem.status,
@@ -110,30 +112,30 @@ def certify(system: System, clock: Clock) -> Guarantees:
             **theorem.epsilon,
         },
         inputs=(theorem if held is None else held).commanded_input.report(),
-        periods={
-            "push": _at_both(system, push_period),
-            "linear": _at_both(system, linear_period),
-            "control_period": clock.control_period if mode_of(system).held else None,
-            "timestep": clock.timestep,
-            "largest_timestep_for_estimates": largest_step(system),
-        },
+        periods=_periods(system, clock),
         division=None if pieces is None else asdict(pieces),
         held=None
         if held is None
         else {**held.report(), "period_search": None, "push_search": None},
         positions=None if positions is None else positions.report(),
         separation=None if apart is None else apart.report(),
+        moving=None if motion is None else motion.report(),
         lyapunov_claimed=theorem.lyapunov,
         guaranteed=verdict.together(
             verdict.guaranteed(theorem, held),
             [] if positions is None else positions.guaranteed(theorem, held),
-            [] if apart is None else apart.guaranteed(),
+            *(part.guaranteed() for part in (apart, motion) if part is not None),
         ),
         measured=verdict.measured(theorem, pieces),
         not_certified=[
             *verdict.not_certified(theorem, held, pieces),
             *([] if positions is None else positions.not_certified(held)),
-            *([] if apart is None else apart.not_certified()),
+            *(
+                each
+                for part in (apart, motion)
+                if part is not None
+                for each in part.not_certified()
+            ),
         ],
     )
 
@@ -230,6 +232,17 @@ def _start(system: System, box: Box | None) -> dict[str, Any]:
         distance = float(np.max(np.abs(values - system.start[of]), initial=0.0))
         found["estimates"] = {"largest_distance_from_actions": distance}
     return found
+
+
+def _periods(system: System, clock: Clock) -> dict[str, Any]:
+    """Rules of thumb for periods and steps in s."""
+    return {
+        "push": _at_both(system, push_period),
+        "linear": _at_both(system, linear_period),
+        "control_period": clock.control_period if mode_of(system).held else None,
+        "timestep": clock.timestep,
+        "largest_timestep_for_estimates": largest_step(system),
+    }
 
 
 def _at_both(system: System, rule: Any) -> dict[str, float | None]:

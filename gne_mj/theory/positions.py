@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.system import Clock, System
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, Assumption
@@ -38,7 +39,11 @@ class Positions:
         worst, value = self.system.game.tightest(self._start)
         name = self.system.game.constraint_names[worst]
         start = Assumption("positions' start", MET, f"inside, least margin {-value:.6g} ({name})")
-        return one, convex_constraints(self.system), start
+        found = [one, convex_constraints(self.system), start]
+        if (motion := motion_of(self.system.game)) is not None and motion.moves_constraints:
+            why = "the set moves, and positions lag behind outputs"
+            found.append(Assumption("a set that stands still", FAILS, why))
+        return tuple(found)
 
     @property
     def granted(self) -> bool:

@@ -63,12 +63,25 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "positions", _positions(g["positions"])
     if g["separation"] is not None:
         yield "separation", _separation(g["separation"])
+    if g["moving"] is not None:
+        yield "moving", _moving(g["moving"])
     for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
     for n, sentence in enumerate(g["measured"]):
         yield "only measured" if n == 0 else "", sentence
     for n, sentence in enumerate(g["not_certified"]):
         yield "not certified" if n == 0 else "", sentence
+
+
+def _moving(game: dict[str, Any]) -> str:
+    moves = (f"{key} at up to {rate:.4g} per s"
+             for key, rate in zip(game["keys"], game["rates"], strict=True))  # fmt: skip
+    text = f"{', '.join(moves)}; all else here is of time 0"
+    if game["equilibrium_rate"] is not None:
+        text += f"; y* moves at up to {game['equilibrium_rate']:.4g} per s"
+    if game["equilibrium_rate_bound"] is not None:
+        text += f", which is at most {game['equilibrium_rate_bound']:.4g} by mu"
+    return text
 
 
 def _separation(apart: dict[str, Any]) -> str:

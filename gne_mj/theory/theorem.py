@@ -11,6 +11,7 @@ from gne_mj.epsilon import epsilon_bounds
 from gne_mj.game_model import Box
 from gne_mj.graph import complete
 from gne_mj.loops.feedback import LARGEST_INPUT
+from gne_mj.motion import motion_of
 from gne_mj.system import System, mode_of
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory import assumptions
@@ -165,6 +166,8 @@ class Theorem:
             found.append(f"the gain k = {gain.gain:g} must exceed {gain.least:.6g}")
         if self.system.schedule is not None:
             found.append("the penalty changes in time, and the theorems have a constant one")
+        if motion_of(self.system.game) is not None:
+            found.append("the game moves, and the paper's theorems have one that stands still")
         if self.system.faults:
             found.append("the scenario has faults, and the theorems have none")
         if self.system.separation is not None:

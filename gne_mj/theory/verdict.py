@@ -1,5 +1,6 @@
 """The verdict in sentences: what is guaranteed, what only measured, what not certified."""
 
+from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import mode_of
 from gne_mj.theory.assumption import ASSUMED
@@ -83,6 +84,8 @@ def _limit(theorem: Theorem) -> str:
 def measured(theorem: Theorem, pieces: Pieces | None = None) -> list[str]:
     """What a run tells beyond that."""
     found = ["margins of all constraints, V and the distance to y*, at every integration step"]
+    if motion_of(theorem.system.game) is not None:
+        found = ["margins of all constraints at every integration step, and the distance to y*(t)"]
     if theorem.status == CERTIFIED:
         found.append("how closely the integrator follows continuous time, near the boundary too")
     if pieces is not None:

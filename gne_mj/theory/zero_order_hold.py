@@ -18,6 +18,7 @@ from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.commanded_input import CommandedInput, limited
 from gne_mj.theory.convexity import convex_constraints, own_convexity
 from gne_mj.theory.disturbances import strength
+from gne_mj.theory.moving import moving
 from gne_mj.theory.theorem import Theorem
 
 
@@ -64,6 +65,8 @@ class ZeroOrderHold:
             self._slopes(),
             self._inputs(),
         ]
+        if (game := moving(self.system, self.clock)) is not None:
+            found.append(game.assumption())
         if self.system.disturbance is not None or self.system.faults:
             found.append(self._disturbances())
         return tuple(found)

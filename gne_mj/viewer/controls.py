@@ -68,6 +68,8 @@ def controls_of(scenario: Scenario) -> list[Control]:
     """What can be changed while a scenario runs: penalties, reference velocities, gains."""
     found = []
     for name, table in scenario.systems.items():
+        if table.game.moving:  # which stays as it is while it runs
+            continue
         start = f"systems.{name}"
         if table.barrier.schedule is None:
             found.append(

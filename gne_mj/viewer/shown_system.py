@@ -12,6 +12,7 @@ from gne_mj.changing_graph import ChangingGraph
 from gne_mj.faults import for_native
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
+from gne_mj.moving_values import bounds_move
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.quantity import Quantity
 from gne_mj.system import Clock, mode_of
@@ -188,10 +189,12 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
     """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
 
     A quantity's bounds count for the agent or for the owners of the constraint that it is of, and
-    for all agents if it is one number.
+    for all agents if it is one number. Bounds that move are left out.
     """
     found = np.full((len(values["action"]), game.agents), np.nan)
-    for quantity in game.quantities:
+    for index, quantity in enumerate(game.quantities):
+        if bounds_move(game, index):
+            continue
         middle, up, down = _range(game, quantity)
         away = values[quantity.name].reshape(len(found), -1) - middle
         used = np.fmax(away / up, away / down)

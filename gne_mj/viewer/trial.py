@@ -17,7 +17,8 @@ class Trials:
     """Runs that nobody sees, each on with a changed system from where the shown run is.
 
     Nothing goes wrong in them: faults are left out. What a trial could not begin like is not tried:
-    a penalty that falls in time, and MJCF robots, whose state is more than their games see of it.
+    a penalty or game that changes in time, and MJCF robots, whose state is more than their games
+    see of it.
     """
 
     def __init__(self) -> None:
@@ -34,7 +35,7 @@ class Trials:
         Raises:
             GneError: as when such a run begins; or a user's function failed.
         """
-        if isinstance(system.agents, MjcfRobots) or system.schedule is not None:
+        if isinstance(system.agents, MjcfRobots) or system.moves:
             return None
         last = self._loops.get(system.name)
         tried = replace(system, faults=())

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from gne_mj.controllers.table import DiscTable, SwitchingTable
-from gne_mj.registry import Names, Registry
+from gne_mj.registry import TIMES, Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.toml_table import Table, Unit
 
@@ -36,6 +36,13 @@ A table without `information` is of full information.
 """
 
 
+TIME = """In the place of any number of a game, those within lists and of `parameters` too
+([moving problems](moving-problems.md)):
+`reference_velocity = {type = "ramp", from = 3.0, to = 5.0, start = 1.0, rate = 0.5}`.
+"""
+TIMES_OF = {tag: TIMES[tag] for tag in sorted(TIMES) if TIMES[tag].__module__.startswith("gne_mj.")}
+
+
 def page() -> str:
     """The whole text."""
     parts = [HEAD, "## The whole file\n", _rows(Scenario)]
@@ -57,6 +64,9 @@ def page() -> str:
                 parts += [f'### `{registry.key} = "{tag}"`\n', _about(table), _rows(table)]
                 parts += [text for key, inner in _inner(table)
                           for text in (f"`{key}` has\n", _rows(inner))]  # fmt: skip
+    parts += ["## Functions of time\n", TIME]
+    for tag, table in TIMES_OF.items():
+        parts += [f'### `type = "{tag}"`\n', _about(table), _rows(table)]
     return "\n".join(parts)
 
 
