@@ -21,6 +21,10 @@ from gne_mj.loops import functions
 from gne_mj.loops.feedback import Problem, work
 from gne_mj.loops.layout import LoopClock, Setup, problem_and_parameter_block
 from gne_mj.loops.link import link
+from gne_mj.simulation import Simulation
+from gne_mj.system import System
+from gne_mj.system.steps import largest_step
+from gne_mj.theory.coupling import least_coupling
 from gne_mj.viewer import replay_pack
 from gne_mj.viewer.pack import unpack
 
@@ -223,6 +227,29 @@ def test_losses_strike_what_is_kept():
     others = law.kept.estimated
     assert np.ptp(samples.memory[:, : law.kept.size][:, others], axis=0).max() == 0.0
     assert len(system.loop_memory) == law.kept.size + 5 + law.kept.heard_size + law.kept.size
+
+
+@pytest.mark.parametrize("seeds", [range(5), pytest.param(range(400), marks=pytest.mark.slow)])
+def test_v_never_rises_above_the_least_gain(seeds):
+    """Random games and graphs, gains just above what the certificate asks for, wrong estimates."""
+    for seed in seeds:
+        drawn, rng = random_consensus(seed, 1 + seed % 2), np.random.default_rng(seed)
+        game, y = drawn.game, drawn.interior(0.95)
+        if game.agents == 1:
+            continue
+        graph = random_graph(rng, game.agents, int(rng.integers(0, 3)))
+        kept, slope = needed(graph, game), game.pseudo_gradient_jacobian(y)
+        least = least_coupling(slope, graph, game.agent_of_action, kept=kept)
+        law = PartialInformation(graph, 1.02 * least + 0.01, 10 ** rng.uniform(-1, 0.5), kept)
+        memory = law.initial_memory(y, y + rng.normal(size=(game.agents, game.actions)))
+        system = System(
+            "random", game, integrators(game.actions), law, RHO, y.reshape(-1, 1), memory=memory
+        )
+        h = 2.0 ** np.floor(np.log2(min(2e-3, 0.3 * largest_step(system))))
+        report = Simulation([system], clock(h, 2.0, sample=0.5)).run().reports["random"]
+        assert report["status"] in ("converged", "completed")
+        assert report["lyapunov"]["claimed"]
+        assert report["lyapunov"]["monotone"]
 
 
 LAW = {"information": "partial", "graph": "line", "coupling": 5.0, "time_constant": 0.1}
