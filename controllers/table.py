@@ -13,7 +13,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.graph import NAMED, Graph
 from gne_mj.registry import MODES
-from gne_mj.toml_table import Fills, Table, Unit
+from gne_mj.toml_table import ACTION, Fills, Table, Unit
 
 
 class LawTable(Table):
@@ -99,8 +99,29 @@ def _fixed(given: GraphKey, count: int) -> Graph:
     return Graph(count, tuple((i - 1, j - 1) for i, j in given))
 
 
+class EventTable(Table):
+    """Agents send when their triggers fire, at most once a control period."""
+
+    type: Literal["event"]
+    sigma: float = Field(
+        0.0, ge=0, le=1e9, description="share of the disagreement that a message may be off by"
+    )
+    threshold: Annotated[float, Unit(ACTION)] = Field(
+        ge=0, le=1e9, description="how far what was sent last may be off besides, at the start"
+    )
+    decay: Annotated[float, Unit("1/s")] = Field(
+        0.0, ge=0, le=1e9, description="a: the threshold falls as exp(-a t)"
+    )
+
+
 class EstimatesTable(NetworkTable):
     """A law whose agents keep estimates of one another."""
+
+    communication: Annotated[EventTable | None, Fills("")] = Field(
+        None,
+        description="modes sampled and implicit: when agents send what they know to neighbours;"
+        " once a control period if left out",
+    )
 
     estimates: Literal["all", "needed"] | list[list[int]] = Field(
         "all",

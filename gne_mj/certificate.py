@@ -11,6 +11,7 @@ from gne_mj import kept_apart, run_metrics, tracking
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
+from gne_mj.faults import triggered
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
@@ -60,6 +61,8 @@ class Certificate:
             equilibrium; None of others.
         network: of a graph that changes: how often it did (``changes``), and for how long it was
             not connected (``disconnected``, s); None of others.
+        messages: where agents send by triggers: how many came over links (``sent``), and how many
+            would have if all sent once a control period (``periodic``); None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
@@ -83,6 +86,7 @@ class Certificate:
     between: dict[str, Any] | None
     separation: dict[str, Any] | None
     network: dict[str, Any] | None
+    messages: dict[str, Any] | None
     exit: dict[str, Any] | None
     of_modes: dict[str, Any]
     steps: int
@@ -153,6 +157,7 @@ def certify_run(
         between=_between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
         network=network,
+        messages=_messages(system, monitor),
         exit=_exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
@@ -389,6 +394,18 @@ def _contacts(system: System, monitor: Any) -> dict[str, Any] | None:
         "first": float(monitor.contact_time) if any_at_all else None,
         "agents": agents if any_at_all else None,
         "depth": float(monitor.contact_depth),
+    }
+
+
+def _messages(system: System, monitor: Any) -> dict[str, Any] | None:
+    """What agents sent, and would have sent once a control period."""
+    if not triggered(system.faults):
+        return None
+    assert system.law.graph is not None
+    links = 2 * len(system.law.graph.edges)
+    return {
+        "sent": int(monitor.messages),
+        "periodic": links * int(monitor.message_instants),
     }
 
 

@@ -264,7 +264,47 @@ class Corruption(Fault):
         return list(range(game.agents) if self.agents is None else self.agents)
 
 
-MESSAGES = (MessageLoss, MessageDelay, Silence)
+@dataclass(frozen=True)
+class EventTrigger(Fault):
+    """No fault: agents that send when their triggers fire, and not once a control period.
+
+    What an agent would send is its row of all actions, its own among them. Its trigger fires where
+    |row - row sent last|^2 > sigma (sum over its links of |row - row heard last|^2) +
+    (threshold exp(-decay t))^2. Until the next message neighbours hold the last one.
+
+    Args:
+        sigma: share of the disagreement, not negative.
+        threshold: in the action's unit, at the start.
+        decay: in 1/s, not negative.
+    """
+
+    kind: ClassVar[int] = native.TRIGGER
+    measure = ("threshold", 0.0, LARGEST)
+    needs_graph = "the full-information law sends no messages"
+    sigma: float = 0.0
+    threshold: float = 0.0
+    decay: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key in ("sigma", "decay"):
+            value = getattr(self, key)
+            if not 0.0 <= value <= LARGEST:
+                raise InvalidInput(key, value, f"it must be between 0 and {LARGEST:g}")
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """See the base class."""
+        return self.sigma, self.decay
+
+    def targets(self, game: Game, graph: Graph | None) -> list[int]:
+        """All agents."""
+        if graph is None:
+            raise InvalidInput("graph", None, self.needs_graph)
+        return list(range(game.agents))
+
+
+MESSAGES = (MessageLoss, MessageDelay, Silence, EventTrigger)
 
 
 def sensor_delay(faults: Sequence[Fault]) -> int:
@@ -290,6 +330,11 @@ def steady_push(game: Game, forces: NDArray[np.float64], **course: Any) -> tuple
 def strikes_messages(faults: Sequence[Fault]) -> bool:
     """Whether what agents hear must be kept link by link."""
     return any(isinstance(fault, MESSAGES) for fault in faults)
+
+
+def triggered(faults: Sequence[Fault]) -> bool:
+    """Whether agents send by triggers."""
+    return any(isinstance(fault, EventTrigger) for fault in faults)
 
 
 def for_native(faults: Sequence[Fault], game: Game, graph: Graph | None, seed: int) -> Faults:

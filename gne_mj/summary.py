@@ -31,6 +31,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         rows["separation"] = _separation(report["separation"])
     if report["network"] is not None:
         rows["network"] = _network(report["network"])
+    if report["messages"] is not None:
+        rows["messages"] = _messages(report["messages"])
     if gap is not None:
         size = f"{gap['gap']:.6g} of {gap['bound']:g} {gap['unit']}".rstrip()
         rows["widest gap"] = f"{size}, {gap['name']} at {gap['time']:.4g} s"
@@ -79,6 +81,11 @@ def _network(seen: dict[str, Any]) -> str:
     if seen["disconnected"] > 0.0:
         return f"{text}; not connected for {seen['disconnected']:.6g} s, of which nothing is proven"
     return f"{text}, connected throughout"
+
+
+def _messages(seen: dict[str, Any]) -> str:
+    share = 100.0 * seen["sent"] / max(seen["periodic"], 1)
+    return f"{seen['sent']}, {share:.3g}% of {seen['periodic']} with one in every control period"
 
 
 def _separation(seen: dict[str, Any]) -> str:

@@ -5,7 +5,8 @@ last bit however it is cut into pieces. See :mod:`gne_mj.faults` for what users 
 
 Where sensors are late, ``work.history`` holds the flat states at the last control instants and
 behind them the inputs of those periods, as rings. Where messages can be lost or late, the law's
-memory has what came last over every link, and behind it a ring of the rows that were sent.
+memory has what came last over every link, and behind it a ring of the rows that were sent. Where
+agents send by triggers, that ring has one place: what each sent last.
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ from gne_mj.native import compiled, copy, kernel
 from gne_mj.numbers import numbers_in
 
 # Kinds of rows, in their order in ``Faults.rows``
-PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION = range(FAULT_KINDS)
+PUSH, LIMIT, NOISE, BIAS, LOSS, LATE, SILENCE, CORRUPTION, TRIGGER = range(FAULT_KINDS)
 STEADY, SINE, SQUARE, RANDOM = range(4)  # forms of pushes
 # Whether the law's action follows from the present state alone, whichever step comes next
 PREDICTION_KNOWN = False
@@ -102,7 +103,7 @@ def begin(parts, at, state, memory):
         if fresh:
             corrupt(parts.problem, parts.clock, step, memory)
         if parts.problem.settings[LINKS] > 0.0 and regular:
-            exchange(parts.problem, parts.clock, step, memory, work)
+            exchange(parts.problem, parts.clock, step, memory, work, parts.monitor)
 
 
 @kernel
@@ -191,7 +192,34 @@ def count_messages(faults, h, period, first, last, out):
 
 
 @kernel
-def exchange(problem, clock, step, memory, work):
+def send(problem, time, memory, sent, monitor):
+    """Put rows into the place of those sent last, at ``sent``, of agents whose triggers fire.
+
+    A trigger fires where |row - row sent last|^2 > sigma (sum over the agent's links of
+    |row - row heard last|^2) + (threshold exp(-decay time))^2. The monitor counts messages over
+    links.
+    """
+    graph, faults, m = problem.graph, problem.faults, len(problem.data.owner)
+    links = int(problem.settings[LINKS])
+    monitor.message_instants += 1.0
+    for f in range(faults.pointer[TRIGGER], faults.pointer[TRIGGER + 1]):
+        trigger = fault(faults, f)
+        i = int(trigger.target)
+        row, last = memory[i * m : (i + 1) * m], memory[sent + i * m : sent + (i + 1) * m]
+        moved, apart = 0.0, 0.0
+        for r in range(m):
+            moved += (row[r] - last[r]) ** 2
+        for link in range(graph.pointer[i], graph.pointer[i + 1]):
+            for r in range(m):
+                apart += (row[r] - memory[links + link * m + r]) ** 2
+        allowed = trigger.amount * np.exp(-trigger.period * time)
+        if moved > trigger.form * apart + allowed * allowed:
+            copy(row, last)
+            monitor.messages += graph.pointer[i + 1] - graph.pointer[i]
+
+
+@kernel
+def exchange(problem, clock, step, memory, work, monitor):
     """Send all rows; over each link comes what was sent some periods ago, or nothing."""
     data, graph, kept, faults = problem.data, problem.graph, problem.kept, problem.faults
     agents, m, time = len(data.offsets) - 1, len(work.y), step * clock.h
@@ -205,7 +233,10 @@ def exchange(problem, clock, step, memory, work):
     else:
         kept_estimates.prepare(problem, 0, agents, work.measurement, memory)
     at = ring + (count % slots) * size
-    copy(memory[:size], memory[at : at + size])
+    if faults.pointer[TRIGGER + 1] > faults.pointer[TRIGGER]:
+        send(problem, time, memory, at, monitor)
+    else:
+        copy(memory[:size], memory[at : at + size])
     for link in range(len(graph.neighbour)):
         delay = 0
         for f in range(faults.pointer[LATE], faults.pointer[LATE + 1]):

@@ -38,8 +38,8 @@ class Fault(Numbers):
     start: float
     end: float
     amount: float
-    form: float  # a push's, see gne_mj.loops.faults
-    period: float  # a push's, in s
+    form: float  # a push's, see gne_mj.loops.faults; sigma of a trigger
+    period: float  # a push's, in s; a trigger's decay in 1/s
     stream: float  # which random numbers
 
 
@@ -61,7 +61,7 @@ class Faults(NamedTuple):
 
 
 NO_ORDER = Order(*(np.zeros(n, dtype=np.int64) for n in (0, 2, 0, 0, 0)))
-FAULT_COLUMNS, FAULT_KINDS = len(names_of(Fault)), 8
+FAULT_COLUMNS, FAULT_KINDS = len(names_of(Fault)), 9
 NO_FAULTS = Faults(np.zeros(0), np.zeros(FAULT_KINDS + 1, dtype=np.int64), numbers(FaultNumbers))
 
 

@@ -50,6 +50,9 @@ class MonitorNumbers(Numbers):
     # Mode continuous, see gne_mj.loops.division
     divided: float  # steps that were divided
     smallest_step: float  # length in s of the shortest piece of one; 0 if none was divided
+    # Messages over links, where agents send by triggers
+    messages: float
+    message_instants: float  # at which there could have been one over each
     # Positions that follow outputs, see gne_mj.loops.positions
     positions: float  # observations of them
     positions_outside: float  # of these, those with a constraint that is violated there

@@ -17,7 +17,7 @@ from gne_mj.controllers import Law
 from gne_mj.controllers.full_information import FullController
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InfeasibleStart, InvalidInput, named, part_of, renaming
-from gne_mj.faults import Fault
+from gne_mj.faults import EventTrigger, Fault
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
 from gne_mj.loops.base import Present
@@ -226,6 +226,10 @@ class SystemTable(Table):
         for number, fault in enumerate(self.faults):
             with part_of(f"faults.{number}"):
                 found.append(fault.build())
+        event = getattr(self.controller, "communication", None)
+        if event is not None:
+            with part_of("controller.communication"):
+                found.append(EventTrigger(**event.model_dump(exclude={"type"})))
         return tuple(found)
 
     @contextmanager

@@ -10,7 +10,14 @@ from gne_mj.bounds import check_room
 from gne_mj.changing_graph import ChangingGraph, DiscGraph
 from gne_mj.controllers import Law, PlainLaw
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
-from gne_mj.faults import for_native, message_delay, sensor_delay, strikes_messages
+from gne_mj.faults import (
+    MESSAGES,
+    for_native,
+    message_delay,
+    sensor_delay,
+    strikes_messages,
+    triggered,
+)
 from gne_mj.game_model import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.motion import motion_of
@@ -257,12 +264,25 @@ def check_faults(system: SystemData) -> None:
             raise InvalidInput(where, type(fault).__name__, fault.needs_graph)
         with part_of(where):
             for_native((fault,), system.game, system.law.graph, system.seed)
+    _check_triggers(system)
     m, graph = system.game.actions, system.law.graph
     kept = (sensor_delay(system.faults) + 1) * m * (system.agents.states + 1)
     if strikes_messages(system.faults) and graph is not None:
         kept += _messages(system)
     check_room(key, "late", ESTIMATES * kept, "what was sent or measured before")
     mode_of(system).check_faults(system)
+
+
+def _check_triggers(system: SystemData) -> None:
+    """Refuse triggers where what was sent last is not what all neighbours have."""
+    if not triggered(system.faults):
+        return
+    key = "communication"
+    if sum(isinstance(fault, MESSAGES) for fault in system.faults) > 1:
+        expected = "whoever sends must know what was heard last: no other faults of messages"
+        raise InvalidInput(key, "event", expected)
+    if system.law.kept is not None:
+        raise InvalidInput(key, "event", "agents must keep all estimates: estimates = 'all'")
 
 
 def _messages(system: SystemData) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.changing_graph import ChangingGraph
-from gne_mj.faults import for_native
+from gne_mj.faults import for_native, triggered
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
 from gne_mj.moving_values import bounds_move
@@ -118,10 +118,12 @@ class ShownSystem:
 
     @property
     def _message_period(self) -> float | None:
-        """s between messages; None if they flow all the time, or over a graph that changes."""
+        """s between messages; None if they flow all the time, by triggers, or over a graph that
+        changes."""
         system = self.system
-        held = system.law.graph is not None and mode_of(system).held and not self._network_changes
-        return self.clock.control_period if held else None
+        held = system.law.graph is not None and mode_of(system).held
+        periodic = held and not self._network_changes and not triggered(system.faults)
+        return self.clock.control_period if periodic else None
 
     @cached_property
     def _edges(self) -> list[list[int]]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from gne_mj.controllers.table import DiscTable, SwitchingTable
+from gne_mj.controllers.table import DiscTable, EventTable, SwitchingTable
 from gne_mj.registry import TIMES, Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.toml_table import Table, Unit
@@ -59,6 +59,8 @@ def page() -> str:
             parts += [GRAPHS]
             for tag, table in (("switching", SwitchingTable), ("disc", DiscTable)):
                 parts += [f'`graph = {{type = "{tag}"}}` has\n', _rows(table)]
+            parts += ['`communication = {type = "event"}` ([messages](messages.md)) has\n',
+                      _rows(EventTable)]  # fmt: skip
         for tag, table in sorted(registry._tables.items()):
             if table.__module__.startswith("gne_mj."):  # and of no plug-in
                 parts += [f'### `{registry.key} = "{tag}"`\n', _about(table), _rows(table)]
