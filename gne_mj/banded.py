@@ -37,7 +37,7 @@ def eliminate(band, first, last, width, n, b, pivots):
 
     Diagonals are left as their reciprocals.
     """
-    flat, long = band.reshape(band.size), band.shape[1]
+    long = band.shape[1]
     for k in range(first, last):
         lowest = min(k + b, n - 1)
         pivot, largest = k, abs(band[k, b])
@@ -62,7 +62,7 @@ def eliminate(band, first, last, width, n, b, pivots):
                     band[r, k + 1 - r + b + c] -= factor * band[k, 1 + b + c]
             else:
                 target = r * long + k + 1 - r + b
-                add_part(-factor, flat, k * long + b + 1, flat, target, end - k)
+                add_part(-factor, band, k * long + b + 1, band, target, end - k)
     return True
 
 

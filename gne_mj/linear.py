@@ -76,12 +76,13 @@ def weighted_sum(typingctx: Any, out: Any, matrix: Any, weights: Any) -> Any:
 
 
 def add_part(factor: float, source: Any, first: int, target: Any, begin: int, count: int) -> None:
-    """target[begin + c] += factor * source[first + c] for c < count, of flat arrays.
+    """target[begin + c] += factor * source[first + c] for c < count, both taken as flat.
 
-    Native code does it as :func:`weighted_sum`, and looks at no number.
+    Arrays are contiguous. Native code does it as :func:`weighted_sum`, and looks at no number.
     """
+    row, out = source.reshape(-1), target.reshape(-1)
     for c in range(count):
-        target[begin + c] += factor * source[first + c]
+        out[begin + c] += factor * row[first + c]
 
 
 @intrinsic

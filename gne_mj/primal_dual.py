@@ -203,7 +203,7 @@ def add_pairs(data, free, k, point, b, work):
 def add_block(free, k, point, b, work):
     """The same, row by row, of a constraint without second derivatives and with rows in a block."""
     position, band, slopes, first = free.position, work.band, work.step, work.first[k]
-    flat, long = band.reshape(band.size), band.shape[1]
+    long = band.shape[1]
     count = work.row[k + 1] - work.row[k]
     ratio = point.multipliers[k] / point.slack[k]
     for entry in range(work.row[k], work.row[k + 1]):
@@ -212,7 +212,7 @@ def add_block(free, k, point, b, work):
         if work.owned[entry] != 0:
             r = position[work.column[entry]]
             add_part(
-                ratio * work.jacobian[entry], slopes, 0, flat, r * long + first - r + b, count
+                ratio * work.jacobian[entry], slopes, 0, band, r * long + first - r + b, count
             )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ unit-free by itself (lambda_l s_l, steps relative to slacks). For the rest there
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.native import kernel
+from gne_mj.native import kernel, shaped
 
 WIDEST = 1e6  # profiles; a bound farther than that says nothing of the length
 NARROWEST = 1e-5  # of the first length, below which a length does not fall
@@ -139,7 +139,7 @@ def add_costs(data, free, length, y, b, work):
 def add_all_costs(data, length, y, b, work):
     """The same where everyone is free and no band is narrower than the matrix, in its own order."""
     m, stride, greatest = len(y), work.band.shape[1] - 1, 0.0
-    flat = work.band.reshape(work.band.size)[b:]
+    flat = shaped(work.band, (work.band.size,))[b:]
     games.cost_rows(data, y, stride, flat)
     for r in range(m):
         slopes = 0.0

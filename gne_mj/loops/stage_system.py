@@ -25,7 +25,7 @@ from gne_mj.linear import add_multiples
 from gne_mj.loops.estimate_modes import Modes, from_modes
 from gne_mj.loops.feedback import Problem
 from gne_mj.loops.rodas import GAMMA, STAGES, Method
-from gne_mj.native import copy, kernel
+from gne_mj.native import copy, kernel, shaped
 from gne_mj.plants import functions
 from gne_mj.plants.ode import Channels
 from gne_mj.records import fresh
@@ -269,10 +269,10 @@ def parts_of(vector, fixed):
     size = m * states
     at_z = size + agents * m
     return VectorParts(
-        vector[:size].reshape((m, states)),
-        vector[size:at_z].reshape((agents, m)),
+        shaped(vector[:size], (m, states)),
+        shaped(vector[size:at_z], (agents, m)),
         vector[at_z : at_z + m],
-        vector[at_z + m :].reshape((agents - 1, m)),
+        shaped(vector[at_z + m :], (agents - 1, m)),
     )
 
 
@@ -312,7 +312,8 @@ def without_input(output, modes, filter_gain, now, system):
         copy(system.k_x, now.x[r])
         system.k_y[r] = now.x[r, output]
         now.z[r] *= filter_gain
-    w, decay = now.w.reshape(now.w.size), system.decay.reshape(now.w.size)
+    size = now.w.size
+    w, decay = shaped(now.w, (size,)), shaped(system.decay, (size,))
     for r in range(len(w)):
         w[r] *= decay[r]
     from_modes(modes.vectors, now.w, now.e)
