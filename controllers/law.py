@@ -217,7 +217,7 @@ class Law(ABC):
         with named(duration="period"):
             if self.kept is not None:
                 return self.kept.propagator(self.estimate_rate * period)
-            return propagator(lists or self.graph_data, self.estimate_rate * period)
+            return propagator(lists or self.graph.data, self.estimate_rate * period)
 
 
 def check_positive(law: Law, *keys: str) -> None:
