@@ -171,6 +171,7 @@ class Law(ABC):
         numbers[settings.RHO] = rho
         numbers[settings.RATE] = self.estimate_rate
         numbers[settings.LINKS] = 0.0
+        numbers[settings.OBSERVER] = 0.0
         numbers[settings.GUARDED] = float(self.guarded)
         return numbers
 

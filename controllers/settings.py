@@ -11,7 +11,8 @@ RATE = 5  # estimates follow d/dt = -RATE times their disagreement, in 1/s
 LINKS = 6  # where in the memory what was last heard over each link begins; 0: rows are read
 GUARDED = 7  # 1: the whole barrier is at measured outputs, which hence stay inside
 FAST_WEIGHT = 8  # omega of W = V + omega V_fast, under the fully distributed law
-COUNT = 9
+OBSERVER = 9  # gain of the observer of loads, mode implicit; 0: there is none
+COUNT = 10
 
 
 class Now(Numbers):

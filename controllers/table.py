@@ -32,6 +32,14 @@ class LawTable(Table):
         " and sampled is cut before it leads outside",
     )
 
+    observer: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="mode implicit: gain of each agent's observer of loads, the part of what was"
+        " not predicted that it takes for one; 0: none",
+    )
+
     @abstractmethod
     def build(self, game: Game) -> Law:
         """The law."""

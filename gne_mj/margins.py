@@ -32,14 +32,18 @@ class Disturbance:
         push: greatest force on each channel besides its input, (m,), in the input's unit.
         noise: greatest error of each output that is read, (m,).
         delay: by how many control periods sensors are late.
+        change: the most that a push changes within a control period, (m,), where an observer
+            follows it (:mod:`gne_mj.load_margins`); ``push`` is then what is not known of it at the
+            start.
     """
 
     push: Array
     noise: Array
     delay: int = 0
+    change: Array | None = None
 
     def __post_init__(self) -> None:
-        for key in ("push", "noise"):
+        for key in ("push", "noise") + (() if self.change is None else ("change",)):
             value = np.asarray(getattr(self, key), dtype=np.float64)
             if np.any(value < 0) or not np.all(np.isfinite(value)):
                 raise InvalidInput(key, value, "it must be finite and not negative")

@@ -144,6 +144,8 @@ def _held_inputs(implicit: dict[str, Any]) -> str:
         f"{implicit['solutions']} solved for in {implicit['mean_newton_steps']:.3g} Newton"
         f" steps each; predicted outputs off by up to {implicit['largest_prediction_error']:.2g}"
     )
+    if implicit["largest_load"] is not None:
+        text += f"; loads of up to {implicit['largest_load']:.4g} were observed"
     for key, first, what in (
         (
             "not_accurate",

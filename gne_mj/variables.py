@@ -365,7 +365,7 @@ def _memory(system: SystemData) -> Iterator[Variable]:
         else:
             yield _estimates(part, at) if part.rows else _row(part, slice(at, at + size))
         at += size
-    if not at and len(system.loop_memory):
+    if not at and len(system.memory):
         yield Variable(
             "memory", ("time", "memory_entry"), lambda rows: rows.samples.memory,
             long_name="the law's memory",
@@ -468,6 +468,12 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     Variable(
         "linked", ("time", "edge"), _linked, there=_network_changes,
         long_name="whether the two agents hear each other", page="behind", batch=False,
+    ),
+    Variable(
+        "load", ("time", AXIS),
+        lambda rows: rows.samples.memory[:, -rows.system.game.actions :],
+        there=lambda system: system.observer > 0.0, unit=input_unit,
+        long_name="load as each agent estimates it",
     ),
     Variable(
         "measurement", ("time", AXIS), lambda rows: rows.samples.measurement, there=_is_faulty,

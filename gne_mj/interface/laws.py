@@ -27,7 +27,11 @@ Estimates = str | Sequence[Sequence[int]]
 
 @answering
 def full_information(
-    *, mode: str = "continuous", decentralised: bool = False, between: str = "watched"
+    *,
+    mode: str = "continuous",
+    decentralised: bool = False,
+    between: str = "watched",
+    observer: float = 0.0,
 ) -> LawTable:
     """Every agent measures all actions [eq:nonlinFIfeedback].
 
@@ -35,6 +39,7 @@ def full_information(
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
         between: "guarded" cuts periods of held modes before they lead outside.
+        observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
     """
     return made(FullController, information="full", **locals())
 
@@ -49,6 +54,7 @@ def partial_information(
     mode: str = "continuous",
     decentralised: bool = False,
     between: str = "watched",
+    observer: float = 0.0,
 ) -> LawTable:
     """Costs at estimates that neighbours exchange, a measured barrier [eq:nonlinearPIFeedback].
 
@@ -61,6 +67,7 @@ def partial_information(
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
         between: "guarded" cuts periods of held modes before they lead outside.
+        observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
     """
     return made(PartialController, information="partial", **locals())
 

@@ -14,7 +14,7 @@ docs/held-inputs.md, *Between the instants*.
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.loops import implicit
+from gne_mj.loops import implicit, loads
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import explicit_law
 from gne_mj.loops.layout import LoopClock
@@ -33,7 +33,10 @@ def act(faults, plant, context, parts, at, state, memory):
     numbers = solver.numbers
     faults.sense(parts.problem, parts.work, parts.work.y, parts.work.measurement)
     known = faults.sense_state(plant, parts, at.step, state, solver.state, solver.scratch)
+    of_agents, begun = memory[loads.place_of(parts.problem, memory) :], numbers.found > 0.0
     implicit.look(parts, at, known, solver)
+    if begun:
+        loads.observe(parts, at.time, of_agents, solver)
     asked = clock.period - at.step % clock.period
     length, first, bad = asked, True, 0
     while True:
@@ -49,14 +52,16 @@ def act(faults, plant, context, parts, at, state, memory):
         ended, agreed, least = implicit.solve(plant, context, parts, period, known, memory, solver)
         bad = length
         if ended != OUTSIDE:
-            bad = first_outside(plant, context, parts, length, known, solver)
+            bad = first_outside(plant, context, parts, length, known, solver, of_agents)
         if bad == 0 or length == 1:
             break
         length, first = length // 2, False
         if ended != OUTSIDE:
             copy(solver.y, solver.prediction)  # which the next attempt may begin from, being inside
     plan(parts, at, asked, length)
-    if not implicit.settle(parts, at.time, memory, solver, ended, agreed, least):
+    good = implicit.settle(parts, at.time, memory, solver, ended, agreed, least)
+    loads.take_off(of_agents, parts.work.commanded)
+    if not good:
         return False
     return bad == 0 or leads_inside(parts, at, solver.reached)
 
@@ -72,7 +77,7 @@ def act_sampled(faults, plant, context, parts, at, state, memory):
         return False
     copy(work.commanded, solver.held)
     games.values(problem.data, problem.data.all_constraints, measurement, solver.inverse)
-    set_out(plant, context, parts, known, solver)
+    set_out(plant, context, parts, known, solver, memory[:0])
     asked = clock.period - at.step % clock.period
     length = 0
     while length < asked:
@@ -95,21 +100,22 @@ def plan(parts, at, asked, length):
 
 
 @kernel
-def set_out(plant, context, parts, known, solver):
-    """Begin to look through a period under the input solver.held, as actuators deliver it."""
+def set_out(plant, context, parts, known, solver, of_agents):
+    """Begin to look through a period under solver.held, as actuators deliver the input's part."""
     limit = parts.problem.limit
     for r in range(len(limit)):
-        solver.u[r] = min(max(solver.held[r], -limit[r]), limit[r])
+        load = of_agents[r] if len(of_agents) > 0 else 0.0
+        solver.u[r] = min(max(solver.held[r] - load, -limit[r]), limit[r]) + load
     plant.set_out(context, parts.channels, known, solver.u, solver.rolled)
 
 
 @kernel
-def first_outside(plant, context, parts, length, known, solver):
+def first_outside(plant, context, parts, length, known, solver, of_agents):
     """The first of so many steps at whose end predicted outputs are not inside; 0 if all are.
 
     ``solver.reached`` has the outputs at that step.
     """
-    set_out(plant, context, parts, known, solver)
+    set_out(plant, context, parts, known, solver, of_agents)
     for step in range(length):
         plant.step_on(
             context, parts.channels, parts.clock, solver.u, solver.reached, solver.rolled,

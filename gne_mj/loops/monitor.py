@@ -43,6 +43,11 @@ class MonitorNumbers(Numbers):
     prediction_time: float
     not_monotone: float  # periods with dy+/du not positive in some channel
     not_monotone_time: float
+    # Loads, see gne_mj.loops.loads
+    load: float  # greatest |estimate|
+    load_time: float
+    load_change: float  # greatest change of one at a control instant
+    load_change_time: float
     # Control periods that may end early, see gne_mj.loops.guard
     cut: float  # periods that did
     cut_time: float  # the first one's start
@@ -156,6 +161,15 @@ def count_solution(monitor, time, steps, accurate, least):
         if monitor.not_monotone == 0.0:
             monitor.not_monotone_time = time
         monitor.not_monotone += 1.0
+
+
+@kernel
+def note_load(monitor, time, load, change):
+    """Note an estimated load, and by how much it changed."""
+    if abs(load) > monitor.load:
+        monitor.load, monitor.load_time = abs(load), time
+    if abs(change) > monitor.load_change:
+        monitor.load_change, monitor.load_change_time = abs(change), time
 
 
 @kernel

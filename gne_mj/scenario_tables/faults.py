@@ -149,10 +149,16 @@ class MarginTable(Table):
         0, ge=0, le=1000, description="of the sensors"
     )
 
+    push_change: Annotated[PerAgent, Unit(INPUT, ">= 0")] = Field(
+        0.0,
+        description="with controller.observer: the most that the push changes within a control"
+        " period; push is then what is not known of it at the start",
+    )
+
     def disturbance(self, game: Game) -> Disturbance:
         """The bounds, for each channel."""
         each = [
             np.repeat(per_agent(key, getattr(self, key), game.agents), game.sizes)
-            for key in ("push", "noise")
+            for key in ("push", "noise", "push_change")
         ]
-        return Disturbance(each[0], each[1], self.delay)
+        return Disturbance(each[0], each[1], self.delay, each[2])

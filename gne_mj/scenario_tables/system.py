@@ -20,6 +20,7 @@ from gne_mj.errors import InfeasibleStart, InvalidInput, named, part_of, renamin
 from gne_mj.faults import EventTrigger, Fault
 from gne_mj.game_model import Game
 from gne_mj.games.table import GameTable
+from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
 from gne_mj.plants.agent_type import placed_state, start_keys, start_of
@@ -34,7 +35,7 @@ from gne_mj.system import System, mode_of
 from gne_mj.system.checks import check_estimates
 from gne_mj.system.data import GUARDED
 from gne_mj.theory.periods import least_rho
-from gne_mj.toml_table import ACTION, Fills, PerAction, Sizes, Table, Unit, per_action
+from gne_mj.toml_table import ACTION, INPUT, Fills, PerAction, Sizes, Table, Unit, per_action
 
 load_plugins()  # the tables below hold any of those that are registered
 
@@ -84,6 +85,10 @@ class InitialTable(Table):
     )
     filtered: Annotated[PerAction | None, Unit(ACTION, "strictly inside")] = Field(
         None, description="distributed law: z(0); y(0) if left out"
+    )
+    load: Annotated[PerAction | None, Unit(INPUT)] = Field(
+        None,
+        description="with controller.observer: what is known to push the agents; 0 if left out",
     )
 
     def build(
@@ -205,6 +210,8 @@ class SystemTable(Table):
             mode=self.controller.mode,
             decentralised=self.controller.decentralised,
             between=self.controller.between,
+            observer=self.controller.observer,
+            load=self._load(game),
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
             rtol=simulation.rtol,
@@ -311,15 +318,16 @@ class SystemTable(Table):
                 "margin", "given", "it is for mode 'implicit', where a margin is a promise"
             )
         period = simulation.control_period or simulation.timestep
-        with named(period="simulation.control_period"):
+        with named(period="simulation.control_period", observer="controller.observer"):
+            guarded = self.controller.between == GUARDED
+            integrator = self.plant.integrator or simulation.integrator
+            steps = max(1, round(period / simulation.timestep))
+            unforeseen = beyond_estimates(
+                agents, simulation.timestep, integrator, steps, disturbance,
+                self.controller.observer, guarded,
+            )  # fmt: skip
             game = with_margin(
-                game,
-                agents,
-                disturbance,
-                simulation.timestep,
-                self.plant.integrator or simulation.integrator,
-                max(1, round(period / simulation.timestep)),
-                self.controller.between == GUARDED,
+                game, agents, unforeseen, simulation.timestep, integrator, steps, guarded
             )
         return game, agents
 
@@ -332,6 +340,10 @@ class SystemTable(Table):
             return None
         with part_of("margin"):
             return self.margin.disturbance(game)
+
+    def _load(self, game: Game) -> NDArray[np.float64] | None:
+        given = self.initial.load
+        return None if given is None else per_action("initial.load", given, game.sizes)
 
     def _separation(self) -> Separation | None:
         if self.separation is None:

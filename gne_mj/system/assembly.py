@@ -11,18 +11,25 @@ from numpy.typing import NDArray
 from gne_mj.barrier import unchanging
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.propagation import Propagator, no_propagator
-from gne_mj.controllers.settings import GUARDED, LINKS
+from gne_mj.controllers.settings import GUARDED, LINKS, OBSERVER
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.graph import GraphData
-from gne_mj.loops import functions
+from gne_mj.loops import functions, no_memory
 from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.changing_network import ChangingNetworkLoop
 from gne_mj.loops.division import sizes_at
 from gne_mj.loops.feedback import Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
-from gne_mj.loops.link import link, penalty, penalty_of_moving, positions, separation
+from gne_mj.loops.link import (
+    link,
+    of_memory,
+    penalty,
+    penalty_of_moving,
+    positions,
+    separation,
+)
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.loops.one_loop import OneLoop
 from gne_mj.loops.separation import neighbours_length
@@ -135,11 +142,18 @@ class Assembly(SystemData):
         return found
 
     @property
+    def _behind(self) -> dict[int, Any]:
+        """What moves the memory of a loop whose law has none."""
+        alone = len(self.loop_memory) > 0 and not len(self.memory)
+        return of_memory(no_memory, mode_of(self).held) if alone else {}
+
+    @property
     def functions(self) -> NDArray[np.int64]:
         """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
         return link(
             self.law.kernels, self.game.kernels,
-            memory=bool(len(self.loop_memory)), held=mode_of(self).held, others=self._others,
+            memory=bool(len(self.memory)), held=mode_of(self).held,
+            others={**self._behind, **self._others},
         )  # fmt: skip
 
     def law_settings(self, rho: float) -> NDArray[np.float64]:
@@ -147,6 +161,7 @@ class Assembly(SystemData):
         settings = self.law.settings(rho)
         if strikes_messages(self.faults):
             settings[LINKS] = len(self.memory)
+        settings[OBSERVER] = self.observer
         if self.game.private:  # which others can push an agent out of
             settings[GUARDED] = 0.0
         return settings

@@ -59,6 +59,8 @@ class SystemData:
     disturbance: Disturbance | None = None
     separation: Separation | None = None
     rtol: float = 1e-6
+    observer: float = 0.0
+    load: NDArray[np.float64] | None = None
     barrier: LogBarrier = field(init=False)
 
     @property
@@ -182,13 +184,20 @@ class SystemData:
         return self.with_links(self.memory)
 
     def with_links(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A law's memory, and where messages can fail behind it what was heard over each link."""
-        if not strikes_messages(self.faults):
-            return memory
-        assert self.law.graph is not None
-        m = self.game.actions
-        delay = message_delay(self.faults)
-        if self.law.kept is not None:
-            return np.concatenate([memory, self.law.kept.heard(memory, delay)])
-        heard = links_memory(self.law.graph, m, memory, delay)
-        return np.concatenate([memory, heard])
+        """A law's memory with what a loop keeps behind it.
+
+        Where messages can fail, what was heard over each link; with an observer, what agents take
+        their loads to be.
+        """
+        parts, m = [memory], self.game.actions
+        if strikes_messages(self.faults):
+            assert self.law.graph is not None
+            delay, kept = message_delay(self.faults), self.law.kept
+            parts.append(
+                links_memory(self.law.graph, m, memory, delay)
+                if kept is None
+                else kept.heard(memory, delay)
+            )
+        if self.observer > 0.0:
+            parts.append(np.zeros(m) if self.load is None else self.load)
+        return np.concatenate(parts) if len(parts) > 1 else memory

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import sensor_delay
+from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops import link
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.newton import solver_length
@@ -81,8 +82,7 @@ def room_ahead(system: SystemData, clock: Clock) -> NDArray[np.float64]:
     """How far disturbances can carry each constraint at each step, (steps * p,); () without any."""
     if not system.guarded or system.disturbance is None:
         return np.zeros(0)
-    errors = errors_ahead(
-        system.agents, clock.timestep, system.integrator, clock.steps(clock.control_period),
-        system.disturbance,
-    )  # fmt: skip
+    how = (system.agents, clock.timestep, system.integrator, clock.steps(clock.control_period))
+    unforeseen = beyond_estimates(*how, system.disturbance, system.observer, guarded=True)
+    errors = errors_ahead(*how, unforeseen)
     return np.concatenate([tightening(system.game, error) for error in errors])

@@ -9,6 +9,7 @@ from gne_mj.system import checks
 from gne_mj.system.apart import check_separation
 from gne_mj.system.assembly import Assembly
 from gne_mj.system.guard import check_guard
+from gne_mj.system.observer import check_observer
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +41,9 @@ class System(Assembly):
         separation: how far apart agents in the plane keep; None if nothing keeps them apart.
         rtol: error allowed in a step that "tsit5" or "rosenbrock" chooses, of each state
             relative to its greatest magnitude so far.
+        observer: mode implicit: gain of each agent's observer of loads (:mod:`gne_mj.loops.loads`),
+            0 for none.
+        load: (m,) the loads that are known at the start, in the input's unit; 0 if left out.
 
     Raises:
         InvalidInput: parts that do not fit together.
@@ -75,3 +79,4 @@ class System(Assembly):
         checks.check_network(self)
         check_separation(self)
         check_guard(self)
+        check_observer(self)

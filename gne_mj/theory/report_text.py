@@ -278,6 +278,8 @@ def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f" {max(held['prediction_error']):.4g},"
             f" constraints tightened by up to {max(held['tightening']):.4g}",
         )
+    if held["observer"] is not None:
+        yield "loads", _observer(held["observer"])
     if held["largest_push"] is not None:
         push = f"{held['largest_push']:.4g} on every agent at once is covered"
         yield "largest push", push if held["largest_push"] else "none is covered without a margin"
@@ -301,6 +303,19 @@ def _held(held: dict[str, Any]) -> Iterator[tuple[str, str]]:
         if outside is not None:
             text += f", with {outside:.4g} s it does not"
         yield "period, by trial", f"{text} ({search['note']})"
+
+
+def _observer(observer: dict[str, Any]) -> str:
+    text = f"estimated by each agent with gain {observer['gain']:g}"
+    if observer["shrinks"] is None:
+        return f"{text}; that estimates settle is not known"
+    text += (
+        f"; constant ones are removed, errors shrinking at least by a factor of"
+        f" {observer['shrinks']:.3g} a period"
+    )
+    if observer["unforeseen_push"] is not None:
+        text += f"; at most {max(observer['unforeseen_push']):.4g} is not foreseen"
+    return text
 
 
 def _number(value: float | None, form: str = ".6g") -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.faults import Fault, Push, steady_push
+from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import with_margin
 from gne_mj.plain import raise_pending
@@ -72,14 +73,12 @@ def held_for(system: System, timestep: float, steps: int) -> System:
     """The system with the margin that its declared disturbances need for such a control period."""
     if system.disturbance is None:
         return system
-    game = with_margin(
-        system.game,
-        system.agents,
-        system.disturbance,
-        timestep,
-        system.integrator,
-        steps,
+    unforeseen = beyond_estimates(
+        system.agents, timestep, system.integrator, steps, system.disturbance, system.observer,
         system.guarded,
+    )  # fmt: skip
+    game = with_margin(
+        system.game, system.agents, unforeseen, timestep, system.integrator, steps, system.guarded
     )
     return replace(system, game=game)
 

@@ -9,7 +9,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gne_mj.load_margins import beyond_estimates, shrinking
 from gne_mj.margins import Disturbance, Influence, influence, largest_push
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import Clock, System
@@ -17,9 +19,11 @@ from gne_mj.system.first_input import first_input, law_at_start
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, UNKNOWN, Assumption
 from gne_mj.theory.commanded_input import CommandedInput, limited
 from gne_mj.theory.convexity import convex_constraints, own_convexity
-from gne_mj.theory.disturbances import strength
+from gne_mj.theory.disturbances import greatest_change, strength, unknown_at_start
 from gne_mj.theory.moving import moving
 from gne_mj.theory.theorem import Theorem
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,7 @@ class ZeroOrderHold:
             "slope_exact": None if effect is None else effect.exact,
             "tightening": system.game.margins.tolist(),
             "between": system.between,
+            "observer": self.observer,
             "disturbance": None
             if bound is None
             else {
@@ -97,7 +102,7 @@ class ZeroOrderHold:
             },
             "prediction_error": None
             if effect is None or bound is None
-            else effect.of(bound).tolist(),
+            else effect.of(self._unforeseen()).tolist(),
             "largest_push": self.largest_push(),
         }
 
@@ -113,7 +118,9 @@ class ZeroOrderHold:
             return None
         if self.system.decentralised:
             return 0.0
-        if self.system.guarded:  # more is not left room for at the steps on the way
+        if (
+            self.system.guarded or self.system.observer > 0.0
+        ):  # more is not left room for at the steps on the way
             return float(np.min(bound.push))
         besides = Disturbance(np.zeros(m), np.maximum(bound.noise, declared.noise))
         return largest_push(self.system.game, effect, besides, self.system.game.margins)
@@ -179,6 +186,46 @@ class ZeroOrderHold:
             "inputs", ASSUMED, "as long as no input limit is met, which a run reports"
         )
 
+    def _compared(
+        self, declared: Disturbance, bound: Disturbance
+    ) -> list[tuple[str, Array, Array]]:
+        """What faults do, and the margin covers, by name."""
+        found = [("noise", declared.noise, bound.noise)]
+        if self.system.observer == 0.0:
+            return [("push", declared.push, bound.push), *found]
+        change = np.zeros_like(bound.push) if bound.change is None else bound.change
+        span = self.clock.control_period
+        return [
+            ("push that is not known at the start", unknown_at_start(self.system), bound.push),
+            ("change of a push in a period", greatest_change(self.system, span), change),
+            *found,
+        ]
+
+    @property
+    def observer(self) -> dict[str, Any] | None:
+        """What is known of the observer of loads; None without one."""
+        gain, effect = self.system.observer, self.influence
+        if gain == 0.0:
+            return None
+        shrinks = None if effect is None else float(np.max(shrinking(effect, gain)[0]))
+        known = shrinks is not None and shrinks < 1.0
+        return {
+            "gain": gain,
+            "shrinks": shrinks if known else None,
+            "unforeseen_push": self._unforeseen().push.tolist()
+            if known and self.system.disturbance is not None
+            else None,
+        }
+
+    def _unforeseen(self) -> Disturbance:
+        """What predictions do not know, of what is declared."""
+        system, clock = self.system, self.clock
+        assert system.disturbance is not None
+        return beyond_estimates(
+            system.agents, clock.timestep, system.integrator, clock.steps(clock.control_period),
+            system.disturbance, system.observer, system.guarded,
+        )  # fmt: skip
+
     def _disturbances(self) -> Assumption:
         label, system = "disturbances", self.system
         bound = system.disturbance
@@ -191,10 +238,7 @@ class ZeroOrderHold:
             return Assumption(
                 label, FAILS, "shares of slacks leave no room for disturbances: no margin is known"
             )
-        for what, given, most in (
-            ("push", declared.push, bound.push),
-            ("noise", declared.noise, bound.noise),
-        ):
+        for what, given, most in self._compared(declared, bound):
             if np.any(given > most * (1.0 + 1e-12)):
                 worst = int(np.argmax(given - most))
                 return Assumption(

@@ -17,7 +17,7 @@ from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
-from gne_mj.loops import apart, functions, guard, implicit, joint, link, local
+from gne_mj.loops import apart, functions, guard, implicit, joint, link, loads, local
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.ode import IMPLICIT
 from gne_mj.margins import influence
@@ -38,6 +38,7 @@ class Implicit(Mode):
     promises = True
     keeps_apart = True
     guards = True
+    observes = True
     section = "implicit"
     figures = (
         Figure("solutions", entry("solutions")),
@@ -57,7 +58,8 @@ class Implicit(Mode):
         """The law's barrier-free part, the equation's solver, and what a control instant does."""
         equation = self.equation(system)
         alone = equation.ALONE
-        find = guard.act if system.guarded else implicit.act
+        find = loads.act if system.observer > 0.0 else implicit.act
+        find = guard.act if system.guarded else find
         return {
             **link.of_implicit(system.law.kernels, system.game.kernels, alone),
             functions.SOLVE: link.solve(equation),
@@ -161,6 +163,10 @@ class Implicit(Mode):
             "first_not_accurate": seen_or_none(monitor, "unsolved"),
             "largest_prediction_error": float(monitor.prediction),
             "largest_prediction_error_time": seen_or_none(monitor, "prediction"),
+            "largest_load": float(monitor.load) if system.observer > 0.0 else None,
+            "largest_load_time": seen_or_none(monitor, "load"),
+            "largest_load_change": float(monitor.load_change) if system.observer > 0.0 else None,
+            "largest_load_change_time": seen_or_none(monitor, "load_change"),
             "periods_not_monotone": int(monitor.not_monotone),
             "first_not_monotone": seen_or_none(monitor, "not_monotone"),
         }

@@ -50,6 +50,7 @@ class Mode:
             (:mod:`gne_mj.theory.zero_order_hold` says when that is certain).
         keeps_apart: whether agents can keep apart in it (:mod:`gne_mj.loops.separation`).
         guards: whether it can cut periods before they lead outside (:mod:`gne_mj.loops.guard`).
+        observes: whether agents can observe their loads in it (:mod:`gne_mj.loops.loads`).
         section: of a run's report, for :meth:`report`; empty for none.
         figures: that batches keep of each run.
     """
@@ -60,6 +61,7 @@ class Mode:
     promises: ClassVar[bool] = False
     keeps_apart: ClassVar[bool] = False
     guards: ClassVar[bool] = False
+    observes: ClassVar[bool] = False
     section: ClassVar[str] = ""
     figures: ClassVar[tuple[Figure, ...]] = ()
 
