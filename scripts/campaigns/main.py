@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import held
+import loads
 import margins
 
 
@@ -14,6 +15,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="scripts/check-held", description=__doc__)
     parser.add_argument("--runs", type=int, default=100_000, help="of each mode")
     parser.add_argument("--margin-runs", type=int, default=10_000, help="under disturbances")
+    parser.add_argument("--load-runs", type=int, default=1_000, help="with observers of loads")
     parser.add_argument("--ratios", action="store_true", help="certified and breaking pushes too")
     parser.add_argument(
         "--guarded-runs", type=int, default=10_000, help="of each mode, guarded between instants"
@@ -43,6 +45,10 @@ def main() -> int:
     if options.margin_runs:
         lines, left = margins.campaign(options.margin_runs, options.seed, options.processes)
         print("\n".join(["", "within margins", "", *lines]), flush=True)
+        broken += left
+    if options.load_runs:
+        lines, left = loads.campaign(options.load_runs, options.seed, options.processes)
+        print("\n".join(["", "with observers of loads", "", *lines]), flush=True)
         broken += left
     if options.ratios:
         head = ["", "| period | certified push | breaking push | ratio |", "|---|---|---|---|"]
