@@ -24,7 +24,7 @@ arrays by it.
 import ast
 from collections.abc import Callable, Mapping
 from functools import cache
-from types import MappingProxyType
+from types import CodeType, MappingProxyType
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -56,8 +56,13 @@ class Field(NamedTuple):
 
     def evaluated(self, names: dict[str, Any]) -> tuple[int, ...]:
         """Its shape, the names in it standing for this."""
-        found: tuple[int, ...] = eval(f"({self.shape},)", dict(names))  # of our own declarations
+        found: tuple[int, ...] = eval(_compiled(self.shape), dict(names))
         return found
+
+
+@cache  # shapes are our own declarations, and few
+def _compiled(shape: str) -> CodeType:
+    return compile(f"({shape},)", "<shape>", "eval")
 
 
 def fields(record: Any) -> Mapping[str, Any]:
