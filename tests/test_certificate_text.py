@@ -220,7 +220,7 @@ def test_steps_say_how_they_are_divided(start, there, ends, text):
 
 HELD = {
     "conditions": [], "disturbance": None, "largest_push": None, "push_search": None,
-    "period_search": None,
+    "period_search": None, "observer": None,
 }  # fmt: skip
 
 
