@@ -31,6 +31,9 @@ class LawTable(Table):
         description="between control instants: every step is watched, or a period of modes implicit"
         " and sampled is cut before it leads outside",
     )
+    feed_forward: bool = Field(
+        False, description="add the input that an equilibrium which moves needs to be followed"
+    )
 
     observer: float = Field(
         0.0,

@@ -19,7 +19,7 @@ from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
 from gne_mj.run_metrics import EXITS, SUCCESSES, TAIL
-from gne_mj.system import System, mode_of
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 
@@ -119,7 +119,7 @@ def certify_run(
     interrupted: bool = False,
     intervened: bool = False,
     network: dict[str, Any] | None = None,
-    period: float | None = None,
+    clock: Clock | None = None,
 ) -> Certificate:
     """Put together what a run of ``system`` showed.
 
@@ -134,7 +134,7 @@ def certify_run(
         wall_time: real time that it took.
         interrupted: the user stopped it.
         intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
-        period: control period in s; not asked for in mode continuous.
+        clock: how it stepped; None where that is not known.
     """
     distance = np.max(np.abs(action - system.equilibria(time)), axis=1)
     (settled,) = run_metrics.settling_time(time, distance[None])
@@ -147,7 +147,7 @@ def certify_run(
         worst_constraint=_worst_constraint(system, monitor),
         worst_gap=_worst_gap(system, monitor),
         equilibrium=_equilibrium(system, action[-1], time[-1]),
-        tracking=tracking.report(system, time, action, period, _spoilt(monitor, intervened)),
+        tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
         epsilon=_epsilon(system, time[-1]),
         settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor, intervened),

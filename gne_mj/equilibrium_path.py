@@ -57,29 +57,49 @@ class EquilibriumPath:
         self._game, self._penalty = game, penalty
         self._last: Equilibrium | None = None
         self._start = np.asarray(start, dtype=np.float64)
+        self._equilibria: dict[float, Equilibrium | None] = {}
         self._points: dict[float, Point] = {}
+
+    @property
+    def size(self) -> int:
+        """m, the entries of y*."""
+        return self._game.actions
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times in s at which the game's numbers, or their rates, jump."""
+        motion = motion_of(self._game)
+        return () if motion is None else motion.knots
 
     def game(self, time: float) -> Game:
         """The game at a time in s, until another time is asked for."""
         return self._game if self._frame is None else self._frame.to(time)
 
-    def at(self, time: float) -> Point:
-        """The equilibrium at a time in s.
+    def equilibrium(self, time: float) -> Equilibrium | None:
+        """y* at a time in s; None where it was not found.
 
         Raises:
             InvalidInput: no profile strictly inside was found.
         """
         time = float(time)
-        if time not in self._points:
+        if time not in self._equilibria:
             found = self._solved(time)
             self._last = found if found is not None else self._last
+            self._equilibria[time] = found
+        return self._equilibria[time]
+
+    def at(self, time: float) -> Point:
+        """The same with its rates; raises as :meth:`equilibrium` does."""
+        time = float(time)
+        if time not in self._points:
+            found = self.equilibrium(time)
             self._points[time] = Point(found, *self._rates(time, found))
         return self._points[time]
 
     def actions(self, times: Iterable[float]) -> Array:
         """y* (times, m) at times in s, not a number where none was found."""
         nothing = np.full(self._game.actions, np.nan)
-        found = [self.at(time).equilibrium for time in times]
+        found = [self.equilibrium(time) for time in times]
         return np.array([nothing if each is None else each.action for each in found])
 
     def _solved(self, time: float) -> Equilibrium | None:

@@ -42,6 +42,10 @@ class Moving(NamedTuple):
     entry: Annotated[np.ndarray, "n", int]  # entries of q that follow it
     factor: Annotated[np.ndarray, "n"]  # by how much
     target: Annotated[np.ndarray, "n", int]  # [address, length] of q
+    # Feed-forward (gne_mj.feed_forward): inputs (times, m) so many s apart, and that of now
+    input: Annotated[np.ndarray, "n"] = np.zeros(0)
+    spacing: Annotated[np.ndarray, "1"] = np.ones(1)
+    now: Annotated[np.ndarray, "n"] = np.zeros(0)
 
 
 _NONE = np.zeros(0, dtype=np.int64)
@@ -52,7 +56,7 @@ STANDING = Moving(
 
 @kernel
 def move(moving, time):
-    """Bring q to a time in s."""
+    """Bring q, and what is fed forward, to a time in s."""
     q = floats_at(moving.target[0], moving.target[1])
     for k in range(len(moving.moved)):
         q[moving.moved[k]] = moving.standing[k]
@@ -60,6 +64,14 @@ def move(moving, time):
         value = value_at(moving.rows[moving.pointer[s] : moving.pointer[s + 1]], time)
         for k in range(moving.first[s], moving.first[s + 1]):
             q[moving.entry[k]] += moving.factor[k] * value
+    m = len(moving.now)
+    if m > 0:
+        at = time / moving.spacing[0]
+        row = min(int(at), len(moving.input) // m - 2)
+        part = min(at - row, 1.0)
+        for r in range(m):
+            before, after = moving.input[row * m + r], moving.input[(row + 1) * m + r]
+            moving.now[r] = before + part * (after - before)
 
 
 @dataclass(frozen=True, eq=False)

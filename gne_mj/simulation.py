@@ -440,7 +440,7 @@ class SystemRun:
             interrupted=interrupted,
             intervened=intervened,
             network=self.loop.network,
-            period=self.clock.control_period,
+            clock=self.clock,
         )
         return parts, certificate
 

@@ -10,6 +10,7 @@ sample time and knot, both sides of it; between two times the greater one is tak
 has moved farther than that, it has jumped by the rest.
 """
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from gne_mj.motion import motion_of
 from gne_mj.plants import integrator, pi_cascade
-from gne_mj.system import System, mode_of
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.theory.constants import Slopes
 from gne_mj.theory.gain import decay_rate
 
@@ -39,7 +40,7 @@ def report(
     system: System,
     time: Array,
     action: Array,
-    period: float | None,
+    clock: Clock | None,
     spoilt: str = "",
 ) -> dict[str, Any] | None:
     """The section ``tracking`` of a run's report; None where neither game nor penalty move.
@@ -48,7 +49,7 @@ def report(
         system: what was run.
         time: sample times (samples,) in s.
         action: y there (samples, m).
-        period: control period in s, in the held modes.
+        clock: of the run; without one nothing is certain of held inputs and what is fed forward.
         spoilt: what happened in the run so that nothing is certain of it, in words.
     """
     if not system.moves:
@@ -60,15 +61,16 @@ def report(
     grid = np.unique([*time, *(t for t in knots if time[0] < t < time[-1])])
     points = [system.path.at(t) for t in grid]
     mu = _monotonicity(system, grid)
-    why = spoilt or _why_not(system, time, mu, period)
+    why = spoilt or _why_not(system, time, mu, clock)
     bound = None
     if mu is not None and not why:
-        bound = _bound(system, grid, mu, period)[np.isin(grid, time)]
+        bound = _bound(system, time, grid, mu, clock)
     worst = int(np.argmax(distance))
     rates = np.array([point.rate for point in points])
     found: dict[str, Any] = {
         "game": motion is not None,
         "penalty": system.schedule is not None,
+        "feed_forward": system.feed_forward,
         "largest_distance": float(distance[worst]),
         "largest_distance_time": float(time[worst]),
         "final_distance": float(distance[-1]),
@@ -89,7 +91,7 @@ def report(
     return found
 
 
-def _why_not(system: System, time: Array, mu: Array | None, period: float | None) -> str:
+def _why_not(system: System, time: Array, mu: Array | None, clock: Clock | None) -> str:
     """Why no bound is certain; empty if one is."""
     kind, mode = system.agents.kind, mode_of(system)
     if kind not in (integrator, pi_cascade):
@@ -102,10 +104,13 @@ def _why_not(system: System, time: Array, mu: Array | None, period: float | None
         return "of an F that is not affine dF/dy moves too, and mu is not known at all times"
     if not np.all(mu > 0.0):
         return "F is not strongly monotone at all times"
+    if system.feed_forward and (kind is not integrator or clock is None):
+        return "with an input fed forward it is known of integrators"
     if not mode.held:
         return ""
-    if not mode.promises or kind is not integrator or period is None:
+    if not mode.promises or kind is not integrator or clock is None:
         return "with a held input it is known of integrators in mode implicit"
+    period = clock.control_period
     if np.any(np.abs(time / period - np.round(time / period)) > 1e-6):
         return "samples are not at control instants"
     return ""
@@ -130,29 +135,33 @@ def _monotonicity(system: System, grid: Array) -> Array | None:
     return np.array(found)
 
 
-def _bound(system: System, grid: Array, mu: Array, period: float | None) -> Array:
-    """|y - y*| is at most this (times,)."""
+def _bound(system: System, time: Array, grid: Array, mu: Array, clock: Clock | None) -> Array:
+    """|y - y*| is at most this at sample times (samples,), which are among those of ``grid``."""
     path, held, moves = system.path, mode_of(system).held, motion_of(system.game) is not None
     rates = np.array([path.at(t).rate for t in grid])
     pushes = np.array([path.at(t).push for t in grid]) / mu
     rates = np.where(np.isnan(rates), pushes, rates)
     moved = np.linalg.norm(np.diff(path.actions(grid), axis=0), axis=1)
     decay = _decay(system, float(np.min(mu)), path.actions(grid[:1])[0])
-    found = [decay.start]
-    for k, length in enumerate(np.diff(grid)):
-        speed = max(rates[k], rates[k + 1])
-        jump = max(0.0, moved[k] - speed * length)
+    found, ends = [decay.start], np.searchsorted(grid, time)
+    for first, last in pairwise(ends.tolist()):
+        length, between = grid[last] - grid[first], slice(first, last + 1)
+        speed, rate = np.max(rates[between]), decay.rate
+        jumps = np.sum(np.maximum(0.0, moved[first:last] - speed * np.diff(grid[between])))
+        left, late = np.exp(-rate * length), 1.0
         if held:
-            assert period is not None
-            least = min(mu[k], mu[k + 1])
-            left = (1.0 + least * period) ** -round(length / period)
-            driven = speed * (1.0 - left) / least
-            if not moves:  # a penalty that falls is that of the period's start
-                driven *= 1.0 + least * period
-        else:
-            left = np.exp(-decay.rate * length)
-            driven = speed * (1.0 - left) / decay.rate
-        found.append(left * found[-1] + decay.harm * (driven + jump))
+            assert clock is not None
+            period, rate = clock.control_period, np.min(mu[between])
+            left = (1.0 + rate * period) ** -round(length / period)
+            # a penalty that falls, without an input fed forward, is that of the period's start
+            late = 1.0 if moves or system.feed_forward else 1.0 + rate * period
+        behind = decay.harm * (late * speed * (1.0 - left) / rate + jumps)
+        if system.feed_forward:
+            assert clock is not None
+            step = clock.control_period if held else clock.timestep
+            steps = slice(round(grid[first] / step), round(grid[last] / step))
+            behind = float(np.sum(system.fed(clock).left[steps]))
+        found.append(left * found[-1] + behind)
     return decay.share * np.array(found)
 
 

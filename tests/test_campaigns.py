@@ -14,9 +14,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts" / "campaigns"))
 import continuous
 import kills
 import kinds
+import moving
 import positions
 import quadratic
 import stiff
+
+from gne_mj.time_functions import from_table
 
 AGENTS = 4
 
@@ -248,3 +251,12 @@ def test_random_platoons_and_formations_keep_their_positions(monkeypatch):
     for key in ("outside", "contacts", "outputs_outside"):
         assert positions.broken({**rows[0], key: 1}) == [key]
     assert positions.broken(positions.crashed(7, ValueError("x"))) == ["crashed"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_functions_of_time_are_those_of_the_campaigns_formulas(seed):
+    rng = np.random.default_rng(seed)
+    given = moving.moving(rng, rng.uniform(-3, 3), rng.uniform(0.1, 2.0))
+    made = from_table(given).build()
+    for time in [0.0, *rng.uniform(0.0, 4.0, 10)]:
+        assert made.at(time) == pytest.approx(moving.value(given, time), abs=1e-12)

@@ -75,6 +75,7 @@ def link(
     *,
     memory: bool,
     held: bool,
+    driven: bool = False,
     others: Mapping[int, Any] = NO_OTHERS,
 ) -> NDArray[np.int64]:
     """The addresses for ``problem.functions``: those that a run calls, the others 0.
@@ -83,11 +84,12 @@ def link(
         law, game: modules of kernels.
         memory: whether the law has one.
         held: whether its inputs are, so that the memory moves once a control period.
+        driven: whether an input is fed forward besides.
         others: C functions besides the law's own, by their entry: of the mode, the schedule, the
             positions.
     """
     addresses = np.zeros(functions.COUNT, dtype=np.int64)
-    addresses[functions.ACTION] = action(law, game).address
+    addresses[functions.ACTION] = action(law, game, driven).address
     owners: dict[int, Any] = {}
     if memory:
         owners |= of_memory(law, held)
@@ -97,13 +99,13 @@ def link(
 
 
 @cache
-def action(law: ModuleType, game: ModuleType) -> Any:
-    """The law's action in a game."""
-    (found,) = compiled_for(game, _action, law)
+def action(law: ModuleType, game: ModuleType, driven: bool = False) -> Any:
+    """The law's action in a game, with what is fed forward if it is ``driven``."""
+    (found,) = compiled_for(game, _action, law, driven)
     return found
 
 
-def _action(game: ModuleType, law: ModuleType) -> list[Any]:
+def _action(game: ModuleType, law: ModuleType, driven: bool) -> list[Any]:
     source = source_key(law, game)
     of_all = hasattr(game, "pseudo_gradient") and hasattr(law, "action_of_all")
     act = law.action_of_all if of_all else law.action
@@ -111,11 +113,16 @@ def _action(game: ModuleType, law: ModuleType) -> list[Any]:
     def action(block, y, weights, memory, profile, now, u):
         _ = source
         steps = steps_in(block)
-        m = steps.actions
-        return act(
-            game, problem_in(block), floats_at(y, m), floats_at(weights, steps.constraints),
+        m, problem = steps.actions, problem_in(block)
+        left = act(
+            game, problem, floats_at(y, m), floats_at(weights, steps.constraints),
             floats_at(memory, steps.memory), law_work_at(profile, now, m), floats_at(u, m),
         )  # fmt: skip
+        if driven:
+            asked = floats_at(u, m)
+            for r in range(len(problem.motion.now)):
+                asked[r] += problem.motion.now[r]
+        return left
 
     return [callback(_whole(*[_whole] * 7), action)]
 
@@ -227,16 +234,18 @@ def separation(held: bool) -> dict[int, Any]:
 
 
 @cache
-def of_implicit(law: ModuleType, game: ModuleType, alone: bool) -> dict[int, Any]:
-    """What mode implicit solves a law for, each agent by itself if ``alone``."""
+def of_implicit(
+    law: ModuleType, game: ModuleType, alone: bool, driven: bool = False
+) -> dict[int, Any]:
+    """What mode implicit solves a law for, each agent by itself if ``alone``; see :func:`link`."""
     entries = (
         functions.PREPARE, functions.BARRIER_FREE_TERMS, functions.ADD_BARRIER_FREE_SLOPE,
         functions.MEMORY_OUTPUTS, functions.OWN_PROFILE,
     )  # fmt: skip
-    return dict(zip(entries, compiled_for(game, _of_implicit, law, alone), strict=False))
+    return dict(zip(entries, compiled_for(game, _of_implicit, law, alone, driven), strict=False))
 
 
-def _of_implicit(game: ModuleType, law: ModuleType, alone: bool) -> list[Any]:
+def _of_implicit(game: ModuleType, law: ModuleType, alone: bool, driven: bool) -> list[Any]:
     source = source_key(law, game)
 
     def prepare(block, first, last, y, memory):
@@ -257,6 +266,8 @@ def _of_implicit(game: ModuleType, law: ModuleType, alone: bool) -> list[Any]:
         for i in range(first, last):
             for a in range(data.offsets[i], data.offsets[i + 1]):
                 out[a] = law.barrier_free(game, problem, i, a, y, memory)
+                if driven:
+                    out[a] -= problem.motion.now[a]
         return 0
 
     def add_barrier_free_slope(block, i, a, y, memory, out):

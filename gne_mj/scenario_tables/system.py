@@ -212,6 +212,7 @@ class SystemTable(Table):
             between=self.controller.between,
             observer=self.controller.observer,
             load=self._load(game),
+            feed_forward=self.controller.feed_forward,
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
             rtol=simulation.rtol,

@@ -14,6 +14,7 @@ from gne_mj.controllers.propagation import Propagator, no_propagator
 from gne_mj.controllers.settings import GUARDED, LINKS, OBSERVER
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
+from gne_mj.feed_forward import FeedForward, feed_forward
 from gne_mj.graph import GraphData
 from gne_mj.loops import functions, no_memory
 from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
@@ -33,7 +34,7 @@ from gne_mj.loops.link import (
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.loops.one_loop import OneLoop
 from gne_mj.loops.separation import neighbours_length
-from gne_mj.motion import STANDING, Motion, motion_of
+from gne_mj.motion import STANDING, Frame, Motion, Moving, motion_of
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
@@ -127,7 +128,7 @@ class Assembly(SystemData):
     def _others(self) -> dict[int, Any]:
         found = dict(mode_of(self).prediction(self))
         fall = unchanging if self.schedule is None else self.schedule.fall
-        if motion_of(self.game) is not None:
+        if motion_of(self.game) is not None or self.feed_forward:
             found[functions.PENALTY] = penalty_of_moving(fall)
         elif self.schedule is not None:
             found[functions.PENALTY] = penalty(fall)
@@ -152,7 +153,7 @@ class Assembly(SystemData):
         """The addresses of the law's functions, see :mod:`gne_mj.loops.functions`."""
         return link(
             self.law.kernels, self.game.kernels,
-            memory=bool(len(self.memory)), held=mode_of(self).held,
+            memory=bool(len(self.memory)), held=mode_of(self).held, driven=self.feed_forward,
             others={**self._behind, **self._others},
         )  # fmt: skip
 
@@ -188,7 +189,7 @@ class Assembly(SystemData):
         problem = Problem(
             graph=self.graph_at_start,
             data=self.game.data if frame is None else frame.data,
-            motion=STANDING if frame is None else frame.moving,
+            motion=self._moving(clock, frame),
             settings=settings,
             limit=self.agents.input_limit,
             equilibrium=self.centre,
@@ -226,13 +227,38 @@ class Assembly(SystemData):
         every = max(1, round(clock.duration / clock.sample_period) // _LOOKED_AT)
         times = np.arange(0.0, clock.duration, every * clock.sample_period).tolist()
         for time in sorted({*times, *(t for t in motion.knots if t <= clock.duration)}):
-            self.path.at(time)
+            self.path.equilibrium(time)
 
     @property
     def _penalty_numbers(self) -> NDArray[np.float64]:
         if self.schedule is not None:
             return self.schedule.numbers
-        return np.array([self.rho, 0.0, 0.0]) if motion_of(self.game) else np.zeros(3)
+        moves = motion_of(self.game) is not None or self.feed_forward
+        return np.array([self.rho, 0.0, 0.0]) if moves else np.zeros(3)
+
+    def _moving(self, clock: Clock, frame: Frame | None) -> Moving:
+        moving = STANDING if frame is None else frame.moving
+        if not self.feed_forward:
+            return moving
+        feed = self.fed(clock)
+        return moving._replace(
+            input=feed.input.ravel(),
+            spacing=np.array([feed.spacing]),
+            now=np.zeros(self.game.actions),
+        )
+
+    def fed(self, clock: Clock) -> FeedForward:
+        """What is fed forward in a run on a clock."""
+        if clock not in self._fed:
+            mode = mode_of(self)
+            self._fed[clock] = feed_forward(
+                self.path, self.agents, clock, held=mode.held, ahead=mode.promises
+            )
+        return self._fed[clock]
+
+    @cached_property
+    def _fed(self) -> dict[Clock, FeedForward]:
+        return {}
 
     @property
     def typical_sizes(self) -> NDArray[np.float64]:

@@ -18,10 +18,12 @@ from gne_mj.faults import (
     strikes_messages,
     triggered,
 )
+from gne_mj.feed_forward import FED
 from gne_mj.game_model import Game
 from gne_mj.loops.feedback import Problem
 from gne_mj.motion import motion_of
 from gne_mj.native import INTERPRETED
+from gne_mj.plants import integrator
 from gne_mj.plants.agent_type import has_ode, in_mujoco
 from gne_mj.system.data import ADAPTIVE, SystemData
 from gne_mj.system.modes import mode_of
@@ -68,6 +70,7 @@ def check_parts(system: SystemData) -> None:
             "law", "plain functions", "they are given a game that stands still: let its numbers"
             " stand, or write the law as kernels",
         )  # fmt: skip
+    check_feed_forward(system)
     mode = mode_of(system)
     mode.check_law(system)
     if system.decentralised and not mode.shares_slack(system):
@@ -82,6 +85,21 @@ def check_parts(system: SystemData) -> None:
         with part_of(f"game.quantities.{quantity.name}"):
             quantity.at(system.start[None], system.game.entries(quantity))
             quantity.bounds(system.game.entries(quantity))
+
+
+def check_feed_forward(system: SystemData) -> None:
+    """Refuse an input fed forward where nothing moves, or that is not known."""
+    if not system.feed_forward:
+        return
+    kind, key = system.agents.kind, "feed_forward"
+    if not system.moves:
+        raise InvalidInput(key, True, "it is for games or penalties that move")
+    if not system.law.guarded:
+        raise InvalidInput(key, True, "it is for full and partial information")
+    known = (integrator,) if mode_of(system).held else FED
+    if kind not in known:
+        names = " and ".join(f"{each.NAME}s" for each in known)
+        raise InvalidInput(key, True, f"in mode '{system.mode}' it is known of {names}")
 
 
 def check_lists(system: SystemData, problem: Problem) -> None:

@@ -52,6 +52,7 @@ class SystemData:
     integrator: str = "rk4"
     memory: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     schedule: Schedule | None = None
+    feed_forward: bool = False
     decentralised: bool = False
     between: str = WATCHED
     faults: tuple[Fault, ...] = ()
@@ -158,7 +159,7 @@ class SystemData:
     def equilibrium_at(self, time: float) -> Equilibrium | None:
         """What runs are judged by at a time in s: y*, of a game that moves that of the time."""
         still = motion_of(self.game) is None
-        return self.known_equilibrium if still else self.path.at(time).equilibrium
+        return self.known_equilibrium if still else self.path.equilibrium(time)
 
     def equilibria(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same of times (samples,): (samples, m), not a number where it is not known."""
@@ -171,7 +172,8 @@ class SystemData:
     @property
     def game_kernels(self) -> ModuleType:
         """The module that brings the game to a period's end in this system's loops."""
-        return standing if motion_of(self.game) is None else moving
+        still = motion_of(self.game) is None and not self.feed_forward
+        return standing if still else moving
 
     @property
     def recorded(self) -> int:

@@ -46,8 +46,8 @@ def check_guard(system: SystemData) -> None:
             key, value, "agents that keep apart look at each other at the clock's own control"
             " instants: leave it out, or [separation]",
         )  # fmt: skip
-    if motion_of(system.game) is not None:
-        raise InvalidInput(key, value, "it looks at bounds that stand still, and the game moves")
+    if motion_of(system.game) is not None or system.feed_forward:
+        raise InvalidInput(key, value, "it looks at games that stand still, under the law alone")
     late = system.disturbance is not None and system.disturbance.delay > 0
     if late or sensor_delay(system.faults) > 0:
         raise InvalidInput(

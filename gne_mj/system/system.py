@@ -31,6 +31,8 @@ class System(Assembly):
             chooses its steps by their error, and for the fully distributed law there
             "rosenbrock", which does so too and does not mind a small epsilon.
         schedule: how the penalty falls to rho in time; None if it does not change.
+        feed_forward: whether the input that y* needs to move is added to the law's
+            (:mod:`gne_mj.feed_forward`).
         decentralised: mode implicit: each agent finds its input alone and keeps to its share of
             what is left of every bound (:mod:`gne_mj.loops.local`).
         between: "watched", or "guarded": held modes cut a control period before it leads outside

@@ -61,7 +61,7 @@ class Implicit(Mode):
         find = loads.act if system.observer > 0.0 else implicit.act
         find = guard.act if system.guarded else find
         return {
-            **link.of_implicit(system.law.kernels, system.game.kernels, alone),
+            **link.of_implicit(system.law.kernels, system.game.kernels, alone, system.feed_forward),
             functions.SOLVE: link.solve(equation),
             functions.ACT: acting(system, find),
         }
