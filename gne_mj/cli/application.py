@@ -97,6 +97,9 @@ def main() -> None:
     printed cannot be written or a cluster is lost. With --json nothing but the report is printed to
     stdout, whatever a user's functions print.
     """
+    # before NumPy is loaded: matrices here are small, and threads that wait for each other take
+    # longer than the work (a certificate of ten channels three times as long)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(_BETWEEN_LOOKS)
     atexit.register(gc.freeze)  # what is left at the end goes with the process
     # Nothing here needs a display, so that no setting for one may be in the way.
