@@ -116,8 +116,8 @@ def certify_run(
     tolerance: float,
     duration: float,
     wall_time: float,
-    interrupted: bool = False,
-    intervened: bool = False,
+    interrupted: bool,
+    intervened: bool,
     network: dict[str, Any] | None = None,
     clock: Clock | None = None,
 ) -> Certificate:

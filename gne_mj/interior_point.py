@@ -255,7 +255,8 @@ def is_near_enough(path, residual, off, distance, still):
     """Whether the end may be taken where rounding lets the residuals fall no more."""
     enough = ACCEPTED * path.tolerance
     near_enough = residual <= enough and (still or off <= max(8.0 * path.spread, enough))
-    return near_enough or distance <= path.tolerance
+    # slacks do not tell of a step where all gradients of constraints vanish
+    return near_enough or (distance <= path.tolerance and residual <= NEAR)
 
 
 @kernel

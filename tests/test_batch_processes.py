@@ -9,7 +9,8 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -168,6 +169,28 @@ def dask_cluster(workers, folder):
         for process in started:
             process.kill()
             process.wait()
+
+
+class Done:
+    """A chunk's future."""
+
+    def result(self):
+        return 3, 1
+
+
+def test_what_a_cluster_has_finished_is_told(tmp_path, monkeypatch):
+    """Of each chunk three runs, of which one ended early, by two workers."""
+    store = small(tmp_path, chunk=2)
+    client = SimpleNamespace(
+        submit=lambda *given, **about: Done(),
+        as_current=nullcontext, scheduler=SimpleNamespace(ncores=None), cancel=lambda left: None,
+        sync=lambda *given, **about: {"a": 1, "b": 1},
+    )  # fmt: skip
+    monkeypatch.setattr("distributed.wait", lambda waiting, **about: (set(waiting), set()))
+    (found,) = cluster.on_cluster(store, client, lambda: False)
+    chunks = store.plan.chunks
+    assert found == cluster.Finished(runs=3 * chunks, early=chunks, workers=2)
+    assert chunks > 2
 
 
 @pytest.mark.slow

@@ -264,7 +264,7 @@ def test_periods_that_are_not_accurate_are_excepted():
         y = rows.state[:, :, system.agents.kind.OUTPUT]
         found = certify_run(
             system, np.array([0.2]), y, rows.input, monitor, tolerance=1e-3, duration=0.2,
-            wall_time=0.0,
+            wall_time=0.0, interrupted=False, intervened=False,
         )  # fmt: skip
         solutions = found.of_modes["implicit"]["solutions"]
         assert found.of_modes["implicit"]["covered"] == solutions - unsolved

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import V0
+from scipy.optimize import brentq
 from test_scales import scaled
 
 import reference
@@ -102,3 +103,12 @@ SHORT_WAYS = {
 def test_a_look_ahead_makes_the_way_short(name):
     game, start, most = SHORT_WAYS[name]
     assert variational_equilibrium(game, start).iterations <= most
+
+
+@pytest.mark.parametrize("start", [1e-8, 1e-12, 1.1e-16, -1.1e-16, 1e-20, 1e-25])
+def test_a_start_where_all_constraints_slopes_vanish_is_no_equilibrium(start):
+    """y^2 < 0.49 and a wish of 3 m/s: y = 0 changes no slack, however long a step from there."""
+    game = velocity_game(1, 0.0, 0.7, 3.0, 1.0)
+    found = penalised_equilibrium(game, 0.1, np.array([start]))
+    root = brentq(lambda y: 4.0 * y - 6.0 + 0.2 * y / (0.49 - y * y), 0.1, 0.699, xtol=1e-15)
+    assert found.action[0] == pytest.approx(root, rel=1e-9)
