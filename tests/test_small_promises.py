@@ -19,7 +19,7 @@ from gne_mj.faults import Push
 from gne_mj.games import edges
 from gne_mj.games.platoon import _check_monotone
 from gne_mj.graph import ring
-from gne_mj.loops import division
+from gne_mj.loops import division, newton
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Case, EachLoop, Span
 from gne_mj.system import System
@@ -286,3 +286,11 @@ def test_a_batch_draws_what_goes_wrong_by_the_seed_of_each_run():
     for run in range(2):
         alone = plan.alone(run).simulation_object().run()["robots"]["action"].to_numpy()[-1]
         assert np.array_equal(ends[run], alone)
+
+
+def test_what_a_step_by_old_factors_leaves_is_its_worst_entry_over_the_longest():
+    step, old = np.array([1.0, -4.0, 2.0]), np.array([1.5, -4.25, 2.0])
+    kernel = newton.share_left
+    assert kernel(3, SimpleNamespace(step=step, old_step=old)) == 2.0 * 0.5 / 4.0
+    assert kernel(3, SimpleNamespace(step=step, old_step=-step)) == 1.0
+    assert kernel(3, SimpleNamespace(step=0.0 * step, old_step=old)) == 1.0
