@@ -236,7 +236,7 @@ def test_mistakes_in_a_game(copied, tmp_path, capsys, monkeypatch, mistake):
     ("old", "new", "status", "words"),
     [
         ("@kernel\ndef cost_gradient", "def cost_gradient", 2, "'cost' is a kernel"),
-        ("@kernel\ndef total", "def total", 1, "line 47: a kernel cannot be compiled: Untyped"),
+        ("@kernel\ndef total", "def total", 1, "line 67: a kernel cannot be compiled: Untyped"),
         ("power = 0.0", "power = np.zeros(1)[0]", 1, "line 39: a kernel cannot be compiled: it al"),
     ],
     ids=["mixture", "unmarked", "allocates"],

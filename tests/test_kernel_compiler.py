@@ -30,9 +30,9 @@ class Both(NamedTuple):
 @native.kernel
 def turned(path, point):
     """Records of numbers with a truth value, and of arrays, as what a kernel returns."""
-    return Path(2.0 * path.rho, path.last_rho, path.tolerance, path.spread, not path.to_zero), (
-        Iterate(point.slack, point.multipliers, point.y)
-    )
+    return Path(
+        2.0 * path.rho, path.last_rho, path.tolerance, path.spread, not path.to_zero, path.gently
+    ), (Iterate(point.slack, point.multipliers, point.y))
 
 
 @native.kernel
@@ -54,7 +54,7 @@ def tell(path, point, free, other, out):
 
 
 def test_records_come_through_kernels_as_they_are():
-    path = Path(0.5, 0.25, 0.125, 4.0, False)
+    path = Path(0.5, 0.25, 0.125, 4.0, False, True)
     point = Iterate(np.array([1.0, 2.0]), np.array([3.0, 5.0]), np.array([7.0, 11.0]))
     free = Free(np.array([0, 1]), np.array([0]), np.array([0, 1]))
     other = Elsewhere(np.array([0.0, 1000.0]), 1, True)

@@ -129,7 +129,10 @@ def test_what_a_margin_costs_is_named_where_there_is_one(lost, told):
 def test_v_is_known_about_a_known_equilibrium_of_agents_that_have_one(about, stored, monkeypatch):
     monkeypatch.setattr(certificate, "Theorem", lambda system: SimpleNamespace(lyapunov=True))
     system = SimpleNamespace(
-        known_equilibrium=object() if about else None, agents=SimpleNamespace(knows_storage=stored)
+        known_equilibrium=object() if about else None,
+        agents=SimpleNamespace(knows_storage=stored),
+        game=boxed(lambda i, y: 0.0, lambda i, y: 0.0, 1.0),
+        schedule=None,
     )
     monitor = SimpleNamespace(
         storage_start=2.0, storage=1.0, storage_rise=0.0, storage_rise_time=0.0, started=1.0,

@@ -7,7 +7,7 @@ one (then of as many agents as the game has), or edges as pairs of agents number
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -31,6 +31,7 @@ def full_information(
     mode: str = "continuous",
     decentralised: bool = False,
     between: str = "watched",
+    feed_forward: bool = False,
     observer: float = 0.0,
 ) -> LawTable:
     """Every agent measures all actions [eq:nonlinFIfeedback].
@@ -39,6 +40,7 @@ def full_information(
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
         between: "guarded" cuts periods of held modes before they lead outside.
+        feed_forward: of a game that moves: add the input under which agents stay at y*(t).
         observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
     """
     return made(FullController, information="full", **locals())
@@ -51,9 +53,11 @@ def partial_information(
     coupling: float = 1.0,
     time_constant: float = 1.0,
     estimates: Estimates = "all",
+    communication: Mapping[str, Any] | None = None,
     mode: str = "continuous",
     decentralised: bool = False,
     between: str = "watched",
+    feed_forward: bool = False,
     observer: float = 0.0,
 ) -> LawTable:
     """Costs at estimates that neighbours exchange, a measured barrier [eq:nonlinearPIFeedback].
@@ -64,9 +68,12 @@ def partial_information(
         time_constant: tau of the estimates in s; the paper has 1.
         estimates: of whom agents keep some: "all", the "needed" ones, or for each agent a list of
             agents, numbered from 1.
+        communication: when messages are sent, as ``{"type": "event", "threshold": 0.1}``; left out,
+            all the time or once a control period.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
         between: "guarded" cuts periods of held modes before they lead outside.
+        feed_forward: of a game that moves: add the input under which agents stay at y*(t).
         observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
     """
     return made(PartialController, information="partial", **locals())
@@ -78,9 +85,14 @@ def fully_distributed(
     *,
     epsilon: float,
     gain: float = 1.0,
+    fast_weight: float = 3.0,
     estimates: Estimates = "all",
+    communication: Mapping[str, Any] | None = None,
     mode: str = "continuous",
     decentralised: bool = False,
+    between: str = "watched",
+    feed_forward: bool = False,
+    observer: float = 0.0,
 ) -> LawTable:
     """Neighbours' messages and nothing else [eq:CenterFeedback].
 
@@ -88,10 +100,14 @@ def fully_distributed(
         graph: over which agents communicate.
         epsilon: time constant of estimates and z in s.
         gain: k.
+        fast_weight: omega of W = V + omega V_fast.
         estimates: of whom agents keep some: "all", the "needed" ones, or for each agent a list of
             agents, numbered from 1.
+        communication: when messages are sent, as ``{"type": "event", "threshold": 0.1}``; left out,
+            all the time or once a control period.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
+        between, feed_forward, observer: as of the other laws; this one refuses what it cannot do.
     """
     return made(DistributedController, information="distributed", **locals())
 
