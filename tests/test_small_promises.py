@@ -297,3 +297,31 @@ def test_what_a_step_by_old_factors_leaves_is_its_worst_entry_over_the_longest()
     assert kernel(3, SimpleNamespace(step=step, old_step=old)) == 2.0 * 0.5 / 4.0
     assert kernel(3, SimpleNamespace(step=step, old_step=-step)) == 1.0
     assert kernel(3, SimpleNamespace(step=0.0 * step, old_step=old)) == 1.0
+
+
+def euler_piece(change, count=1):
+    """A slack of 1 that a piece of 0.1 s changes by so much, judged; the division and its rates."""
+    stages = SimpleNamespace(
+        g=np.array([-1.0, -1.0, -1.0, -1.0]), y=np.array([0.0, 0.1, 0.2, 0.4]), size=np.ones(2)
+    )
+    div = SimpleNamespace(calm=0.0, easy=0.0, rated=0.0, level=0.0)
+    work = SimpleNamespace(division=div, stages=stages, g=np.array([-1.0 + change]), y=np.zeros(1))
+    pieces = SimpleNamespace(
+        member_pointer=[0, 1], member_index=[0], offsets=[0, 1], tightening=np.zeros(1)
+    )
+    return division.judge(count, 0.1, SimpleNamespace(data=pieces), work), div, stages, work
+
+
+def test_a_piece_of_eulers_method_is_compared_with_the_rate_of_the_one_before():
+    """The first one has none; after it the slack's second derivative tells of the error."""
+    which, div, stages, work = euler_piece(0.1)
+    assert (which, div.rated) == (-1, 1.0)
+    assert stages.g[1] == pytest.approx(1.0), "0.1 in 0.1 s"
+    stages.g[0] = work.g[0]
+    work.g[0] += 0.1 + 0.017  # half of what has changed is 0.0085 of a slack of 0.9: allowed 0.009
+    problem = SimpleNamespace(data=SimpleNamespace(tightening=np.zeros(1)))
+    assert division.judge(1, 0.1, problem, work) == -1
+    stages.g[:2] = -0.9, 1.0
+    work.g[0] = -0.9 + 0.1 + 0.019
+    assert division.judge(1, 0.1, problem, work) == 0
+    assert euler_piece(0.1, count=4)[1].rated == 0.0
