@@ -107,7 +107,9 @@ def fully_distributed(
             all the time or once a control period.
         mode: when the law is evaluated.
         decentralised: in mode implicit, whether each agent solves alone.
-        between, feed_forward, observer: as of the other laws; this one refuses what it cannot do.
+        between: only "watched": what agents take for the profile is not what a guard would look at.
+        feed_forward: only False: nobody knows all of the game.
+        observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
     """
     return made(DistributedController, information="distributed", **locals())
 
