@@ -22,6 +22,7 @@ from gne_mj.graph import ring
 from gne_mj.loops import division, newton
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Case, EachLoop, Span
+from gne_mj.margins import is_affine
 from gne_mj.system import System
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import Slopes, assumptions, convexity, search_push, theorem, trials
@@ -325,3 +326,18 @@ def test_a_piece_of_eulers_method_is_compared_with_the_rate_of_the_one_before():
     work.g[0] = -0.9 + 0.1 + 0.019
     assert division.judge(1, 0.1, problem, work) == 0
     assert euler_piece(0.1, count=4)[1].rated == 0.0
+
+
+def test_one_curved_entry_is_enough_for_constraints_that_are_not_affine():
+    """y_1^2 < 1 and y_2 < 1: of four second derivatives three are zero."""
+    functions = {
+        "cost": lambda q, i, y: y[i] ** 2 / 2,
+        "cost_gradient": lambda q, i, a, y: y[i],
+        "constraint": lambda q, k, y: y[1] - 1.0 if k else y[0] ** 2 - 1.0,
+        "constraint_gradient": lambda q, k, a, y: (
+            float(a == 1) if k else 2.0 * y[0] * float(a == 0)
+        ),
+    }
+    game = plain_game(functions, (1, 1), [[0], [1]], [[0], [1]])
+    assert not is_affine(game, np.array([0.5, 0.5]))
+    assert is_affine(boxed(lambda i, y: y[i], lambda i, y: 1.0, 1.0), np.array([0.5, 0.5]))
