@@ -75,7 +75,8 @@ class Quantity:
         Raises:
             InvalidInput: the values come in another shape.
         """
-        values = np.asarray(self.values(profiles), dtype=np.float64)
+        with np.errstate(over="ignore"):  # what is beyond all floats is infinite
+            values = np.asarray(self.values(profiles), dtype=np.float64)
         if values.shape != (len(profiles), *entries):
             raise InvalidInput(
                 "values",

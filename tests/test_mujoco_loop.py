@@ -281,8 +281,9 @@ def test_leaving_the_set_is_seen_at_its_step_and_the_state_before_it_is_kept():
         assert len(again.input) == 0
 
 
-def test_masses_that_mujoco_does_not_take_are_refused_in_one_sentence():
-    agents = robot_system(robot_state(FIVE), {**EQUAL, "main_mass": [1e-16] * 5}).agents
-    with pytest.raises(InvalidInput, match=r"MuJoCo must compile it: .*mass") as caught:
+@pytest.mark.parametrize(("mass", "verb"), [(1e-16, "compile"), (5e-324, "read")])
+def test_masses_that_mujoco_does_not_take_are_refused_in_one_sentence(mass, verb):
+    agents = robot_system(robot_state(FIVE), {**EQUAL, "main_mass": [mass] * 5}).agents
+    with pytest.raises(InvalidInput, match=f"MuJoCo must {verb} it: .*mass") as caught:
         MujocoPlant(agents, 0.01)
     assert "\n" not in str(caught.value)

@@ -175,3 +175,8 @@ def test_wrong_shapes_are_found_before_a_run(quantity, words):
 def test_what_they_may_belong_to():
     with pytest.raises(InvalidInput, match=r"^each: got 'link'"):
         replace(SHARE, each="link")
+
+
+def test_a_value_beyond_all_floats_is_infinite_without_a_warning():
+    quantity = Quantity("size", "size", "m", lambda y: np.linalg.norm(y, axis=1))
+    assert quantity.at(np.array([[1e300, 1e300], [3.0, 4.0]]), ()).tolist() == [np.inf, 5.0]

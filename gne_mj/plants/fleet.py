@@ -80,7 +80,9 @@ def compose(
     for first in range(0, len(robots), GROUP):
         group = _group(robot, robots[first : first + GROUP], first + 1, ends, decorated=decorated)
         frame = world.worldbody.add_frame()
-        world.attach(mujoco.MjSpec.from_string(group), prefix="robot_", frame=frame)
+        with named(path="world"):
+            part = mjcf_file.of_text(group, "...")
+        world.attach(part, prefix="robot_", frame=frame)
     if len(robots) > MANY:
         # Else so much as contacts of all with all would need; there are few.
         world.memory = _LEAST_ARENA + _ARENA_FOR_EACH * len(robots)

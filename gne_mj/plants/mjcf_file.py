@@ -74,6 +74,16 @@ def compiled(spec: Any, path: Path | str) -> mujoco.MjModel:
     return model
 
 
+def of_text(text: str, path: Path | str) -> Any:
+    """What a text says, as a number that MuJoCo reads as none (5e-324) may not be.
+
+    Raises:
+        InvalidInput: it cannot be read.
+    """
+    with _refusing(path, "read"):
+        return mujoco.MjSpec.from_string(text)
+
+
 def attach(world: Any, spec: Any, path: Path, *, prefix: str, at: tuple[float, ...]) -> None:
     """Attach a file to a fleet's world, at a place (m), its names behind a prefix.
 
