@@ -9,10 +9,36 @@ agent's neighbours in turn): what came over it last. Then that is what an agent 
 """
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.propagation import propagate_estimates
 from gne_mj.controllers.settings import LINKS, RATE
+from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
+
+
+def given_estimates(
+    agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
+) -> NDArray[np.float64]:
+    """What a start says of N agents' estimates: one number (), a profile (m,) or one each (N, m).
+
+    Args:
+        agents: N.
+        y: (m,) the actions, which are taken where ``estimate`` is None.
+        estimate: as given.
+
+    Raises:
+        InvalidInput: another shape.
+    """
+    m = len(y)
+    expected = f"it must be one number, a list of {m}, or {agents} lists of {m}"
+    try:
+        given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
+    except ValueError:
+        raise InvalidInput("estimate", "lists of different lengths", expected) from None
+    if given.shape not in ((), (m,), (agents, m)):
+        raise InvalidInput("estimate", f"shape {given.shape}", expected)
+    return given
 
 
 @kernel

@@ -10,10 +10,15 @@ from typing import ClassVar, Literal
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
+from gne_mj.controllers.measured import memory_outputs as memory_outputs
+from gne_mj.controllers.measured import own_profile as own_profile
+from gne_mj.controllers.no_memory import propagate as propagate
+from gne_mj.controllers.no_memory import rate as rate
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.table import LawTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.game_model import Game
-from gne_mj.native import copy, kernel
+from gne_mj.native import kernel
 from gne_mj.registry import LAWS
 
 LANES = True  # numbers or lanes
@@ -72,37 +77,6 @@ def barrier_free(game, problem, i, a, y, memory):
 def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     """Add dpull/dy to out (m,), which is touched for agents in the cost only."""
     game.add_cost_hessian(problem.data.parameters, i, a, y, 1.0, out)
-
-
-@kernel
-def own_profile(problem, i, y, memory, profile):
-    """Fill profile (m,) with the others' actions as agent i's barrier reads them: measured.
-
-    Returns by how much its own block moves with its own action: fully.
-    """
-    copy(y, profile)
-    return 1.0
-
-
-@kernel
-def memory_outputs(prediction, held):
-    """In mode implicit too the memory moves with the outputs of the period's start."""
-
-
-@kernel
-def rate(problem, y, memory, out):
-    """No memory, no rate."""
-
-
-@kernel
-def propagate(problem, y, memory, scratch):
-    """No memory to propagate."""
-
-
-@kernel
-def storage(problem, memory):
-    """No memory, no storage."""
-    return 0.0
 
 
 @LAWS.register

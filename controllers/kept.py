@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.bounds import check_room
+from gne_mj.controllers.estimates import given_estimates
 from gne_mj.controllers.keepers import Keepers
 from gne_mj.controllers.kept_propagation import kept_propagator
 from gne_mj.controllers.propagation import Propagator
-from gne_mj.errors import InvalidInput
 from gne_mj.graph import Graph
 
 Array = NDArray[np.float64]
@@ -160,14 +160,8 @@ class Kept:
 
     def initial(self, y: Array, estimate: ArrayLike | None) -> Array:
         """The memory at the start, (size + m,); see :meth:`gne_mj.controllers.law.Law`."""
-        agents, m = self.graph.agents, len(y)
-        expected = f"it must be one number, a list of {m}, or {agents} lists of {m}"
-        try:
-            given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
-        except ValueError:
-            raise InvalidInput("estimate", "lists of different lengths", expected) from None
-        if given.shape not in ((), (m,), (agents, m)):
-            raise InvalidInput("estimate", f"shape {given.shape}", expected)
+        m = len(y)
+        given = given_estimates(self.graph.agents, y, estimate)
         if given.ndim == 2:
             kept = given[self.holder, self.action]
         else:

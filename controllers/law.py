@@ -36,6 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers import settings
+from gne_mj.controllers.estimates import given_estimates
 from gne_mj.controllers.kept import EVERYTHING, Kept, KeptData
 from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
 from gne_mj.controllers.theorem import LawTheorem
@@ -237,12 +238,5 @@ def initial_estimates(
     agents: int, y: NDArray[np.float64], estimate: ArrayLike | None
 ) -> NDArray[np.float64]:
     """All agents' estimates at the start, flat (N m,); see :meth:`Law.initial_memory`."""
-    m = len(y)
-    expected = f"it must be one number, a list of {m}, or {agents} lists of {m}"
-    try:
-        given = np.asarray(y if estimate is None else estimate, dtype=np.float64)
-    except ValueError:
-        raise InvalidInput("estimate", "lists of different lengths", expected) from None
-    if given.shape not in ((), (m,), (agents, m)):
-        raise InvalidInput("estimate", f"shape {given.shape}", expected)
-    return np.broadcast_to(given, (agents, m)).astype(np.float64).ravel()
+    given = given_estimates(agents, y, estimate)
+    return np.broadcast_to(given, (agents, len(y))).astype(np.float64).ravel()

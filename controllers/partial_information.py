@@ -39,12 +39,14 @@ from gne_mj.controllers.law import (
     check_positive,
     initial_estimates,
 )
+from gne_mj.controllers.measured import memory_outputs as memory_outputs
+from gne_mj.controllers.measured import own_profile as own_profile
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
 from gne_mj.controllers.table import EstimatesTable
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.game_model import Game
 from gne_mj.graph import Graph
-from gne_mj.native import copy, kernel
+from gne_mj.native import kernel
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
 
@@ -147,18 +149,6 @@ def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     game.add_cost_hessian(data.parameters, i, a, memory[i * m : (i + 1) * m], 1.0, out)
     clear_others(data, i, out)
     out[a] += problem.settings[COUPLING] * (graph.pointer[i + 1] - graph.pointer[i])
-
-
-@kernel
-def own_profile(problem, i, y, memory, profile):
-    """As under full information: the barrier is measured."""
-    copy(y, profile)
-    return 1.0
-
-
-@kernel
-def memory_outputs(prediction, held):
-    """In mode implicit too the memory moves with the outputs of the period's start."""
 
 
 @kernel

@@ -15,8 +15,10 @@ from gne_mj.controllers.kept_estimates import (
     squared_distance,
 )
 from gne_mj.controllers.kept_estimates import prepare as prepare
+from gne_mj.controllers.measured import memory_outputs as memory_outputs
+from gne_mj.controllers.measured import own_profile as own_profile
 from gne_mj.controllers.settings import COUPLING, TIME_CONSTANT
-from gne_mj.native import copy, kernel, part
+from gne_mj.native import kernel, part
 
 
 @kernel
@@ -51,18 +53,6 @@ def add_barrier_free_slope(game, problem, i, a, y, memory, out):
     game.add_cost_hessian(data.parameters, i, a, profile, 1.0, out)
     clear_others(data, i, out)
     out[a] += problem.settings[COUPLING] * couplings(problem, i)
-
-
-@kernel
-def own_profile(problem, i, y, memory, profile):
-    """As under full information: the barrier is measured."""
-    copy(y, profile)
-    return 1.0
-
-
-@kernel
-def memory_outputs(prediction, held):
-    """In mode implicit too the memory moves with the outputs of the period's start."""
 
 
 @kernel

@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import kept_apart, run_metrics, variables
+from gne_mj import kept_apart, run_metrics, signals
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
+from gne_mj.signals import input_unit
 from gne_mj.system import System, mode_of
 from gne_mj.system.data import SystemData
 from gne_mj.system.modes import Figure, Mode
-from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed, input_unit
+from gne_mj.variables import AXIS, Column, Panel, Rows, Variable, changed
 
 if TYPE_CHECKING:
     import pandas
@@ -335,12 +336,12 @@ def _of_mode(mode: Mode, figure: Figure) -> Variable:
 
 def figures() -> list[Variable]:
     """All figures that runs may have, in the order of a batch's dataset."""
-    return _with_figures_of(each for each in variables.SIGNALS if isinstance(each, Variable))
+    return _with_figures_of(each for each in signals.SIGNALS if isinstance(each, Variable))
 
 
 def declared_figures(system: System) -> list[Variable]:
     """The figures that a system's runs have."""
-    found = _with_figures_of(variables.declared(system))
+    found = _with_figures_of(signals.declared(system))
     return [figure for figure in found if figure.there(system)]
 
 

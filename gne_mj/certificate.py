@@ -7,20 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import kept_apart, run_metrics, tracking
+from gne_mj import exits, kept_apart, monitored, run_metrics, tracking
 from gne_mj.epsilon import epsilon_bounds
 from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
-from gne_mj.faults import triggered
 from gne_mj.loops import monitor as watch
-from gne_mj.loops.division import PIECES
 from gne_mj.margins import of_the_set
 from gne_mj.motion import motion_of
-from gne_mj.plants.agent_type import followed_position
 from gne_mj.registry import MODES
-from gne_mj.run_metrics import EXITS, SUCCESSES, TAIL
+from gne_mj.run_metrics import SUCCESSES, TAIL
 from gne_mj.system import Clock, System, mode_of
-from gne_mj.system.first_input import limits_at
 from gne_mj.theory import Theorem
 
 # V may rise by this much of its start through rounding alone.
@@ -144,21 +140,21 @@ def certify_run(
     return Certificate(
         status=status,
         message=message,
-        worst_constraint=_worst_constraint(system, monitor),
-        worst_gap=_worst_gap(system, monitor),
+        worst_constraint=monitored.worst_constraint(system, monitor),
+        worst_gap=monitored.worst_gap(system, monitor),
         equilibrium=_equilibrium(system, action[-1], time[-1]),
         tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
         epsilon=_epsilon(system, time[-1]),
         settling_time=None if np.isnan(settled) else float(settled),
         lyapunov=_lyapunov(system, monitor, intervened),
-        actuators=_actuators(system, monitor),
-        positions=_positions(system, monitor),
-        contacts=_contacts(system, monitor),
-        between=_between(system, monitor),
+        actuators=monitored.actuators(system, monitor),
+        positions=monitored.positions(system, monitor),
+        contacts=monitored.contacts(system, monitor),
+        between=monitored.between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
         network=network,
-        messages=_messages(system, monitor),
-        exit=_exit_report(system, monitor),
+        messages=monitored.messages(system, monitor),
+        exit=exits.exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
         end_time=float(time[-1]),
@@ -184,7 +180,7 @@ def status_now(system: System, monitor: Any) -> dict[str, Any]:
         system: what runs.
         monitor: the loop's flat array of what was seen at every step.
     """
-    worst = _worst_constraint(system, monitor) or {}
+    worst = monitored.worst_constraint(system, monitor) or {}
     now: dict[str, Any] = {
         "status": "running",
         "message": "",
@@ -195,9 +191,9 @@ def status_now(system: System, monitor: Any) -> dict[str, Any]:
         "exit_agents": [],
     }
     if monitor.exit != watch.INSIDE:
-        now["status"], now["message"] = _exit(system, monitor)
+        now["status"], now["message"] = exits.exit_status(system, monitor)
         now["exit_time"] = float(monitor.exit_time)
-        now["exit_agents"] = _concerned(system, monitor)
+        now["exit_agents"] = exits.concerned(system, monitor)
     return now
 
 
@@ -211,7 +207,7 @@ def _status(
     interrupted: bool,
 ) -> tuple[str, str]:
     if monitor.exit != watch.INSIDE:
-        return _exit(system, monitor)
+        return exits.exit_status(system, monitor)
     end = float(time[-1])
     if interrupted:
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
@@ -238,108 +234,6 @@ def _status(
     )
 
 
-def _exit(system: System, monitor: Any) -> tuple[str, str]:
-    game = system.game
-    at = f"at {monitor.exit_time:.6g} s"
-    if monitor.exit_stage > 0:
-        at += f" (stage {int(monitor.exit_stage) + 1} of the integration step)"
-    value = float(monitor.exit_value)
-    code = int(monitor.exit)
-    if code == watch.DIVERGED:
-        return EXITS[code], f"an output or input is no longer a usable number ({value:g}) {at}"
-    if code == watch.FORCES_LOST:
-        from gne_mj.plants.native_mujoco import lost_text  # late: MuJoCo is slow to import
-
-        return EXITS[code], f"{at} {lost_text(int(value))}"
-    if (pair := kept_apart.pair_of(monitor)) is not None:
-        return EXITS[code], kept_apart.exit_text(system, monitor, pair, at)
-    constraint = game.constraint_names[int(monitor.exit_constraint)]
-    if code == watch.FORESEEN:
-        return (
-            EXITS[code],
-            f"held for even one integration step from {at[3:]} on, the input that there is would"
-            f" violate constraint '{constraint}' (predicted g = {value:.6g}), and it was not given:"
-            f" {_instead(system)} can go on there",
-        )
-    if code == watch.STEP_TOO_SMALL:
-        return (
-            EXITS[code],
-            f"1/{PIECES} of the timestep is still too long next to constraint '{constraint}' {at}"
-            f" (g = {value:.6g}): {_instead(system)} can go on there",
-        )
-    if code == watch.MOVED_PAST:
-        return (
-            EXITS[code],
-            f"constraint '{constraint}' moves past the present outputs within the control period"
-            f" that begins {at}: g = {value:.6g} at its end, not negative",
-        )
-    if monitor.exit_between > 0:
-        at += ", between two control instants"
-    if code == watch.LEFT_SET:
-        return (
-            EXITS[code],
-            f"constraint '{constraint}' was violated {at}: g = {value:.6g}, not negative",
-        )
-    agent = int(monitor.exit_agent) + 1
-    if agent == 0:
-        tightened = np.any(game.margins)
-        return (
-            EXITS[code],
-            f"the measured profile violated constraint '{constraint}'"
-            f"{', tightened,' if tightened else ''} {at}: g{' + t' if tightened else ''} ="
-            f" {value:.6g}, not negative, so the law has no action there",
-        )
-    return (
-        EXITS[code],
-        f"agent {agent}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g}, not"
-        " negative, so its law has no action there (a smaller epsilon or gain keeps estimates"
-        " closer to the actions)",
-    )
-
-
-def _exit_report(system: System, monitor: Any) -> dict[str, Any] | None:
-    """What led to an exit: the last input that was held, and under which law."""
-    if monitor.exit == watch.INSIDE:
-        return None
-    constraint = int(monitor.exit_constraint)
-    pair = kept_apart.pair_of(monitor)
-    known = monitor.exit != watch.DIVERGED and pair is None
-    agent = int(monitor.exit_agent) + 1 if pair is None else 0
-    return {
-        "time": float(monitor.exit_time),
-        "stage": int(monitor.exit_stage) + 1,
-        "at_control_instant": not monitor.exit_between > 0,
-        "constraint": system.game.constraint_names[constraint] if known else None,
-        "value": float(monitor.exit_value),
-        "estimates_of_agent": agent or None,
-        "agents": _concerned(system, monitor),
-        "information": system.law.information,
-        "mode": system.mode,
-        "last_input": monitor.last_u.tolist(),
-    }
-
-
-def _concerned(system: System, monitor: Any) -> list[int]:
-    """The agents, from 1, that an exit is of: in the constraint, or the one with the estimates."""
-    if monitor.exit == watch.DIVERGED:
-        return []
-    if (pair := kept_apart.pair_of(monitor)) is not None:
-        return sorted({i + 1 for i in pair})
-    agent = int(monitor.exit_agent)
-    members = system.game.in_constraint[int(monitor.exit_constraint)]
-    return [agent + 1] if agent >= 0 else sorted(i + 1 for i in members)
-
-
-def _instead(system: System) -> str:
-    """What does where steps are too long next to a bound."""
-    ways = ["a larger rho", "a smaller timestep"]
-    if system.mode != "implicit":
-        ways.insert(0, "mode 'implicit'")
-    if system.law.rosenbrock and system.engine == "ode":
-        ways.insert(0, "integrator 'rosenbrock'")
-    return f"{', '.join(ways[:-1])} or {ways[-1]}"
-
-
 def _of_modes(system: System, monitor: Any) -> dict[str, Any]:
     """What each mode's runs report, by section; None in other modes."""
     found: dict[str, Any] = {each.section: None for each in MODES if each.section}
@@ -347,100 +241,6 @@ def _of_modes(system: System, monitor: Any) -> dict[str, Any]:
     if mode.section and mode.reports(system):
         found[mode.section] = mode.report(system, monitor)
     return found
-
-
-def _worst(system: System, monitor: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Each constraint's greatest value and when, that at an exit included."""
-    worst, when = run_metrics.worst_constraints(watch.together([monitor]))
-    return worst[0], when[0]
-
-
-def _worst_constraint(system: System, monitor: Any) -> dict[str, Any] | None:
-    worst, when = _worst(system, monitor)
-    index = int(np.argmax(worst))
-    if not np.isfinite(worst[index]):
-        return None
-    return {
-        "name": system.game.constraint_names[index],
-        "index": index + 1,
-        "margin": float(-worst[index]),
-        "each": [float(-value) if np.isfinite(value) else None for value in worst],
-        "time": float(when[index]),
-    }
-
-
-def _positions(system: System, monitor: Any) -> dict[str, Any] | None:
-    """Where positions stood that follow outputs, at every integration step."""
-    if followed_position(system.agents.kind) < 0 or not monitor.positions:
-        return None
-    return {
-        "observed": int(monitor.positions),
-        "outside": int(monitor.positions_outside),
-        "least_margin": -float(monitor.positions_worst),
-        "constraint": system.game.constraint_names[int(monitor.positions_constraint)],
-        "time": float(monitor.positions_worst_time),
-    }
-
-
-def _contacts(system: System, monitor: Any) -> dict[str, Any] | None:
-    """What was seen of contacts between agents, at every integration step."""
-    if not system.agents.contacts:
-        return None
-    any_at_all = monitor.contacts > 0
-    agents = [1 + int(monitor.contact_agent), 1 + int(monitor.contact_other)]
-    return {
-        "count": int(monitor.contacts),
-        "steps": int(monitor.touching),
-        "first": float(monitor.contact_time) if any_at_all else None,
-        "agents": agents if any_at_all else None,
-        "depth": float(monitor.contact_depth),
-    }
-
-
-def _messages(system: System, monitor: Any) -> dict[str, Any] | None:
-    """What agents sent, and would have sent once a control period."""
-    if not triggered(system.faults):
-        return None
-    assert system.law.graph is not None
-    links = 2 * len(system.law.graph.edges)
-    return {
-        "sent": int(monitor.messages),
-        "periodic": links * int(monitor.message_instants),
-    }
-
-
-def _between(system: System, monitor: Any) -> dict[str, Any] | None:
-    """What a guard did between control instants."""
-    if not system.guarded:
-        return None
-    any_at_all = monitor.cut > 0
-    return {
-        "periods_cut": int(monitor.cut),
-        "first_cut": float(monitor.cut_time) if any_at_all else None,
-        "shortest_period": float(monitor.shortest_period) if any_at_all else None,
-    }
-
-
-def _worst_gap(system: System, monitor: Any) -> dict[str, Any] | None:
-    worst, when = _worst(system, monitor)
-    bounds = system.game.gap_bounds
-    if bounds is None or not np.any(np.isfinite(worst)):
-        return None
-    motion = motion_of(system.game)
-    others = () if motion is None else [each.gap_bounds for each in motion.others]
-    if not all(each is not None and np.array_equal(each, bounds) for each in others):
-        return None  # bounds that move
-    gaps = np.sqrt(np.maximum(worst + bounds**2, 0.0))
-    index = int(np.argmax(gaps / bounds))
-    return {
-        "name": system.game.constraint_names[index],
-        "index": index + 1,
-        "gap": float(gaps[index]),
-        "bound": float(bounds[index]),
-        "unit": system.game.action_unit,
-        "time": float(when[index]),
-        "each": gaps.tolist(),
-    }
 
 
 def _spoilt(monitor: Any, intervened: bool) -> str:
@@ -505,29 +305,3 @@ def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:
         "observed_until": float(monitor.time),
         "left": bool(monitor.exit != watch.INSIDE),
     }
-
-
-def _actuators(system: System, monitor: Any) -> dict[str, Any]:
-    peak, when, rms, energy = (each[0] for each in run_metrics.inputs(watch.together([monitor])))
-    agent = system.game.agent_of_action
-    largest = int(np.argmax(peak))
-    limits = system.agents.input_limit
-    result: dict[str, Any] = {
-        "peak": float(peak[largest]),
-        "peak_agent": int(agent[largest]) + 1,
-        "peak_time": float(when[largest]),
-        "peaks": peak.tolist(),
-        "rms": rms.tolist(),
-        "energy": energy.tolist(),
-        "limits": None if np.all(np.isinf(limits)) else limits.tolist(),
-        "saturated": None,
-    }
-    if monitor.saturated > 0:
-        index = int(monitor.saturated_action)
-        result["saturated"] = {
-            "agent": int(agent[index]) + 1,
-            "time": float(monitor.saturated_time),
-            "demand": float(monitor.saturated_command),
-            "limit": float(limits_at(system, float(monitor.saturated_time))[index]),
-        }
-    return result

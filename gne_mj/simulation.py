@@ -20,9 +20,10 @@ from gne_mj.loops.base import Present, Samples
 from gne_mj.motion import motion_of
 from gne_mj.plain import raise_pending
 from gne_mj.run_metrics import check_numbers
+from gne_mj.signals import check_names, declared
 from gne_mj.system import Clock, System
 from gne_mj.trajectory import SystemRecord, Trajectory, joined, variables_of_parts
-from gne_mj.variables import Rows, Variable, changed, check_names, declared
+from gne_mj.variables import Rows, Variable, changed
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
 _CHUNK, _FIRST = 0.1, 10_000

@@ -25,9 +25,10 @@ from gne_mj.files import written
 from gne_mj.loops.base import Samples
 from gne_mj.recorded import structure_of
 from gne_mj.run_metrics import SUCCESSES
+from gne_mj.signals import coordinates_of, declared, variables_of
 from gne_mj.summary import summary
 from gne_mj.system import System
-from gne_mj.variables import Labelled, coordinates_of, declared, variables_of
+from gne_mj.variables import Labelled
 
 if TYPE_CHECKING:
     import xarray

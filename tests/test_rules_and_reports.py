@@ -7,7 +7,7 @@ import pytest
 from builders import EQUAL, FIVE, V0, clock, integrators, robot_state, robot_system, robots
 
 import reference
-from gne_mj import certificate
+from gne_mj import certificate, exits, monitored
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
@@ -150,24 +150,24 @@ def test_the_worst_gap_is_the_one_nearest_to_its_own_bound():
     system = line()
     gaps = np.array([2.0, 1.9, 0.5])
     monitor = monitor_of(system, gaps**2 - np.array(DELTA) ** 2)
-    found = certificate._worst_gap(system, monitor)
+    found = monitored.worst_gap(system, monitor)
     assert found["gap"] == pytest.approx(1.9)
     assert (found["bound"], found["index"], found["time"]) == (2.0, 2, 0.2)
     assert found["name"] == system.game.constraint_names[1]
     assert found["each"] == pytest.approx(gaps.tolist())
     # rounding below a gap of zero is none
     monitor = monitor_of(system, [-9.0 - 1e-12, -4.0, -1.0])
-    assert certificate._worst_gap(system, monitor)["gap"] == 0.0
-    worst = certificate._worst_constraint(system, monitor_of(system, [-3.0, -2.0, -2.5]))
+    assert monitored.worst_gap(system, monitor)["gap"] == 0.0
+    worst = monitored.worst_constraint(system, monitor_of(system, [-3.0, -2.0, -2.5]))
     assert (worst["index"], worst["margin"], worst["time"]) == (2, 2.0, 0.2)
     nothing = watch.fresh(system.game.actions, system.game.constraints_count)
-    assert certificate._worst_gap(system, nothing) is None
-    assert certificate._worst_constraint(system, nothing) is None
+    assert monitored.worst_gap(system, nothing) is None
+    assert monitored.worst_constraint(system, nothing) is None
 
 
 def test_exits_tell_whose_they_are():
     system = line()
-    exits = {
+    latched = {
         "set": {"EXIT": watch.LEFT_SET, "EXIT_AGENT": -1, "EXIT_CONSTRAINT": 1, "EXIT_VALUE": 0.5},
         "estimates": {"EXIT": watch.ESTIMATE_LEFT, "EXIT_AGENT": 2, "EXIT_CONSTRAINT": 0},
         "measured": {"EXIT": watch.ESTIMATE_LEFT, "EXIT_AGENT": -1, "EXIT_CONSTRAINT": 2},
@@ -179,28 +179,28 @@ def test_exits_tell_whose_they_are():
         "set": "was violated at 0.75 s: g = 0.5", "estimates": "agent 3's estimates violated",
         "measured": "the measured profile violated", "number": "no longer a usable number",
     }  # fmt: skip
-    for name, entries in exits.items():
+    for name, entries in latched.items():
         monitor = monitor_of(system, [-1.0] * 3, EXIT_TIME=0.75, **entries)
-        report = certificate._exit_report(system, monitor)
-        assert report["agents"] == whose[name] == certificate._concerned(system, monitor)
+        report = exits.exit_report(system, monitor)
+        assert report["agents"] == whose[name] == exits.concerned(system, monitor)
         assert report["estimates_of_agent"] == of[name]
         assert report["at_control_instant"] is True
         assert report["stage"] == 1
         known = name != "number"
         index = int(monitor.exit_constraint)
         assert report["constraint"] == (system.game.constraint_names[index] if known else None)
-        status, message = certificate._exit(system, monitor)
+        status, message = exits.exit_status(system, monitor)
         assert words[name] in message
         now = certificate.status_now(system, monitor)
         assert (now["status"], now["exit_agents"]) == (status, whose[name])
         assert now["exit_time"] == 0.75
         monitor.exit_between, monitor.exit_stage = 1.0, 2.0
-        assert certificate._exit_report(system, monitor)["at_control_instant"] is False
-        assert "(stage 3 of the integration step)" in certificate._exit(system, monitor)[1]
-        between = "between two control instants" in certificate._exit(system, monitor)[1]
+        assert exits.exit_report(system, monitor)["at_control_instant"] is False
+        assert "(stage 3 of the integration step)" in exits.exit_status(system, monitor)[1]
+        between = "between two control instants" in exits.exit_status(system, monitor)[1]
         assert between == known
     monitor = monitor_of(system, [-3.0, -1.0, -0.5])
-    assert certificate._exit_report(system, monitor) is None
+    assert exits.exit_report(system, monitor) is None
     now = certificate.status_now(system, monitor)
     assert (now["status"], now["margin"], now["exit_time"]) == ("running", 0.5, None)
 
@@ -212,7 +212,7 @@ def test_actuators_tell_the_greatest_demand_and_whose():
     monitor = monitor_of(system, [-1.0] * 3, TIME=4.0)
     monitor.peak[:], monitor.peak_time[:] = [3, 9, 4], [0.3, 0.9, 0.4]
     monitor.square[:], monitor.energy[:] = [16, 36, 64], [1, 2, 3]
-    found = certificate._actuators(system, monitor)
+    found = monitored.actuators(system, monitor)
     assert (found["peak"], found["peak_agent"], found["peak_time"]) == (9.0, 2, 0.9)
     assert found["rms"] == [2.0, 3.0, 4.0]
     assert found["energy"] == [1.0, 2.0, 3.0]
@@ -221,10 +221,10 @@ def test_actuators_tell_the_greatest_demand_and_whose():
     for time, limit in ((0.5, 7.0), (1.0, 5.0), (1.5, 5.0), (2.0, 7.0)):
         monitor.saturated, monitor.saturated_time = 1.0, time
         monitor.saturated_action, monitor.saturated_command = 1, -9.0
-        assert certificate._actuators(system, monitor)["saturated"] == {
+        assert monitored.actuators(system, monitor)["saturated"] == {
             "agent": 2, "time": time, "demand": -9.0, "limit": limit,
         }  # fmt: skip
-    assert certificate._actuators(line(), monitor)["limits"] is None
+    assert monitored.actuators(line(), monitor)["limits"] is None
 
 
 def test_mode_implicit_tells_when_it_was_not_accurate():
@@ -257,7 +257,7 @@ def test_planar_agents_are_told_by_agent_and_not_by_entry():
     )
     monitor = monitor_of(system, [-1.0] * 2)
     monitor.peak[:] = [1, 2, 3, 2]
-    assert certificate._actuators(system, monitor)["peak_agent"] == 2
+    assert monitored.actuators(system, monitor)["peak_agent"] == 2
 
 
 # ------------------------------------------------------------------------ what a theorem gives

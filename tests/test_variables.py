@@ -7,12 +7,13 @@ import pytest
 from batch_plans import small
 
 import gne_mj
-from gne_mj import plots, variables
+from gne_mj import plots, signals
 from gne_mj.batch_variables import declared_figures, figures
 from gne_mj.batches import execute
 from gne_mj.batches.report import summary, write_report
 from gne_mj.scenario import load_scenario
-from gne_mj.variables import AXIS, SIGNALS, Column, Panel, Variable, declared
+from gne_mj.signals import SIGNALS, declared
+from gne_mj.variables import AXIS, Column, Panel, Variable
 from gne_mj.viewer import Session, replay_pack
 from gne_mj.viewer.pack import unpack
 
@@ -120,7 +121,7 @@ POWER = Variable(
 
 @pytest.fixture
 def more(monkeypatch):
-    monkeypatch.setattr(variables, "SIGNALS", (*SIGNALS, POWER))
+    monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, POWER))
 
 
 @pytest.mark.usefixtures("more")

@@ -21,8 +21,8 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.loops.batch import Outcome, Span
 from gne_mj.scenario import load_scenario
+from gne_mj.signals import variables_of
 from gne_mj.system import Clock, System
-from gne_mj.variables import variables_of
 
 M, P = 2, 3
 GAMES = {2: velocity_game(2, V0, 3.0)}

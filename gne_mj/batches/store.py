@@ -29,7 +29,8 @@ from gne_mj.files import storing, written
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.batch import Outcome
 from gne_mj.loops.recorder import Recorder
-from gne_mj.variables import Labelled, check_names, coordinates_of, declared
+from gne_mj.signals import check_names, coordinates_of, declared
+from gne_mj.variables import Labelled
 
 if TYPE_CHECKING:
     import xarray

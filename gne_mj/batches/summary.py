@@ -10,7 +10,8 @@ from gne_mj.batch_variables import Runs, declared_figures
 from gne_mj.batches.plan import Combination
 from gne_mj.errors import InfeasibleStart
 from gne_mj.loops.batch import Outcome, Span
-from gne_mj.variables import Labelled, declared, labelled
+from gne_mj.signals import declared
+from gne_mj.variables import Labelled, labelled
 
 
 def columns_of(combination: Combination, span: Span, outcome: Outcome, record: int) -> Labelled:

@@ -3,17 +3,16 @@
 The kernels are for numbers and for lanes (:mod:`gne_mj.lanes`), to the same bits.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gne_mj.lanes import where
-from gne_mj.loops.layout import SCRATCH, Steps, Workspace
+from gne_mj.loops.layout import Workspace
+from gne_mj.loops.one_loop import laid_out
 from gne_mj.loops.tsitouras import interpolate
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers
-from gne_mj.records import by_name, dtype_of, in_array
 
 # Error allowed of a state: rtol times its greatest magnitude so far, in any channel, and this much
 # of its unit more; and of a slack: rtol times that many slacks, but at most this part of one
@@ -58,37 +57,7 @@ class AdaptiveWorkspace(NamedTuple):
     pace: Pace
 
 
-_SIZES = "m p agents states memory history solver separation"
-_length, _workspace_in = in_array(AdaptiveWorkspace, _SIZES, **SCRATCH)
-
-
-@kernel
-def workspace_length(s):
-    """Entries of a workspace for a run of these sizes, as a parameter block has them."""
-    return _length(
-        s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver, s.separation
-    )
-
-
-@kernel
-def workspace_in(flat, s):
-    """A workspace's views."""
-    return _workspace_in(
-        flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
-        s.separation,
-    )  # fmt: skip
-
-
-def workspaces_of(flat: NDArray[np.float64], s: Steps) -> Any:
-    """Workspaces (..., length) as Python knows them, by name."""
-    return by_name(
-        flat,
-        dtype_of(
-            AdaptiveWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-            memory=s.memory, history=s.history, solver=s.solver, separation=s.separation,
-            **SCRATCH,
-        ),
-    )  # fmt: skip
+workspace_length, workspace_in, workspaces_of = laid_out(AdaptiveWorkspace)
 
 
 @kernel

@@ -19,21 +19,18 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Present
 from gne_mj.loops.feedback import explicit_law, inside
 from gne_mj.loops.layout import (
-    SCRATCH,
     Instant,
     Setup,
-    Steps,
     Workspace,
     parts_in,
     steps_in,
 )
-from gne_mj.loops.one_loop import Native, OneLoop
+from gne_mj.loops.one_loop import Native, OneLoop, laid_out
 from gne_mj.loops.recorder import record
 from gne_mj.native import callback, copy, kernel, source_key
 from gne_mj.parameter_block import floats_at
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.functions import EULER, RK4
-from gne_mj.records import by_name, dtype_of, in_array
 
 LOOP = types.int64(types.int64, types.int64, types.int64)
 
@@ -139,37 +136,7 @@ class OdeWorkspace(NamedTuple):
     vectors: Vectors
 
 
-_SIZES = "m p agents states memory history solver separation"
-_length, _workspace_in = in_array(OdeWorkspace, _SIZES, **SCRATCH)
-
-
-@kernel
-def ode_workspace_length(s):
-    """Entries of the workspace of a loop of these sizes, as a parameter block has them."""
-    return _length(
-        s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver, s.separation
-    )
-
-
-@kernel
-def ode_workspace_in(flat, s):
-    """A workspace's views."""
-    return _workspace_in(
-        flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
-        s.separation,
-    )  # fmt: skip
-
-
-def workspaces_of(flat: NDArray[np.float64], s: Steps) -> Any:
-    """Workspaces (..., length) as Python knows them, by name."""
-    return by_name(
-        flat,
-        dtype_of(
-            OdeWorkspace, m=s.actions, p=s.constraints, agents=s.agents, states=s.states,
-            memory=s.memory, history=s.history, solver=s.solver, separation=s.separation,
-            **SCRATCH,
-        ),
-    )  # fmt: skip
+ode_workspace_length, ode_workspace_in, workspaces_of = laid_out(OdeWorkspace)
 
 
 @kernel

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from gne_mj.loops import faultless
 from gne_mj.loops.base import ClosedLoop, Present, Samples
-from gne_mj.loops.layout import Setup, Steps, ode_parameter_block, steps_of
+from gne_mj.loops.layout import SCRATCH, Setup, Steps, ode_parameter_block, steps_of
 from gne_mj.loops.recorder import Recorder
+from gne_mj.native import kernel
 from gne_mj.plants.agents import Agents
+from gne_mj.records import by_name, dtype_of, in_array
 
 
 class Native(NamedTuple):
@@ -27,6 +29,45 @@ class Native(NamedTuple):
     build: Callable[[ModuleType], Any]
     length: Callable[[Steps], int]
     workspaces: Callable[[NDArray[np.float64], Steps], Any]
+
+
+_SIZES = "m p agents states memory history solver separation"
+
+
+def laid_out(record: Any) -> tuple[Any, Any, Callable[[NDArray[np.float64], Steps], Any]]:
+    """How a loop's workspace lies in one flat array.
+
+    Args:
+        record: the workspace, whose shapes are of the sizes that a parameter block has.
+
+    Returns:
+        ``length(steps)``, its entries, and ``views(flat, steps)``, both kernels; and the same views
+        of (..., length) as Python knows them, by name.
+    """
+    length_of, views_of = in_array(record, _SIZES, **SCRATCH)
+
+    @kernel
+    def length(s):
+        return length_of(
+            s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
+            s.separation,
+        )  # fmt: skip
+
+    @kernel
+    def views(flat, s):
+        return views_of(
+            flat, 0, s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
+            s.separation,
+        )  # fmt: skip
+
+    def named(flat: NDArray[np.float64], s: Steps) -> Any:
+        sizes = dict(zip(_SIZES.split(), (
+            s.actions, s.constraints, s.agents, s.states, s.memory, s.history, s.solver,
+            s.separation,
+        ), strict=True))  # fmt: skip
+        return by_name(flat, dtype_of(record, **sizes, **SCRATCH))
+
+    return length, views, named
 
 
 class OneLoop(ClosedLoop):

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from gne_mj.barrier import unchanging
 from gne_mj.changing_graph import ChangingGraph
+from gne_mj.controllers import no_memory
 from gne_mj.controllers.propagation import Propagator, no_propagator
 from gne_mj.controllers.settings import GUARDED, LINKS, OBSERVER
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.feed_forward import FeedForward, feed_forward
 from gne_mj.graph import GraphData
-from gne_mj.loops import functions, no_memory
+from gne_mj.loops import functions
 from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.changing_network import ChangingNetworkLoop

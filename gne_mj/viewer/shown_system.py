@@ -15,9 +15,10 @@ from gne_mj.loops.faults import count_messages
 from gne_mj.moving_values import bounds_move
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.quantity import Quantity
+from gne_mj.signals import declared
 from gne_mj.system import Clock, mode_of
 from gne_mj.system.data import SystemData
-from gne_mj.variables import Variable, declared
+from gne_mj.variables import Variable
 from gne_mj.viewer.fleet import fleet_of
 
 Arrays = dict[str, NDArray[Any]]
