@@ -22,7 +22,6 @@ from gne_mj.starts import interior_profile
 Array = NDArray[np.float64]
 
 _STEP, _BESIDE = 1e-5, 1e-9  # s, of time derivatives, which begin beside a jump at the time itself
-_SOLVED, _ASIDE = 1e-6, 1e-7  # the residual of what counts as found; part of a profile's size
 _DENSE = 500  # actions, beyond which no matrix is made for a rate
 
 
@@ -108,16 +107,11 @@ class EquilibriumPath:
         y = begin.action if isinstance(begin, Equilibrium) else begin
         if not np.all(game.constraints(y) + game.margins < 0.0):
             begin = y = self._inside(game, time, y)
-        aside = y + _ASIDE * max(1.0, float(np.max(np.abs(y))))  # of a place of no use as a start
-        for start in (begin, aside, None):
+        for start in (begin, None):
             try:
-                found = penalised_equilibrium(
-                    game, rho, middle(game, y) if start is None else start
-                )
+                return penalised_equilibrium(game, rho, middle(game, y) if start is None else start)
             except (SolverError, InfeasibleStart):
                 continue
-            if found.residual <= _SOLVED:
-                return found
         return None
 
     def _inside(self, game: Game, time: float, y: Array) -> Array:
