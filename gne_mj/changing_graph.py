@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ MOST_ENUMERATED = 6  # agents of which all trees are looked at: there are 1296
 
 class ChangingGraph(Graph):
     """A graph that is another one from time to time; ``edges`` are all that it can have."""
+
+    changes: ClassVar[bool] = True
 
     @property
     @abstractmethod

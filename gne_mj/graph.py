@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,10 +33,14 @@ class Graph:
         agents: N.
         edges: pairs of agents, numbered from 0; order and repetition do not matter.
 
+    Attributes:
+        changes: whether it becomes another one during a run, ``edges`` being all that it can have.
+
     Raises:
         InvalidInput: an agent that does not exist, a loop, or a graph that is not connected.
     """
 
+    changes: ClassVar[bool] = False
     agents: int
     edges: tuple[tuple[int, int], ...]
 

@@ -9,7 +9,7 @@ import json
 import sys
 from collections.abc import Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -45,6 +45,7 @@ def structure_of(system: SystemData) -> str:
             "owners": None if game.owners is None else _numbered(game.owners, game.agents),
             "quantities": [quantity.name for quantity in game.quantities],
             "graph": _ALL if everyone else edges,
+            "graph_changes": graph is not None and graph.changes,
             "separation": None if apart is None else [apart.distance, apart.reach, apart.turn],
             "estimates": [part.name for part in system.law.memory_parts if part.rows],
         },
@@ -112,14 +113,22 @@ def recorded_system(
     )
 
 
+class _ChangedGraph(Graph):
+    """Of a run in which the graph became another one; the results say which it was when."""
+
+    changes: ClassVar[bool] = True
+
+
 class _RecordedLaw(Law):
     """What is known of a law."""
 
     def __init__(self, data: "xarray.Dataset", known: dict[str, Any], agents: int) -> None:
         edges, names = known["graph"], known["estimates"]
         if edges is not None:
-            pairs = tuple((i - 1, j - 1) for i, j in edges) if edges != _ALL else ()
-            self.graph = complete(agents) if edges == _ALL else Graph(agents, pairs)
+            pairs = tuple((i - 1, j - 1) for i, j in edges) if edges != _ALL else None
+            # of results of versions before graphs could change nothing says so
+            kind = _ChangedGraph if known.get("graph_changes") else Graph
+            self.graph = kind(agents, complete(agents).edges if pairs is None else pairs)
         parts = [MemoryPart(name, data[name].attrs["long_name"], rows=True) for name in names]
         vars(self).update(information=data.attrs["information"], memory_parts=tuple(parts))
 

@@ -278,7 +278,7 @@ def _nearest_distance(rows: Rows) -> Array:
 
 
 def _network_changes(system: SystemData) -> bool:
-    return isinstance(system.law.graph, ChangingGraph)
+    return system.law.graph is not None and system.law.graph.changes
 
 
 def _linked(rows: Rows) -> Array:

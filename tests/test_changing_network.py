@@ -16,6 +16,8 @@ from gne_mj.errors import InvalidInput
 from gne_mj.faults import MessageLoss
 from gne_mj.graph import Graph, complete, line, ring
 from gne_mj.simulation import Simulation
+from gne_mj.viewer import replay_pack
+from gne_mj.viewer.pack import unpack
 
 THREE = (ring(5), line(5), complete(5))
 C, TAU = 5.0, 0.1
@@ -147,6 +149,12 @@ def test_scenario_certificate_report_and_results(tmp_path):
     found = data["linked"].sel(time=[0.0, 0.5, 1.0, 1.5], method="nearest").sum("edge")
     assert_array_equal(found, [5, 4, 10, 5])
     assert data["edge"].to_numpy().tolist()[:2] == ["1-2", "1-3"]
+    meta, arrays = unpack(replay_pack(trajectory, "robots"))  # a page has results alone
+    (about,) = meta["systems"]
+    assert about["links"][:2] == [[1, 2], [2, 1]], "both of each edge"
+    assert about["message_period"] is None
+    every = arrays["robots/linked"].reshape(-1, len(about["edges"]))
+    assert set(every.sum(axis=1).astype(int)) == {4, 5, 10}
 
 
 def test_batches_do_the_same(tmp_path):

@@ -7,7 +7,6 @@ else may differ, and is in a run's table.
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
-from gne_mj.changing_graph import ChangingGraph
 from gne_mj.loops.batch import BatchLoop, EachLoop
 from gne_mj.loops.lane_batch import modules_for
 from gne_mj.loops.layout import Setup, ode_parameter_block
@@ -69,7 +68,7 @@ class Structure:
 
 
 def _network_changes(system: System) -> bool:
-    return isinstance(system.law.graph, ChangingGraph)
+    return system.law.graph is not None and system.law.graph.changes
 
 
 def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:

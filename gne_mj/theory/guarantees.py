@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED, check_count
-from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.kept import Kept
 from gne_mj.errors import part_of
 from gne_mj.game_model import Box
@@ -159,7 +158,7 @@ def _graph(graph: Graph, kept: Kept | None) -> dict[str, Any]:
         "edges": len(graph.edges),
         "lambda_2": graph.algebraic_connectivity,
         "lambda_max": graph.largest_eigenvalue,
-        "changes": isinstance(graph, ChangingGraph),
+        "changes": graph.changes,
         "kept": None
         if kept is None
         else {

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.changing_graph import ChangingGraph
 from gne_mj.game_model import Game
 from gne_mj.graph import Graph
 from gne_mj.plants.agent_type import energy_balance
@@ -93,7 +92,7 @@ def why_not(system: System) -> str | None:
         return "the constraints are not affine"
     if not game.affine and not (game.row_scaled and game.jacobian_bounds is not None):
         return "F is neither affine, nor are its rows known to change in length only"
-    if isinstance(system.law.graph, ChangingGraph):
+    if system.law.graph is not None and system.law.graph.changes:
         return "the graph changes"
     if system.law.kept is not None:
         return "agents keep only some of the estimates"

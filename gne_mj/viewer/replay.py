@@ -140,6 +140,9 @@ def _values(data: "xarray.Dataset", time: NDArray[np.float64]) -> dict[str, NDAr
     for name, variable in data.variables.items():
         if variable.dims[:1] == ("time",) and name != "time":
             rows = variable.to_numpy()
+            if rows.dtype == bool:  # as it was at the sample before
+                found[str(name)] = rows[np.where(rest > 0.0, before, after)]
+                continue
             weight = rest.reshape(-1, *(1,) * (rows.ndim - 1))
             mixed = rows[after] + weight * (rows[before] - rows[after])
             # exact at samples, also where a neighbour is not a number

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.changing_graph import ChangingGraph
 from gne_mj.faults import for_native, triggered
 from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
@@ -142,7 +141,7 @@ class ShownSystem:
 
     @property
     def _network_changes(self) -> bool:
-        return isinstance(self.system.law.graph, ChangingGraph)
+        return self.system.law.graph is not None and self.system.law.graph.changes
 
     @cached_property
     def _links(self) -> list[list[int]]:
