@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from reference_agents import FlexibleRobot, PiCascade, PositionRobot
 
-import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import osnr_game, ten_channels, velocity_consensus_game, velocity_game
@@ -79,7 +79,7 @@ def reference_pi(count, v=1.0, k=0.5):
 
 def reference_osnr(parameters=None):
     p = parameters or ten_channels()
-    return reference.OsnrGame(
+    return reference_games.OsnrGame(
         p["price"],
         p["utility_weight"],
         p["gain"],
@@ -180,4 +180,4 @@ def random_consensus(seed, dimension, tightest=0.3):
     leaders = int(np.sum(weight > 0))
     v0, delta = rng.uniform(-3, 3, dimension), rng.uniform(tightest, 4, len(edges) + leaders)
     game = velocity_consensus_game(edges, weight, v0, delta[: len(edges)], delta[len(edges) :])
-    return Consensus(game, reference.VelocityConsensusGame(v0, edges, weight, delta), rng)
+    return Consensus(game, reference_games.VelocityConsensusGame(v0, edges, weight, delta), rng)

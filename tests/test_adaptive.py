@@ -26,6 +26,7 @@ from scipy.integrate import solve_ivp
 from test_division import NEAR, near_darkness, robots_outputs
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.barrier import Schedule
 from gne_mj.controllers import PartialInformation
@@ -150,7 +151,7 @@ def robots(law=None, **options):
     return robot_system(state, UNEQUAL, law=law, integrator="tsit5", **options)
 
 
-ROBOTS = reference_robots(UNEQUAL), reference.VelocityGame(V0, [3.0] * 5)
+ROBOTS = reference_robots(UNEQUAL), reference_games.VelocityGame(V0, [3.0] * 5)
 CASES = {
     "robots, full": lambda: (robots(rtol=EXACT), *ROBOTS, "full_information", {}),
     "robots, partial": lambda: (

@@ -8,6 +8,7 @@ import pytest
 from reference_agents import FlexibleRobot, Integrator, PiCascade
 
 import reference
+import reference_games
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts" / "campaigns"))
 
@@ -28,19 +29,19 @@ def slow_game(game):
     """The game of reference.py with the numbers of one of the product's."""
     q = game.parameters
     if game.name == "velocity synchronisation":
-        return reference.VelocityGame(q[0], *q[1:].reshape(3, -1))
+        return reference_games.VelocityGame(q[0], *q[1:].reshape(3, -1))
     if game.name == "Cournot":
         numbers = q[2:].reshape(3, -1)
-        return reference.CournotGame(numbers[0], q[1], numbers[1], numbers[2])
+        return reference_games.CournotGame(numbers[0], q[1], numbers[1], numbers[2])
     if game.name == "OSNR":
         columns = q[2 : 2 + 4 * AGENTS].reshape(4, -1)
         matrix = q[2 + 4 * AGENTS :].reshape(AGENTS, AGENTS)
-        return reference.OsnrGame(*columns, matrix, q[1])
+        return reference_games.OsnrGame(*columns, matrix, q[1])
     d, agents, p = (int(n) for n in q[:3])
     at = 3 + d + agents
     rows = q[at : at + 3 * p].reshape(p, 3)
     edges = [(int(i), int(j)) for i, j, _ in rows if j < agents]
-    return reference.VelocityConsensusGame(q[3 : 3 + d], edges, q[3 + d : at], rows[:, 2])
+    return reference_games.VelocityConsensusGame(q[3 : 3 + d], edges, q[3 + d : at], rows[:, 2])
 
 
 def near(rng, both):

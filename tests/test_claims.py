@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.games import velocity_game
@@ -64,7 +65,7 @@ def integrator_line(rng, count):
     delta = rng.uniform(0.5, 4.0, count)
     v0 = rng.uniform(-5.0, 5.0)
     y = v0 + np.cumsum(rng.uniform(-0.9, 0.9, count) * delta)
-    game, oracle = velocity_game(count, v0, delta), reference.VelocityGame(v0, delta)
+    game, oracle = velocity_game(count, v0, delta), reference_games.VelocityGame(v0, delta)
     return game, oracle, y, random_graph(rng, count)
 
 
@@ -162,7 +163,7 @@ def robots_of(law, h):
 
 def test_robots_in_mujoco_end_at_the_equilibrium_under_partial_information():
     graph = graphs.ring(5)
-    oracle = reference.VelocityGame(V0, [3.0] * 5)
+    oracle = reference_games.VelocityGame(V0, [3.0] * 5)
     coupling = 1.05 * required_coupling(oracle, graph)
     system, h = robots_of(PartialInformation(graph, coupling, 0.05), 1e-3)
     found, robot = [], reference_robots(UNEQUAL)
@@ -186,7 +187,7 @@ def test_robots_in_mujoco_end_at_the_equilibrium_under_partial_information():
 @pytest.mark.slow
 def test_robots_under_all_laws_end_at_the_same_equilibrium():
     graph = graphs.ring(5)
-    coupling = 1.05 * required_coupling(reference.VelocityGame(V0, [3.0] * 5), graph)
+    coupling = 1.05 * required_coupling(reference_games.VelocityGame(V0, [3.0] * 5), graph)
     for law, duration in (
         (FullInformation(), 200.0),
         (PartialInformation(graph, coupling, 0.01), 400.0),

@@ -11,6 +11,7 @@ from reference_agents import Integrator
 from scipy.optimize import brentq
 
 import reference
+import reference_games
 from gne_mj import run
 from gne_mj.controllers import FullInformation
 from gne_mj.equilibrium import measured_epsilon, penalised_equilibrium, variational_equilibrium
@@ -98,7 +99,7 @@ def test_a_variant_whose_bounds_bind():
 @pytest.mark.parametrize("rho", [10.0, 0.1])
 def test_penalised_equilibrium_and_its_epsilon(rho):
     game = cournot_game(10)
-    oracle = reference.CournotGame(COST, 600.0, np.full(10, 7.0), np.full(10, 100.0))
+    oracle = reference_games.CournotGame(COST, 600.0, np.full(10, 7.0), np.full(10, 100.0))
     found = penalised_equilibrium(game, rho, START)
     assert np.allclose(found.action, reference.penalised_equilibrium(oracle, rho, START), atol=1e-9)
     assert np.all(game.own_constraints == 2)
@@ -126,7 +127,7 @@ def test_the_shipped_scenario_has_the_defaults_and_converges():
 @pytest.mark.slow
 def test_the_closed_loop_equals_an_independent_one():
     y = np.array([8.0, 90.0, 20.0, 75.0, 30.0, 60.0, 40.0, 50.0, 95.0, 10.0])
-    oracle = reference.CournotGame(COST, 600.0, np.full(10, 7.0), np.full(10, 100.0))
+    oracle = reference_games.CournotGame(COST, 600.0, np.full(10, 7.0), np.full(10, 100.0))
     system = System(
         "firms", cournot_game(10), integrators(10), FullInformation(), 0.1, y[:, None].copy()
     )

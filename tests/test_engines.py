@@ -24,6 +24,7 @@ from reference_agents import Integrator
 from scipy.linalg import expm
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.games import osnr_game, ten_channels, velocity_game
@@ -62,7 +63,7 @@ class Case:
         else:
             delta = np.full(self.count, 3.0)
             self.game = velocity_game(self.count, V0, delta)
-            self.oracle = reference.VelocityGame(V0, delta)
+            self.oracle = reference_games.VelocityGame(V0, delta)
             y = V0 + np.cumsum(rng.uniform(-0.7, 0.7, self.count) * delta)
             spread = 0.1
         if self.plant.startswith("robots"):

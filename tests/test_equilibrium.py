@@ -14,6 +14,7 @@ from own_games import ring
 from scipy.optimize import minimize, minimize_scalar
 
 import reference
+import reference_games
 from gne_mj import banded
 from gne_mj.equilibrium import (
     _solver,
@@ -90,7 +91,7 @@ def random_robots(rng, count):
     weight = 10.0 ** rng.uniform(-2.0, 1.5, count) * rng.integers(0, 2, count)
     share = rng.choice([0.5, 0.99, 1 - 1e-9])
     start = V0 + np.cumsum(rng.uniform(-share, share, count) * delta)
-    oracle = reference.VelocityGame(V0, delta, desired, weight)
+    oracle = reference_games.VelocityGame(V0, delta, desired, weight)
     return velocity_game(count, V0, delta, desired, weight), oracle, start
 
 
@@ -161,7 +162,7 @@ def chain(count, seed=0):
 
 def test_a_thousand_robots():
     game, desired, weight = chain(1000)
-    oracle = reference.VelocityGame(V0, np.full(1000, 0.4), desired, weight)
+    oracle = reference_games.VelocityGame(V0, np.full(1000, 0.4), desired, weight)
     assert _solver(game)._half_band == 1
     result = variational_equilibrium(game, np.full(1000, V0 - 1e-3))
     stationarity, g, complementarity = kkt(oracle, result)

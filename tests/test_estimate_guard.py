@@ -13,6 +13,7 @@ from builders import (
 )
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.errors import InfeasibleStart, InvalidInput
@@ -58,7 +59,7 @@ def drifting(engine, mode, epsilon=0.5, h=0.02, integrator="rk4"):
     ],
 )
 def test_an_estimate_that_leaves_ends_the_run(mode, epsilon, h, integrator, engines):
-    game = reference.VelocityGame(V0, [2.0] * 5)
+    game = reference_games.VelocityGame(V0, [2.0] * 5)
     seen = []
     for engine in engines:
         system, h = drifting(engine, mode, epsilon, h, integrator)

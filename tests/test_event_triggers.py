@@ -7,6 +7,7 @@ import pytest
 from builders import clock, integrators
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.errors import InvalidInput
@@ -17,7 +18,7 @@ from gne_mj.simulation import Simulation
 from gne_mj.system import System
 
 RHO, H, START = 0.1, 0.01, np.array([1.0, 0.0, -1.0, 0.5, 2.0])
-GAME = reference.VelocityGame(3.0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(3.0, np.full(5, 3.0))
 
 
 def system(*faults, law=None, mode="sampled"):

@@ -5,6 +5,7 @@ import pytest
 from builders import EQUAL, FIVE, V0, clock, robot_state, robot_system
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
 from gne_mj.errors import InvalidInput
@@ -29,7 +30,7 @@ from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
 
 RHO, H = 0.1, 0.01
-GAME = reference.VelocityGame(V0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(V0, np.full(5, 3.0))
 
 
 def struck(*faults, law=None, mode="sampled", engine="ode", **options):

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import reference
+import reference_games
 from gne_mj.barrier import LogBarrier
 from gne_mj.errors import InvalidInput
 from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_game
@@ -21,7 +22,7 @@ def velocity(rng, count):
     def interior(rows):
         return v0 + np.cumsum(rng.uniform(-0.95, 0.95, (rows, count)) * delta, axis=1)
 
-    return velocity_game(count, v0, delta), reference.VelocityGame(v0, delta), interior
+    return velocity_game(count, v0, delta), reference_games.VelocityGame(v0, delta), interior
 
 
 def desired_velocity(rng, count):
@@ -31,7 +32,7 @@ def desired_velocity(rng, count):
         rng.uniform(0, 3, count) * rng.integers(0, 2, count),
     )
     game = velocity_game(count, plain.v0, plain.delta, desired, weight)
-    return game, reference.VelocityGame(plain.v0, plain.delta, desired, weight), interior
+    return game, reference_games.VelocityGame(plain.v0, plain.delta, desired, weight), interior
 
 
 def osnr(rng, count):
@@ -60,7 +61,7 @@ def cournot(rng, count):
         return lower + rng.uniform(0.03, 0.97, (rows, count)) * (upper - lower)
 
     game = cournot_game(count, costs, intercept, lower, upper)
-    return game, reference.CournotGame(costs, intercept, lower, upper), interior
+    return game, reference_games.CournotGame(costs, intercept, lower, upper), interior
 
 
 any_game = pytest.mark.parametrize("build", [velocity, desired_velocity, osnr, cournot])

@@ -18,6 +18,7 @@ from builders import (
 
 import gne_mj as gm
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
 from gne_mj.errors import InvalidInput
@@ -30,7 +31,7 @@ from gne_mj.system import Clock, System
 from gne_mj.theory import certify, report_text
 
 RHO, H, PERIOD = 0.1, 0.005, 20
-GAME = reference.VelocityGame(V0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(V0, np.full(5, 3.0))
 # so far off that within 0.1 s springs carry robots out and back
 WILD = robot_state(
     np.add(V0, [2.9, 0.2, -2.4, 0.3, 2.9]), extension=[20.0, -20, 20, -20, 20],

@@ -20,6 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference
+import reference_games
 from gne_mj import banded
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
@@ -30,7 +31,7 @@ from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
 
 RHO = 0.1
-GAME = reference.VelocityGame(V0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(V0, np.full(5, 3.0))
 
 
 def instants(system, h, periods, steps):
@@ -81,7 +82,7 @@ def test_curved_bounds_in_the_plane(steps):
 
     edges, v0, delta = [(0, 1), (1, 2)], np.array([1.0, -0.5]), np.array([1.0, 0.8, 1.5])
     game = velocity_consensus_game(edges, [1.0, 0.0, 0.0], v0, delta[:2], delta[2:])
-    oracle = reference.VelocityConsensusGame(v0, edges, np.array([1.0, 0.0, 0.0]), delta)
+    oracle = reference_games.VelocityConsensusGame(v0, edges, np.array([1.0, 0.0, 0.0]), delta)
     agents = Agents(flexible_robot, np.ones((6, 5)), np.full(6, np.inf), 2)
     y = np.add(np.tile(v0, 3), [0.9, 0.9, 0.3, 0.7, 0.2, 0.2])
     state = agents.equilibrium(y)

@@ -10,6 +10,7 @@ from builders import FIVE, UNEQUAL, V0, clock, integrators, robot_state, robot_s
 from plain_loops import parts_of, run_plain
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
@@ -24,7 +25,7 @@ from gne_mj.plants import integrator, zero_order_hold
 from gne_mj.system import System
 
 PENALTY = 0.1
-GAME = reference.VelocityGame(V0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(V0, np.full(5, 3.0))
 
 
 def alone(game, members, own, now, after):
@@ -67,7 +68,7 @@ def test_agents_alone_in_the_plane():
     """Two entries for each agent and curved bounds: the whole block is the agent's own."""
     edges, v0, delta = [(0, 1), (1, 2)], np.array([1.0, -0.5]), np.array([1.0, 0.8, 1.5])
     game = velocity_consensus_game(edges, [1.0, 0.0, 0.0], v0, delta[:2], delta[2:])
-    oracle = reference.VelocityConsensusGame(v0, edges, np.array([1.0, 0.0, 0.0]), delta)
+    oracle = reference_games.VelocityConsensusGame(v0, edges, np.array([1.0, 0.0, 0.0]), delta)
     members = [[0, 1], [1, 2], [0]]
     agents = integrators(6)
     y = np.add(np.tile(v0, 3), [0.9, 0.9, 0.3, 0.7, 0.2, 0.2])

@@ -21,6 +21,7 @@ from builders import (
 )
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.controllers.propagation import no_propagator
@@ -45,7 +46,7 @@ def case(kind, count):
     rng = np.random.default_rng(count)
     if kind == "velocity":
         delta = rng.uniform(0.5, 3, count)
-        game, oracle = velocity_game(count, V0, delta), reference.VelocityGame(V0, delta)
+        game, oracle = velocity_game(count, V0, delta), reference_games.VelocityGame(V0, delta)
 
         def interior(rows):
             return V0 + np.cumsum(rng.uniform(-0.95, 0.95, (rows, count)) * delta, axis=1)

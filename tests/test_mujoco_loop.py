@@ -20,6 +20,7 @@ from builders import (
 )
 
 import reference
+import reference_games
 from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.plants.callbacks import callbacks
@@ -35,7 +36,7 @@ def starts():
 
 
 def reference_rate(numbers, rho=0.1, delta=DELTA):
-    game = reference.VelocityGame(V0, delta)
+    game = reference_games.VelocityGame(V0, delta)
     return reference.closed_loop_rate(reference_robots(numbers), "full_information", game, rho)
 
 
@@ -75,7 +76,7 @@ def test_continuous_is_of_fourth_order():
 @pytest.mark.parametrize("numbers", [EQUAL, UNEQUAL], ids=["equal", "unequal"])
 def test_euler_is_semi_implicit(numbers):
     h, steps, state = 0.005, 2000, starts()[1]
-    game = reference.VelocityGame(V0, DELTA)
+    game = reference_games.VelocityGame(V0, DELTA)
     robot = reference_robots(numbers)
 
     def law(_time, x):
@@ -92,7 +93,7 @@ def test_euler_is_semi_implicit(numbers):
 @pytest.mark.parametrize("numbers", [EQUAL, UNEQUAL], ids=["equal", "unequal"])
 def test_sampled_holds_the_input_over_the_control_period(numbers, engine):
     h, steps, per_period, state = 0.002, 5000, 5, starts()[0]
-    robot, game = reference_robots(numbers), reference.VelocityGame(V0, DELTA)
+    robot, game = reference_robots(numbers), reference_games.VelocityGame(V0, DELTA)
     law = reference.full_information_of_state(robot, game, 0.1)
     expected, inputs = reference.rk4_sampled(
         reference.held_input_rate(robot, 5), law, state[:, :3].ravel(), h, steps, per_period

@@ -24,6 +24,7 @@ from reference_agents import Integrator
 from scipy.linalg import expm
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.games import velocity_game
@@ -49,7 +50,7 @@ def powers(seed=0):
 
 
 def full_information_cases():
-    velocity, osnr = reference.VelocityGame(V0, DELTA), reference_osnr()
+    velocity, osnr = reference_games.VelocityGame(V0, DELTA), reference_osnr()
     robots = random_robot_state(np.random.default_rng(5), 0.8 * DELTA, spread=1.0)
     line = System(
         "line", velocity_game(5, V0, 3.0), integrators(5), FullInformation(), RHO, FIVE[:, None]
@@ -229,7 +230,7 @@ def test_the_monitor_is_what_numpy_makes_of_every_step(engine, mode, integrator,
     state = np.concatenate([recorded.state, last.state])
     u = np.concatenate([recorded.input, last.input])
     y, times, monitor = state[:, :, 1], h * np.arange(steps + 1), loop.monitor
-    game = reference.VelocityGame(V0, DELTA)
+    game = reference_games.VelocityGame(V0, DELTA)
 
     assert monitor.started == 1
     assert monitor.exit == watch.INSIDE

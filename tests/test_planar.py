@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from reference_agents import FlexibleRobot
 
 import reference
+import reference_games
 from gne_mj import plots
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput
@@ -44,7 +45,7 @@ def game():
 
 
 def oracle():
-    return reference.VelocityConsensusGame(V_0, EDGES, WEIGHT, DELTA)
+    return reference_games.VelocityConsensusGame(V_0, EDGES, WEIGHT, DELTA)
 
 
 def numbers(seed=0):

@@ -13,6 +13,7 @@ from builders import (
 from reference_agents import PositionRobot
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.errors import InfeasibleStart
@@ -47,7 +48,7 @@ def system_of(state=None, law=None, agents=None, bound=BOUND, rho=0.1, **options
 
 
 def oracle_rate(rho=0.1):
-    game = reference.VelocityGame(0.0, BOUND)
+    game = reference_games.VelocityGame(0.0, BOUND)
     return reference.closed_loop_rate(ORACLE, "full_information", game, rho)
 
 
@@ -148,7 +149,7 @@ def test_continuous_is_close_to_dop853():
 
 @pytest.mark.parametrize("engine", ["mujoco", "ode"])
 def test_euler_is_semi_implicit_and_positions_are_means(engine):
-    h, steps, game = 0.005, 400, reference.VelocityGame(0.0, BOUND)
+    h, steps, game = 0.005, 400, reference_games.VelocityGame(0.0, BOUND)
     expected = [start()]
     for _ in range(steps):
         u = reference.full_information(game, 0.1, expected[-1][:, 1])

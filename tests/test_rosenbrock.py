@@ -24,6 +24,7 @@ from reference_agents import Integrator
 from scipy.integrate import solve_ivp
 
 import reference
+import reference_games
 from gne_mj import banded, linear, native
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullyDistributed
@@ -244,7 +245,7 @@ def test_robots_agree_with_scipy():
     law = FullyDistributed(graphs.line(3), 1e-2, 0.3)
     system = robot_system(robot_state(y, extension=0.3), numbers, law=law, integrator="rosenbrock")
     rows, _, memory, _ = run_loop(system, 0.1, 15)
-    game = reference.VelocityGame(V0, [3.0] * 3)
+    game = reference_games.VelocityGame(V0, [3.0] * 3)
     want = expected(system, reference_robots(numbers), game, np.arange(16) * 0.1, 1e-2, 0.3)
     assert np.max(np.abs(flat(rows, memory, 3) - want)) < 5e-6
 

@@ -7,6 +7,7 @@ import pytest
 from builders import EQUAL, FIVE, V0, clock, integrators, robot_state, robot_system, robots
 
 import reference
+import reference_games
 from gne_mj import certificate, exits, monitored
 from gne_mj import graph as graphs
 from gne_mj.barrier import LogBarrier, Schedule
@@ -51,7 +52,7 @@ def test_the_push_rule_is_that_of_the_gap_with_the_least_room():
 
 def test_the_linear_rule_has_the_couplings_of_all_neighbours():
     """The least 2 Re / |.|^2 of the eigenvalues of M^-1 (d2phi + dF + c D)."""
-    oracle = reference.VelocityGame(V0, np.array(DELTA))
+    oracle = reference_games.VelocityGame(V0, np.array(DELTA))
     y = V0 + np.array([-1.0, 0.5, 0.75])
     jacobian = reference.pseudo_gradient_jacobian(oracle, y)
     matrix = jacobian + reference.barrier_hessian(oracle, 0.1, y)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import reference
+import reference_games
 from gne_mj.barrier import Schedule
 from gne_mj.equilibrium import variational_equilibrium
 from gne_mj.errors import InvalidInput
@@ -15,7 +16,7 @@ from gne_mj.scenario import load_scenario, run
 from gne_mj.theory import certify
 from gne_mj.theory.periods import least_rho, linear_period
 
-GAME = reference.VelocityGame(3.0, np.full(5, 3.0))
+GAME = reference_games.VelocityGame(3.0, np.full(5, 3.0))
 
 
 KINDS = ("exponential", "reciprocal", "halving")

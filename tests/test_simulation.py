@@ -21,6 +21,7 @@ from builders import (
 )
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed
 from gne_mj.scenario import load_scenario, run
@@ -38,7 +39,7 @@ CLOCK = {"duration": 20.0, "timestep": 0.01, "control_period": 0.01, "sample_per
 @pytest.fixture(scope="module")
 def exact():
     """States and inputs of the shipped robots at the step times, by DOP853."""
-    game = reference.VelocityGame(V0, np.full(5, 3.0))
+    game = reference_games.VelocityGame(V0, np.full(5, 3.0))
     robot = reference_robots(EQUAL)
     rate = reference.closed_loop_rate(robot, "full_information", game, 0.1)
     times = np.arange(0, 20.001, 0.01)

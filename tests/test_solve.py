@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commands import gne_here as gne
 
-import reference
+import reference_games
 from gne_mj import solutions
 from gne_mj.equilibrium import penalised_equilibrium
 from gne_mj.errors import InvalidInput
@@ -27,7 +27,7 @@ def test_the_shipped_desires_make_two_bounds_bind():
         "gap of agent 2",
         "gap of agent 4",
     ]
-    oracle = reference.VelocityGame(3.0, [1.0] * 5, [3.0, 6.0, 6.0, 1.0, 3.0], [2.0] * 5)
+    oracle = reference_games.VelocityGame(3.0, [1.0] * 5, [3.0, 6.0, 6.0, 1.0, 3.0], [2.0] * 5)
     y, pushes = solution.variational.action, solution.variational.multipliers
     force = np.array([oracle.partial_gradient(i, y) for i in range(5)])
     assert y[1] - y[0] == pytest.approx(1.0, abs=1e-10)

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from test_scales import scaled
 
 import reference
+import reference_games
 from gne_mj.equilibrium import penalised_equilibrium, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.games import cournot_game, osnr_game, ten_channels, velocity_game
@@ -31,7 +32,7 @@ def far_start(seed):
     weight = 10.0 ** rng.uniform(-2.0, 1.5, count) * rng.integers(0, 2, count)
     share = rng.choice([0.5, 0.99, 1 - 1e-9])
     start = V0 + np.cumsum(rng.choice([-share, share], count) * delta)
-    oracle = reference.VelocityGame(V0, delta, desired, weight)
+    oracle = reference_games.VelocityGame(V0, delta, desired, weight)
     return (
         velocity_game(count, V0, delta, desired, weight),
         oracle,

@@ -25,6 +25,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import reference
+import reference_games
 from gne_mj import graph as graphs
 from gne_mj.cli import app
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
@@ -123,7 +124,7 @@ def test_the_chain_has_closed_forms(agents):
 def test_the_papers_five_robots():
     slopes = chain_slopes(5)
     expected = reference.affine_constants(
-        reference.pseudo_gradient_jacobian(reference.VelocityGame(V0, np.full(5, 3.0)), FIVE)
+        reference.pseudo_gradient_jacobian(reference_games.VelocityGame(V0, np.full(5, 3.0)), FIVE)
     )
     values = slopes.mu.value, slopes.theta_1.value, slopes.theta_2.value
     np.testing.assert_allclose(values, expected, rtol=1e-12)
@@ -684,7 +685,7 @@ def test_the_linear_rule_is_where_held_integrators_become_unstable(seed):
     )
     y = system.equilibrium.action
     period = linear_period(system, y)
-    ours = reference.VelocityGame(V0, np.full(4, 3.0))
+    ours = reference_games.VelocityGame(V0, np.full(4, 3.0))
     matrix = reference.pseudo_gradient_jacobian(ours, y) + reference.barrier_hessian(ours, 0.1, y)
     for factor, stable in ((0.999, True), (1.001, False)):
         step = np.eye(4) - factor * period * matrix
