@@ -24,6 +24,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from gne_mj import game_model
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
 from gne_mj.controllers.local_law import is_local, joined
@@ -40,6 +41,9 @@ from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, GAMES, LAWS, TIMES
 from gne_mj.time_functions import Signal, TimeTable, called
 from gne_mj.toml_table import Fills, PerAgent, Sizes, dimension_of, per_agent
+
+# Files written for version 0.1 import Game from there. (`gne_mj.game` stays the function.)
+sys.modules.setdefault("gne_mj.game", game_model)
 
 # What the functions of a plain law are called, and take besides the scenario's parameters; and
 # those of one agent

@@ -13,10 +13,12 @@ import own_games
 import pytest
 from commands import gne_here
 
+import gne_mj
 from gne_mj.equilibrium import penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput, UserCodeError
 from gne_mj.game_model import Game
 from gne_mj.plain import number_of
+from gne_mj.user_files import load_module
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 FILES = {"law": "damped_plain.py", "game": "charging_plain.py"}
@@ -381,3 +383,11 @@ def test_ctrl_c_ends_a_kernel_that_never_returns(tmp_path, interrupts):
         process.kill()
     assert process.returncode == (1 if interrupts == 1 else 130)
     assert "gne-mj: interrupted" in told
+
+
+def test_files_written_for_the_first_version_find_game(tmp_path):
+    """Its module had the name that is a function's now; both are there."""
+    path = tmp_path / "old.py"
+    path.write_text("from gne_mj.game import Game\n")
+    assert load_module(path).Game is Game
+    assert callable(gne_mj.game)
