@@ -58,7 +58,8 @@ class Certificate:
         network: of a graph that changes: how often it did (``changes``), and for how long it was
             not connected (``disconnected``, s); None of others.
         messages: where agents send by triggers: how many came over links (``sent``), and how many
-            would have if all sent once a control period (``periodic``); None of others.
+            would have if all sent once a control period (``periodic``), and what is proven of
+            the triggers (``triggers``, see :mod:`gne_mj.theory.triggers`); None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
@@ -153,7 +154,7 @@ def certify_run(
         between=monitored.between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
         network=network,
-        messages=monitored.messages(system, monitor),
+        messages=_messages(system, monitor),
         exit=exits.exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
@@ -285,6 +286,13 @@ def _epsilon(system: System, end: float) -> dict[str, Any]:
         "measured": None if gains is None else float(np.max(gains)),
         **epsilon_bounds(game, system.rho, known, gains=gains),
     }
+
+
+def _messages(system: System, monitor: Any) -> dict[str, Any] | None:
+    seen, triggers = monitored.messages(system, monitor), Theorem(system).triggers
+    if seen is None or triggers is None:
+        return None
+    return {**seen, "triggers": triggers.report()}
 
 
 def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:

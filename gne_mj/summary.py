@@ -85,7 +85,9 @@ def _network(seen: dict[str, Any]) -> str:
 
 def _messages(seen: dict[str, Any]) -> str:
     share = 100.0 * seen["sent"] / max(seen["periodic"], 1)
-    return f"{seen['sent']}, {share:.3g}% of {seen['periodic']} with one in every control period"
+    text = f"{seen['sent']}, {share:.3g}% of {seen['periodic']} with one in every control period"
+    triggers = seen.get("triggers")  # which older results do not have
+    return text if triggers is None else f"{text}; triggers: {triggers_text(triggers)}"
 
 
 def _separation(seen: dict[str, Any]) -> str:
@@ -119,14 +121,20 @@ def _convergence(report: dict[str, Any]) -> dict[str, str]:
 
 
 def _tracking(seen: dict[str, Any]) -> str:
+    unit = seen.get("unit", "")  # which older results do not have
+    of, rate = f" {unit}" * bool(unit), f" {unit or 1}/s"
     text = (
-        f"at most {seen['largest_distance']:.3g} from y*(t), at {seen['largest_distance_time']:.4g}"
-        f" s, which moves at up to {seen['largest_rate']:.3g} per s"
+        f"at most {seen['largest_distance']:.3g}{of} from y*(t), at"
+        f" {seen['largest_distance_time']:.4g} s, which moves at up to"
+        f" {seen['largest_rate']:.3g}{rate}"
     )
     if seen["not_known"] is not None:
         return f"{text}; no bound: {seen['not_known']}"
     inside = "within its bound at all samples" if seen["within"] else "BEYOND its bound"
-    return f"{text}; {inside}, at the end {seen['final_distance']:.3g} <= {seen['final_bound']:.3g}"
+    return (
+        f"{text}; {inside}, at the end {seen['final_distance']:.3g} <="
+        f" {seen['final_bound']:.3g}{of}"
+    )
 
 
 def _lyapunov(seen: dict[str, Any]) -> str:
@@ -170,3 +178,16 @@ def bounds_text(bounds: dict[str, Any]) -> str:
         f"at most {bounds['bound']:.4g} = p rho{margin}, and"
         f" {bounds['largest_own_bound']:.4g} by each agent's own constraints"
     )
+
+
+def triggers_text(found: dict[str, Any]) -> str:
+    """What :mod:`gne_mj.theory.triggers` reports, in words."""
+    if not found["proven"]:
+        return f"not proven to keep V falling: {found['why_not']}"
+    text = (
+        f"V falls in continuous time where |e| > {found['ball']:.4g} exp(-{found['decay']:g} t)"
+        f" (q = {found['form']:.4g}; proven up to sigma = {found['largest_sigma']:.4g})"
+    )
+    if found["rises"] is None:
+        return f"{text}; the threshold does not decay, so that y* is not reached exactly"
+    return f"{text}; all its rises together are at most {found['rises']:.4g}"

@@ -71,6 +71,7 @@ def report(
         "game": motion is not None,
         "penalty": system.schedule is not None,
         "feed_forward": system.feed_forward,
+        "unit": system.game.action_unit,
         "largest_distance": float(distance[worst]),
         "largest_distance_time": float(time[worst]),
         "final_distance": float(distance[-1]),

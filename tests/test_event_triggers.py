@@ -9,13 +9,15 @@ from builders import clock, integrators
 import reference
 import reference_games
 from gne_mj import graph as graphs
-from gne_mj.controllers import FullInformation, PartialInformation
+from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import EventTrigger, MessageLoss
 from gne_mj.games import velocity_game
 from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import System
+from gne_mj.theory import certify
+from gne_mj.theory.theorem import Theorem
 
 RHO, H, START = 0.1, 0.01, np.array([1.0, 0.0, -1.0, 0.5, 2.0])
 GAME = reference_games.VelocityGame(3.0, np.full(5, 3.0))
@@ -99,6 +101,102 @@ def test_few_messages_reach_the_equilibrium():
     assert report["messages"]["sent"] < 0.1 * report["messages"]["periodic"]
     assert report["equilibrium"]["final_distance"] < 1e-3
     assert "messages" in str(trajectory)
+
+
+def falls(law, rows, others):
+    """-dV/dt of integrators without their barrier, agent by agent, y* being 3 for all.
+
+    V is half the squared distance of actions plus tau/2 that of estimates; ``others`` are the rows
+    that neighbours hold.
+    """
+    found, distance = 0.0, rows - 3.0
+    for i, row in enumerate(law.graph.laplacian):
+        pull = sum(rows[i] - others[j] for j in np.flatnonzero(row < 0))
+        rate = -law.coupling * pull  # tau times an estimate's rate
+        rate[i] -= GAME.partial_gradient(i, rows[i])
+        found -= distance[i] @ rate
+    return found
+
+
+def as_form(law):
+    """:func:`falls` as the matrix of a quadratic form in the distance of all rows and the errors of
+    what others hold (50, 50), by its values at sums of unit vectors."""
+
+    def at(z):
+        rows = 3.0 + z[:25].reshape(5, 5)
+        return falls(law, rows, rows + z[25:].reshape(5, 5))
+
+    unit = np.eye(50)
+    own = [at(each) for each in unit]
+    pairs = np.array([[at(a + b) for b in unit] for a in unit])
+    return 0.5 * (pairs - np.add.outer(own, own))
+
+
+@pytest.mark.parametrize("links", [graphs.ring(5), graphs.line(5)])
+def test_what_is_proven_of_triggers(links):
+    law = PartialInformation(links, 6.0, 0.1)
+    form = as_form(law)
+    q = np.linalg.eigvalsh(form[:25, :25])[0]
+    disagreement = np.zeros((50, 50))  # sum over links of |e^i - e^j - eps^j|^2
+    for i, j in zip(*np.nonzero(links.laplacian < 0), strict=True):
+        for r in range(5):
+            row = np.zeros(50)
+            row[5 * i + r], row[5 * j + r], row[25 + 5 * j + r] = 1.0, -1.0, -1.0
+            disagreement += np.outer(row, row)
+    own, errors = np.diag([1.0] * 25 + [0.0] * 25), np.diag([0.0] * 25 + [1.0] * 25)
+
+    def least(t, sigma):
+        return np.linalg.eigvalsh(form - 0.25 * q * own + t * (errors - sigma * disagreement))[0]
+
+    told = Theorem(system(EventTrigger(), law=law)).triggers.report()
+    assert told["form"] == pytest.approx(q, rel=1e-9)
+    most = told["largest_sigma"]
+    weights = np.geomspace(10.0, 1e5, 400)
+    assert max(least(t, 0.98 * most) for t in weights) > -1e-9
+    assert max(least(t, 1.02 * most) for t in weights) < -1e-6
+    trigger = EventTrigger(sigma=0.5 * most, threshold=0.2, decay=0.5)
+    told = Theorem(system(trigger, law=law)).triggers.report()
+    t = told["beta"] / 5
+    assert told["proven"]
+    assert least(1.0001 * t, trigger.sigma) > -1e-9
+    assert least(0.99 * t, trigger.sigma) < -1e-7
+    assert told["rises"] == pytest.approx(told["beta"] * 0.2**2 / (2.0 * 0.5))
+    assert told["ball"] == pytest.approx(np.sqrt(4.0 * told["beta"] / q) * 0.2)
+    beyond = Theorem(system(EventTrigger(sigma=1.01 * most), law=law)).triggers
+    assert not beyond.report()["proven"]
+    assert f"{most:.4g}" in beyond.why_not
+
+
+def test_the_condition_without_a_matrix_is_a_weaker_one(monkeypatch):
+    law = PartialInformation(graphs.complete(5), 9.0, 0.1)
+    sharp = Theorem(system(EventTrigger(), law=law)).triggers.report()
+    monkeypatch.setattr("gne_mj.theory.coupling._FORM", 0)
+    told = Theorem(system(EventTrigger(), law=law)).triggers
+    q, c, degree = told.form, 9.0, 4
+    assert 0.0 < q <= sharp["form"]
+    assert told.largest_sigma <= sharp["largest_sigma"]
+    sigma = told.largest_sigma
+    assert 16.0 * sigma * c**2 * degree**3 == pytest.approx(q**2 * (1.0 - 2.0 * sigma * degree))
+    assert told.beta == pytest.approx(c**2 * degree**2 * 5 / (2.0 * q))
+
+
+def test_certify_and_reports_say_whether_triggers_are_proven():
+    proven = certify(system(EventTrigger(threshold=0.5, decay=0.3)), clock(H, 1.0))
+    assert not proven.theorem["obstacles"]
+    assert proven.triggers["least_time"] == H
+    assert "triggers being looked at at all times" in proven.guaranteed[0]
+    assert "V falls in continuous time" in str(proven)
+    never = certify(system(EventTrigger(threshold=0.5)), clock(H, 1.0))
+    assert "where |e| >" in never.guaranteed[0]
+    assert never.to_dict()["triggers"]["rises"] is None
+    distributed = system(EventTrigger(sigma=0.1), law=FullyDistributed(graphs.ring(5), 0.1, 1.0))
+    (why,) = (each for each in certify(distributed, clock(H, 1.0)).theorem["obstacles"]
+              if each.startswith("triggers"))  # fmt: skip
+    assert why == "triggers: nothing is proven of them under distributed information"
+    told = run(150).reports["agents"]["messages"]["triggers"]
+    assert told["proven"] is False
+    assert "sigma = 0.01" in told["why_not"]
+    assert "not proven to keep V falling" in str(run(150))
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 # Greatest number of operations for the quadratic form, and where iteration is quicker
 _WORK = 1.3e11
 _DENSE = 500
+# Greatest number of rows of the form itself
+_FORM = 500
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,40 @@ def coupling(slopes: Slopes, graph: Graph, gain: float, kept: Kept | None = None
     return Coupling(
         gain, condition(printed, False), condition(rigorous, sure), quadratic, slopes.label
     )
+
+
+def form_at(slopes: Slopes, graph: Graph, gain: float) -> Array | None:
+    """What the quadratic form in all profiles, agent by agent, certainly has at least.
+
+    Args:
+        slopes: what is certain of dF/dy.
+        graph: that stays, of N >= 2 agents that keep all estimates.
+        gain: c.
+
+    Returns:
+        (N m, N m); None if dF/dy is not known so well, or that is too large.
+    """
+    bound, m = slopes.between, slopes.game.actions
+    if bound is None or graph.agents * m > _FORM:
+        return None
+    owner = slopes.game.agent_of_action
+    agent, column = _entries(bound.base, bound.loss, owner)
+    at = agent * m + column
+    form = gain * np.kron(graph.laplacian, np.eye(m))
+    form[np.ix_(at, at)] += _second_term(bound.base, bound.loss, owner, agent, column).toarray()
+    return form
+
+
+def least_of_form(slopes: Slopes, graph: Graph, gain: float) -> float:
+    """q with Q(e) >= q |e|^2 for all e, by mu, theta_1 and theta_2 alone.
+
+    That of mu |p|^2 - (theta_1 + theta_2) |p| |w| + (c lambda_2 - theta_2) |w|^2, where
+    |e|^2 = N |p|^2 + |w|^2.
+    """
+    mu, theta_1, theta_2 = slopes.mu.value, slopes.theta_1.value, slopes.theta_2.value
+    between = -0.5 * (theta_1 + theta_2) / np.sqrt(graph.agents)
+    apart = gain * graph.algebraic_connectivity - theta_2
+    return float(np.linalg.eigvalsh([[mu / graph.agents, between], [between, apart]])[0])
 
 
 def least_coupling(

@@ -41,6 +41,7 @@ class Guarantees:
     constants: dict[str, Any]
     graph: dict[str, Any] | None
     coupling: dict[str, Any] | None
+    triggers: dict[str, Any] | None
     gain: dict[str, Any] | None
     epsilon: dict[str, Any] | None
     start: dict[str, Any]
@@ -92,15 +93,11 @@ def certify(system: System, clock: Clock) -> Guarantees:
     return Guarantees(
         system=_system(system),
         status=HELD if held is not None and held.promised else theorem.status,
-        theorem={
-            "name": theorem.name,
-            "assumptions": [asdict(a) for a in theorem.assumptions],
-            "obstacles": list(theorem.obstacles),
-            "continuous": theorem.continuous,
-        },
+        theorem=_theorem(theorem),
         constants=_constants(theorem),
         graph=None if law.graph is None else _graph(law.graph, law.kept),
         coupling=_coupling(theorem),
+        triggers=_triggers(theorem, clock),
         gain=None if theorem.gain is None else asdict(theorem.gain),
         epsilon=None
         if law.epsilon is None
@@ -153,6 +150,15 @@ def _system(system: System) -> dict[str, Any]:
     }
 
 
+def _theorem(theorem: Theorem) -> dict[str, Any]:
+    return {
+        "name": theorem.name,
+        "assumptions": [asdict(a) for a in theorem.assumptions],
+        "obstacles": list(theorem.obstacles),
+        "continuous": theorem.continuous,
+    }
+
+
 def _graph(graph: Graph, kept: Kept | None) -> dict[str, Any]:
     return {
         "edges": len(graph.edges),
@@ -200,6 +206,14 @@ def _coupling(theorem: Theorem) -> dict[str, Any] | None:
     if conditions is None:
         return None
     return {**asdict(conditions), "time_constant": theorem.system.law.time_constant}
+
+
+def _triggers(theorem: Theorem, clock: Clock) -> dict[str, Any] | None:
+    """Of agents that send by triggers; two messages of one are a control period apart, or more."""
+    triggers = theorem.triggers
+    if triggers is None:
+        return None
+    return {**triggers.report(), "least_time": clock.control_period}
 
 
 def _star(theorem: Theorem) -> dict[str, Any]:

@@ -86,6 +86,7 @@ class MovingGame:
         return {
             "keys": list(motion.keys),
             "rates": speed.tolist(),
+            "unit": self.system.game.action_unit,
             "looked_at": len(self.times),
             "least_mu": least,
             "equilibrium_rate": max(rates, default=None),

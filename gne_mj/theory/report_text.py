@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from gne_mj.summary import bounds_text
+from gne_mj.summary import bounds_text, triggers_text
 from gne_mj.theory.guarantees import Guarantees
 
 _WIDTH = 20
@@ -44,6 +44,14 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield "estimates", _kept(graph["kept"])
     if g["coupling"] is not None:
         yield from _coupling(g["coupling"])
+    if g["triggers"] is not None:
+        yield (
+            "triggers",
+            (
+                f"{triggers_text(g['triggers'])}; messages of an agent at least"
+                f" {g['triggers']['least_time']:g} s apart"
+            ),
+        )
     if g["gain"] is not None:
         yield "gain k", _gain(g["gain"])
     if g["epsilon"] is not None:
@@ -78,7 +86,8 @@ def _moving(game: dict[str, Any]) -> str:
              for key, rate in zip(game["keys"], game["rates"], strict=True))  # fmt: skip
     text = f"{', '.join(moves)}; all else here is of time 0"
     if game["equilibrium_rate"] is not None:
-        text += f"; y* moves at up to {game['equilibrium_rate']:.4g} per s"
+        rate = f"{game['equilibrium_rate']:.4g} {game['unit'] or 1}/s"
+        text += f"; y* moves at up to {rate}"
     if game["equilibrium_rate_bound"] is not None:
         text += f", which is at most {game['equilibrium_rate_bound']:.4g} by mu"
     return text

@@ -8,6 +8,7 @@ import numpy as np
 
 from gne_mj.bounds import MOST_EXAMINED
 from gne_mj.epsilon import epsilon_bounds
+from gne_mj.faults import EventTrigger, triggered
 from gne_mj.game_model import Box
 from gne_mj.graph import complete
 from gne_mj.loops.feedback import LARGEST_INPUT
@@ -24,6 +25,7 @@ from gne_mj.theory.disturbances import estimate_error
 from gne_mj.theory.epsilon_star import EpsilonBound
 from gne_mj.theory.gain import Gain, required_gain
 from gne_mj.theory.spectra import DENSE
+from gne_mj.theory.triggers import Triggers
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
 # Why no theorem covers agents that keep apart
@@ -126,6 +128,13 @@ class Theorem:
         return EpsilonBound(self.system) if self.singular_perturbation else None
 
     @cached_property
+    def triggers(self) -> Triggers | None:
+        """What is certain of agents that send by triggers; None where they do not."""
+        if not triggered(self.system.faults):
+            return None
+        return Triggers(self.system, self.slopes if self._at_estimates else None)
+
+    @cached_property
     def assumptions(self) -> tuple[Assumption, ...]:
         """All that the theorem assumes of game, agents, graph and start."""
         proven = self.system.law.theorem
@@ -168,8 +177,10 @@ class Theorem:
             found.append("the penalty changes in time, and the theorems have a constant one")
         if motion_of(self.system.game) is not None:
             found.append("the game moves, and the paper's theorems have one that stands still")
-        if self.system.faults:
+        if any(not isinstance(fault, EventTrigger) for fault in self.system.faults):
             found.append("the scenario has faults, and the theorems have none")
+        if self.triggers is not None and self.triggers.why_not is not None:
+            found.append(f"triggers: {self.triggers.why_not}")
         if self.system.separation is not None:
             found.append(SEPARATED)
         mode = mode_of(self.system)

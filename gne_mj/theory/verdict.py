@@ -56,11 +56,25 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
     if held is None and system.guarded and has_ode(system.agents.kind):
         return [_FORESEEN]
     if not theorem.obstacles:
+        sent = ", triggers being looked at at all times," if theorem.triggers is not None else ""
         return [
-            "nothing of this run; the same law in continuous time is covered by the theorem"
-            f"{as_long}"
+            f"nothing of this run; the same law in continuous time{sent} is covered by the theorem"
+            f"{as_long}{_after_triggers(theorem)}"
         ]
     return [NOTHING]
+
+
+def _after_triggers(theorem: Theorem) -> str:
+    """What is left of the theorem where agents send by triggers."""
+    triggers = theorem.triggers
+    if triggers is None:
+        return ""
+    if triggers.converges:
+        return f", but that V can rise by {triggers.rises:.4g} in all"
+    return (
+        f", but that V falls where |e| > {triggers.ball:.4g} only, e being all profiles' distance"
+        " from y*"
+    )
 
 
 def together(*found: list[str]) -> list[str]:
