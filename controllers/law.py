@@ -55,12 +55,15 @@ class MemoryPart(NamedTuple):
             be, its own entries being no matter; else one row, (m,).
         kept: which of these rows' entries there are, if not all: those of the law's ``kept``, and
             room for a profile behind them.
+        dims, shape: of something else than actions: its dimensions, and how long each of them is.
     """
 
     name: str
     long_name: str
     rows: bool = False
     kept: bool = False
+    dims: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
 
 
 ESTIMATES = MemoryPart("estimate", "what each agent takes the actions to be", rows=True)
@@ -75,6 +78,7 @@ class Law(ABC):
     Attributes:
         information: name of the information structure; "custom" if it is none of the paper's.
         proven: what is proven of the law; a subclass, which may change the law, says it again.
+        promise: of a law that is not the paper's, what its own source promises, in words.
         graph: over which agents communicate; None if they need not.
         gain: k, the factor of the penalised pseudo-gradient in the input.
         coupling: c, the factor of the Laplacian of all profiles in the input; 0 without.
@@ -94,6 +98,7 @@ class Law(ABC):
 
     information: ClassVar[str] = "custom"
     proven: ClassVar[LawTheorem | None] = None
+    promise: ClassVar[str] = ""
     graph: Graph | None = None
     gain: float = 1.0
     coupling: float = 0.0
@@ -220,6 +225,14 @@ class Law(ABC):
             if self.kept is not None:
                 return self.kept.propagator(self.estimate_rate * period)
             return propagator(lists or self.graph.data, self.estimate_rate * period)
+
+    def step_propagator(self, timestep: float) -> Propagator:
+        """What ``rate`` needs to know of the timestep in s, mode continuous: nothing, of most laws.
+
+        Args:
+            timestep: in s.
+        """
+        return no_propagator()
 
 
 def check_positive(law: Law, *keys: str) -> None:

@@ -1,7 +1,9 @@
 """What the tables ``[systems.NAME.controller]`` have in common; each law's is beside it."""
 
 from abc import abstractmethod
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -17,7 +19,13 @@ from gne_mj.toml_table import ACTION, Fills, Table, Unit
 
 
 class LawTable(Table):
-    """A law and how it acts."""
+    """A law and how it acts.
+
+    Attributes:
+        tuned: its gains, each with the values that a comparison of laws may choose among.
+    """
+
+    tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
 
     mode: Annotated[str, MODES] = Field(
         "continuous",

@@ -5,6 +5,7 @@ Trajectories, rows and summaries of batches, the live page, replays and figures 
 """
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -226,8 +227,12 @@ def _memory(system: SystemData) -> Iterator[Variable]:
     """What the law says that its memory holds; all of it where it says nothing."""
     game, at = system.game, 0
     for part in system.law.memory_parts:
-        size = game.actions * (game.agents if part.rows else 1)
-        if part.kept:
+        size = (
+            math.prod(part.shape) if part.dims else game.actions * (game.agents if part.rows else 1)
+        )
+        if part.dims:
+            yield _other(part, slice(at, at + size))
+        elif part.kept:
             assert system.law.kept is not None
             yield _kept(part, np.flatnonzero(system.law.kept.estimated))
             size += system.law.kept.size  # room for a profile is behind them
@@ -253,6 +258,14 @@ def _kept(part: MemoryPart, entries: NDArray[np.int64]) -> Variable:
     return Variable(
         part.name, ("time", "kept"), lambda rows: rows.samples.memory[:, entries],
         unit=_action_unit, long_name=part.long_name,
+    )  # fmt: skip
+
+
+def _other(part: MemoryPart, entries: slice) -> Variable:
+    return Variable(
+        part.name, ("time", *part.dims),
+        lambda rows: rows.samples.memory[:, entries].reshape(-1, *part.shape),
+        long_name=part.long_name,
     )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ from gne_mj.interface.faults import (
     silence,
 )
 from gne_mj.interface.laws import full_information, fully_distributed, own_law, partial_information
+from gne_mj.interface.rivals import primal_dual_play
 from gne_mj.interface.running import Run, run, setup
 from gne_mj.interface.show import Figures, plot, view
 
@@ -55,6 +56,7 @@ __all__ = [
     "pi_cascades",
     "planar_robots",
     "plot",
+    "primal_dual_play",
     "push",
     "run",
     "saturation",

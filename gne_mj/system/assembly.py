@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gne_mj.barrier import unchanging
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import no_memory
-from gne_mj.controllers.propagation import Propagator, no_propagator
+from gne_mj.controllers.propagation import Propagator
 from gne_mj.controllers.settings import GUARDED, LINKS, OBSERVER
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
@@ -182,7 +182,9 @@ class Assembly(SystemData):
         settings = self.law_settings(self.rho)
         with named(period="clock.control_period"):
             moved = self._moved_by(clock)
-            propagator = self.law.propagator(moved) if mode.held else no_propagator()
+            held = mode.held
+            move = self.law.propagator if held else self.law.step_propagator
+            propagator = move(moved if held else clock.timestep)
         motion = motion_of(self.game)
         frame = None if motion is None else motion.frame()
         if motion is not None:

@@ -163,7 +163,11 @@ class Theorem:
         if self.system.game.actions > MOST_EXAMINED:
             return (f"it has more than {MOST_EXAMINED} actions, which are too many to examine",)
         if self.name is None:
-            return (f"the {self.system.law.information} law is none of the paper's",)
+            promise = self.system.law.promise
+            return (
+                f"the {self.system.law.information} law is none of the paper's"
+                + (f": {promise}" if promise else ""),
+            )
         found = [f"[{a.label}] {a.status}: {a.why}" for a in self.assumptions if not a.granted]
         if self.coupling is not None and not found and not self.coupling.certified:
             found.append(
