@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         solve,
         view,
     )
-    from gne_mj.scenario import Scenario, load_scenario
+    from gne_mj.scenario import Scenario, load_scenario, scenario_of
     from gne_mj.simulation import Simulation
     from gne_mj.system import Clock, System
     from gne_mj.trajectory import Trajectory
@@ -110,6 +110,7 @@ __all__ = [
     "ring",
     "run",
     "saturation",
+    "scenario_of",
     "sensor_delay",
     "setup",
     "silence",
@@ -142,6 +143,7 @@ _PLACES = {
     "open_batch": "gne_mj.batches",
     "private": "gne_mj.expressions",
     "ring": "gne_mj.graph",
+    "scenario_of": "gne_mj.scenario",
     "star": "gne_mj.graph",
     "switching": "gne_mj.changing_graph",
 }

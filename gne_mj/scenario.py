@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,17 +16,20 @@ from gne_mj.game_model import Game
 from gne_mj.games.table import functions_in
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.scenario_tables.changes import change, complaint, full_key, plain, validated
+from gne_mj.scenario_tables.interventions import tables_of
 from gne_mj.trajectory import Trajectory
 
 __all__ = [
     "Scenario",
     "Source",
+    "as_done",
     "complaint",
     "full_key",
     "load_scenario",
     "parse_value",
     "plain",
     "run",
+    "scenario_of",
     "shipped",
 ]
 
@@ -65,6 +68,30 @@ def load_scenario(source: Source, changes: Mapping[str, Any] | None = None) -> S
 def run(source: Source, changes: Mapping[str, Any] | None = None) -> Trajectory:
     """Load a scenario, run it to its end and return the trajectory; see :func:`load_scenario`."""
     return load_scenario(source, changes).simulation_object().run()
+
+
+def scenario_of(trajectory: Trajectory) -> Scenario:
+    """The scenario of a run, with what was done while it ran: run again it takes the same steps.
+
+    >>> gne_mj.run(gne_mj.scenario_of(trajectory))
+    >>> Path("again.toml").write_text(gne_mj.scenario_of(trajectory).toml())
+
+    Raises:
+        InvalidInput: it holds no scenario, or something was done that no keys of one say.
+    """
+    if not trajectory.source:
+        raise InvalidInput("trajectory", "of no scenario", "it must be one of a scenario's run")
+    return as_done(trajectory.source, trajectory.interventions)
+
+
+def as_done(source: str, done: Sequence[Mapping[str, Any]]) -> Scenario:
+    """A scenario with what was done while it ran in place of what was planned.
+
+    Args:
+        source: as JSON.
+        done: as :attr:`gne_mj.simulation.Simulation.interventions` has it.
+    """
+    return load_scenario(json.loads(source), {"interventions": tables_of(done)})
 
 
 def parse_value(text: str) -> Any:

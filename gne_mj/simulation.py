@@ -32,13 +32,27 @@ _CHUNK, _FIRST = 0.1, 10_000
 class Remade(Protocol):
     """How a scenario's systems come of its keys: given changes, and where each system is.
 
-    Returns the systems that are otherwise then, and what remakes them further.
+    Returns the systems that are otherwise then, the changes by whole keys as JSON has them, and
+    what remakes the systems further.
     """
 
     def __call__(
         self, changes: Mapping[str, Any], present: Mapping[str, Present]
-    ) -> "tuple[Sequence[System], Remade]":
+    ) -> "tuple[Sequence[System], dict[str, Any], Remade]":
         """See the class."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What is done to a simulation while it runs.
+
+    Attributes:
+        time: in s; it acts as of the step that begins there.
+        act: called with the simulation.
+    """
+
+    time: float
+    act: "Callable[[Simulation], None]"
 
 
 @dataclass(frozen=True)
@@ -72,10 +86,11 @@ class Simulation:
         seed: kept with the results; systems have their own, of what is random in their faults.
         source: the scenario as JSON, kept with the results.
         remade: systems with changes of a scenario's keys, see :class:`Remade`.
+        planned: what is done while it runs.
 
     Attributes:
         interventions: what :meth:`change` and :meth:`push` did, each with its "time" in s, its
-            "system", and "what" in words.
+            "system", and "what" in words; changes of a scenario's keys with these ("keys").
 
     >>> simulation = Simulation([system], clock)
     >>> snapshot = simulation.step()["robots"]    # one integration step
@@ -91,6 +106,7 @@ class Simulation:
         seed: int = 0,
         source: str = "",
         remade: "Remade | None" = None,
+        planned: Sequence[Planned] = (),
     ) -> None:
         names = [system.name for system in systems]
         if len(set(names)) != len(names) or not names:
@@ -103,6 +119,7 @@ class Simulation:
         self.seed, self.source = seed, source
         self._remade = remade
         self.interventions: list[dict[str, Any]] = []
+        self._planned = sorted(planned, key=lambda each: clock.steps(each.time))
         self._runs: dict[str, SystemRun] = {}
         for system in systems:
             with part_of(f"systems.{system.name}", "clock"):
@@ -141,14 +158,36 @@ class Simulation:
         Measurement, input and state are those at the step's start. A system that has left its set
         stays where it was, its input not a number. Steps taken here are not recorded.
         """
+        self._act()
         return {name: run.step() for name, run in self._runs.items()}
 
     def advance(self, steps: int) -> None:
         """Take so many integration steps of every system still inside, recording on the way."""
-        for run in self._runs.values():
-            run.advance(steps)
+        now = self.clock.steps(self.time)
+        end = now + steps
+        while now < end:
+            self._act()
+            due = [self.clock.steps(each.time) for each in self._planned[:1]]
+            until = min([end, *due])
+            for run in self._runs.values():
+                run.advance(until - now)
+            now = until
 
-    def change(self, changes: System | Mapping[str, Any], what: str = "", **about: Any) -> None:
+    def _act(self) -> None:
+        """Do what is planned for now; what is refused is not tried again."""
+        while self._planned and self.clock.steps(self._planned[0].time) <= self.clock.steps(
+            self.time
+        ):
+            self._planned.pop(0).act(self)
+
+    def change(
+        self,
+        changes: System | Mapping[str, Any],
+        what: str = "",
+        *,
+        remade: Remade | None = None,
+        **about: Any,
+    ) -> None:
         """Go on with other numbers, as of the next step.
 
         >>> simulation.change({"barrier.rho": 0.02})
@@ -157,8 +196,11 @@ class Simulation:
             changes: dotted keys of the scenario's games, barriers and controllers to new values;
                 or a system of the same name, game, law, agents and engine, whose start is not used.
             what: the change in words, kept with the results; the keys and values if left out.
+            remade: of a system that a scenario's changes made: how further ones come of its keys.
             about: what else to keep of it, as JSON has it. A later one of the same time, system and
                 "key" takes its place.
+
+        A system that has left its set stays as it is.
 
         Raises:
             InvalidInput: a key that there is not, or a step that the new numbers do not allow.
@@ -167,14 +209,16 @@ class Simulation:
         """
         if isinstance(changes, System):
             self._change(changes, what, about)
+            self._remade = remade or self._remade
             return
         if self._remade is None:
             raise InvalidInput("changes", changes, "only a scenario's simulation knows its keys")
         words = what or ", ".join(f"{key} = {value!r}" for key, value in changes.items())
         present = {name: run.loop.present() for name, run in self._runs.items()}
-        systems, remade = self._remade(changes, present)
+        systems, given, remade = self._remade(changes, present)
         for system in systems:
-            self._change(system, words, about)
+            if self._runs[system.name].inside:
+                self._change(system, words, {"keys": given, **about})
         self._remade = remade
 
     def _change(self, system: System, what: str, about: Mapping[str, Any]) -> None:
@@ -206,8 +250,15 @@ class Simulation:
         game = run.system.game
         agent, axis = int(game.agent_of_action[channel]) + 1, game.axis_of_action[channel]
         along = f" along {axis}" if max(game.sizes) > 1 else ""
-        about = {"agent": agent, "channel": channel + 1, "force": force, "duration": duration}
-        what = f"{game.agent_name} {agent} pushed{along} by {force:g} for {duration:g} s"
+        about: dict[str, Any] = {
+            "agent": agent,
+            "channel": channel + 1,
+            "force": force,
+            "duration": duration,
+        }
+        about |= {"axis": axis} if along else {}
+        unit = run.loop.push_unit(channel)
+        what = f"{game.agent_name} {agent} pushed{along} by {force:g} {unit} for {duration:g} s"
         self._note(system, what, about)
 
     def _note(self, system: str, what: str, about: Mapping[str, Any]) -> None:

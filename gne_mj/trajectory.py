@@ -199,6 +199,11 @@ class Trajectory:
         return self.status in SUCCESSES
 
     @property
+    def source(self) -> str:
+        """What was run, as JSON; empty if no scenario was."""
+        return str(self._attributes["scenario"])
+
+    @property
     def interventions(self) -> list[dict[str, Any]]:
         """What the user did while it ran: "time" in s, and "what" in words."""
         done: list[dict[str, Any]] = json.loads(self._attributes.get("interventions", "[]"))

@@ -1,5 +1,6 @@
 """What a user does to a run that goes on: numbers changed, agents pushed, looks in between."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +11,12 @@ from builders import FIVE, robot_state, robot_system
 import gne_mj
 from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
-from gne_mj.errors import EngineError, InvalidInput
+from gne_mj.errors import EngineError, InfeasibleStart, InvalidInput
 from gne_mj.faults import Push
-from gne_mj.scenario import load_scenario
+from gne_mj.scenario import load_scenario, scenario_of, shipped
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
+from gne_mj.toml_text import toml_text
 from gne_mj.trajectory import Trajectory
 
 CLOCK = Clock(duration=4.0, timestep=0.01, control_period=0.01, sample_period=0.1)
@@ -281,3 +283,92 @@ def test_all_joints_of_own_robots_are_recorded():
     assert np.array_equal(
         data["configuration"].to_numpy()[:, at[known]], data["position"].to_numpy()[:, known]
     )
+
+
+PLANNED = [
+    {"time": 0.3, "changes": {"barrier.rho": 0.3, "game.reference_velocity": 2.5}},
+    {"time": 0.5, "push": {"agent": 2, "force": 4.0, "duration": 0.2}},
+    {"time": 0.6, "push": {"system": "robots", "agent": 4, "force": -1.0, "duration": 0.1}},
+]
+
+
+def test_what_was_done_by_hand_is_done_again_by_a_file():
+    changes = {"simulation.duration": 1.0}
+    simulation = load_scenario("velocity-sync", changes).simulation_object()
+    simulation.advance(150)
+    simulation.change({"barrier.rho": 0.3, "game.reference_velocity": 2.5})
+    simulation.advance(100)
+    simulation.push("robots", 1, 4.0, 0.2)
+    simulation.advance(50)
+    simulation.push("robots", 3, -1.0, 0.1)
+    by_hand = simulation.run()
+    text = scenario_of(by_hand).toml()
+    again = gne_mj.run(tomllib.loads(text))
+    planned = gne_mj.run("velocity-sync", {**changes, "interventions": PLANNED})
+    for run in (again, planned):
+        assert same(run, by_hand)
+        reports = [{**each.reports["robots"], "wall_time": 0} for each in (run, by_hand)]
+        assert reports[0] == reports[1]
+    assert planned.interventions == by_hand.interventions
+    assert again.interventions[1]["what"] == "robot 2 pushed by 4 N for 0.2 s"
+    assert not same(gne_mj.run("velocity-sync", changes), by_hand)
+
+
+def test_steps_one_by_one_see_what_is_planned():
+    scenario = load_scenario("velocity-sync", {"interventions": PLANNED})
+    stepped, advanced = scenario.simulation_object(), scenario.simulation_object()
+    for _ in range(160):
+        stepped.step()
+    advanced.advance(160)
+    one, other = (each.runs["robots"].loop.present().state for each in (stepped, advanced))
+    assert np.array_equal(one, other)
+    assert stepped.systems[0].rho == 0.3
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_scenarios_text_is_read_as_the_same_scenario(name):
+    scenario = load_scenario(name)
+    again = load_scenario(tomllib.loads(scenario.toml()))
+    assert again.model_dump(mode="json") == scenario.model_dump(mode="json")
+
+
+def test_tables_of_any_texts_are_written_and_read():
+    tables = {
+        'a "b".c\n\x7f': 'é\t"\\', "list": [1, -2.5e-7, True], "empty": {}, "none": [],
+        "in": {"of": {"x": 1e300, "each": [{"y": {"z.z": [[1], [2, 3]]}}, {}]}},
+    }  # fmt: skip
+    assert tomllib.loads(toml_text(tables)) == tables
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"time": 0.1}, "interventions.0: .*either changes or a push"),
+        ({"time": -1.0, "changes": {"barrier.rho": 1.0}}, "interventions.0.time: got -1.0"),
+        ({"time": 0.1, "changes": {"barrier.roh": 1.0}}, "did you mean 'rho'"),
+        ({"time": 0.1, "changes": {"simulation.duration": 1.0}}, "it stays as it is"),
+        ({"time": 0.1, "push": {"agent": 6, "force": 1.0, "duration": 1.0}},
+         "interventions.0.push.agent: got 6, but agents are numbered 1 to 5"),
+        ({"time": 0.1, "push": {"agent": 1, "axis": "y", "force": 1.0, "duration": 1.0}},
+         "interventions.0.push.axis: got 'y'"),
+        ({"time": 0.1, "push": {"system": "r", "agent": 1, "force": 1.0, "duration": 1.0}},
+         "interventions.0.push.system: got 'r'"),
+    ],
+)  # fmt: skip
+def test_plans_that_cannot_be_are_refused_before_the_run(table, words):
+    with pytest.raises(InvalidInput, match=words):
+        load_scenario("velocity-sync", {"interventions": [table]}).simulation_object()
+
+
+def test_a_plan_that_is_refused_when_it_is_due_is_named():
+    table = {"time": 0.1, "changes": {"game.reference_velocity": 30.0}}
+    scenario = load_scenario("velocity-sync", {"interventions": [table], **OSNR})
+    with pytest.raises(InfeasibleStart, match=r"interventions\.0\.changes"):
+        scenario.simulation_object().run()
+
+
+def test_what_knows_no_interventions_refuses_them():
+    scenario = load_scenario("velocity-sync", {"interventions": PLANNED})
+    for what in (gne_mj.certify, gne_mj.load_environment):
+        with pytest.raises(InvalidInput, match="know none: leave them out"):
+            what(scenario)

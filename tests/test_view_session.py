@@ -3,6 +3,7 @@
 import signal
 import threading
 import time
+import tomllib
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -141,6 +142,54 @@ def test_numbers_change_while_it_runs_and_hold_after_a_restart():
         "velocity-sync", {**ODE, "barrier.rho": 0.5, "game.reference_velocity": 2.5}
     )
     assert np.array_equal(second["robots"]["action"], expected["robots"]["action"])
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes"),
+    [
+        ("velocity-sync", {"controller": {"information": "partial", "graph": "ring"}}),
+        ("planar-sync", {}),
+    ],
+)
+def test_what_viewers_did_is_done_again_to_the_last_bit(scenario, changes):
+    with watched(scenario, {**changes, "simulation.duration": 0.6}) as (session, page):
+        session._move(30)
+        page.ask(do="set", key="systems.robots.barrier.rho", value=0.3)
+        session._move(7)
+        entry = "[1]" if scenario == "planar-sync" else ""
+        page.ask(do="set", key=f"systems.robots.game.reference_velocity{entry}", value=0.9)
+        page.ask(do="push", system="robots", agent=2, axis=1 if entry else 0, force=3.0)
+        for coupling in (4.0, 5.0):
+            page.ask(do="set", key="systems.robots.controller.coupling", value=coupling)
+        session._move(60)
+        page.ask(do="scenario")
+        text = page.told[-1]["text"]
+        seen = to_the_end(session)
+    assert len(seen.interventions) == (3 if entry else 4)
+    again = gne_mj.run(tomllib.loads(text))
+    assert again.interventions == [
+        {key: value for key, value in done.items() if key not in ("key", "value")} | words
+        for done, words in zip(
+            seen.interventions, [{"what": d["what"]} for d in again.interventions], strict=True
+        )
+    ]
+    for key, values in seen["robots"].variables.items():
+        if values.dtype.kind == "f":
+            assert np.array_equal(values, again["robots"][key], equal_nan=True), key
+
+
+def test_sliders_follow_what_the_scenario_does():
+    rho = "systems.robots.barrier.rho"
+    planned = [{"time": 0.1, "changes": {"barrier.rho": 0.4}}]
+    with watched(changes={**ODE, "interventions": planned}) as (session, page):
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.5)
+        session._move(60)
+        assert [m["values"][rho] for m in page.told if m["kind"] == "controls"] == [0.1, 0.4]
+        assert len(session.simulation.interventions) == 2
+        system = session.simulation.systems[0]
+        assert (system.rho, system.game.parameters[0]) == (0.4, 2.5)
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.6)
+        assert session.simulation.systems[0].rho == 0.4
 
 
 def test_a_reference_with_two_entries_has_two_sliders():

@@ -356,7 +356,7 @@ def make_plan(
     Raises:
         InvalidInput: names the key, the value and what would be right.
     """
-    scenario = load_scenario(source, changes)
+    scenario = load_scenario(source, changes).without_interventions("runs of a batch")
     name = scenario.name_of(system)
     one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
     tables = json.loads(one.model_dump_json(exclude_none=True))

@@ -133,7 +133,7 @@ def certify(
     from gne_mj.theory import report_text, search_epsilon, search_period, search_push
 
     with telling(PREPARING, quiet=as_json):
-        loaded = load_scenario(source, settings(set_))
+        loaded = load_scenario(source, settings(set_)).without_interventions("certificates")
         systems, moved = loaded.inside_systems()
     reports = {}
     for system in systems:
@@ -302,7 +302,7 @@ def map_(
 
     if out is not None:
         need("plots", "the figure of a map")
-    loaded = load_scenario(source, settings(set_))
+    loaded = load_scenario(source, settings(set_)).without_interventions("maps")
     name = loaded.name_of(system)
     grid = mapping.Grid(
         periods=tuple(meaning("periods", parse_path, periods)),

@@ -75,10 +75,14 @@ def simulate(
 
 
 def keep(trajectory: "Trajectory", folder: Path) -> None:
-    """Write what a run leaves: the trajectory and its report."""
+    """Write what a run leaves: the trajectory, its report, and how to do again what was done."""
     trajectory.save(folder / "trajectory.zarr")
     report = json.dumps(trajectory.report(), indent=2)
     (folder / "report.json").write_text(report + "\n", encoding="utf-8")
+    if trajectory.interventions:
+        from gne_mj.scenario import scenario_of
+
+        (folder / "scenario.toml").write_text(scenario_of(trajectory).toml(), encoding="utf-8")
 
 
 def is_batch(folder: Path) -> bool:

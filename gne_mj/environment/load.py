@@ -42,7 +42,7 @@ def load_environment(
     >>> timestep = environment.step(np.zeros(environment.action_spec().shape))
     """
     with named(source="scenario"):
-        loaded = load_scenario(scenario, changes)
+        loaded = load_scenario(scenario, changes).without_interventions("environments")
     name = loaded.name_of(system)
     built = loaded.systems[name].build(name, loaded.simulation)
     with loaded.naming(name):

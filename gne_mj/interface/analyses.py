@@ -66,6 +66,8 @@ def certify(
     Raises:
         InvalidInput: no start inside was found, or matrices would fill the memory.
     """
+    if not isinstance(source, Run | System):
+        source = load_scenario(source).without_interventions("certificates")
     found, own = _system(source, system)
     return examine(found, clock or own)
 

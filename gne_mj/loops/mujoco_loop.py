@@ -113,6 +113,10 @@ class MujocoLoop(ClosedLoop):
             )
         self.plant.data.qfrc_applied[at[at >= 0]] = force[at >= 0]
 
+    def push_unit(self, channel: int) -> str:
+        """See the base class."""
+        return self.plant.push_unit(channel)
+
     def _recorder(self, rows: int, every: int) -> Recorder:
         """Room for rows from now on, made known to the callbacks."""
         agents, userdata = self.plant.agents, self.plant.data.userdata

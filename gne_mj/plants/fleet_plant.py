@@ -53,6 +53,12 @@ class FleetPlant(Plant):
     def output_joints(self) -> NDArray[np.int64]:
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
 
+    def push_unit(self, channel: int) -> str:
+        """What forces at an output's joint are measured in: N, or N m at a hinge."""
+        joint = int(self.output_joints[channel])
+        kind = self.model.jnt_type[self.model.dof_jntid[joint]] if joint >= 0 else None
+        return "N m" if kind == mujoco.mjtJoint.mjJNT_HINGE else "N"
+
     @property
     @abstractmethod
     def outputs(self) -> list[str]:

@@ -44,24 +44,31 @@ def changed_systems(
     Raises:
         InvalidInput: something else has changed.
     """
+    check_stays(before, after)
+    return [
+        table.build(name, after.simulation, present[name])
+        for name, table in after.systems.items()
+        if table != before.systems[name]
+    ]
+
+
+def check_stays(before: Scenario, after: Scenario) -> None:
+    """Refuse changes of what stays as it is while a simulation goes on."""
     for name in Scenario.model_fields:
         if name != "systems" and getattr(before, name) != getattr(after, name):
             raise InvalidInput(name, "another value", _STAYS)
-    found = []
     for name, table in after.systems.items():
-        old = before.systems[name]
         for part in SystemTable.model_fields:
             if part not in ("game", "barrier", "controller") and (
-                getattr(old, part) != getattr(table, part)
+                getattr(before.systems[name], part) != getattr(table, part)
             ):
-                raise InvalidInput(
-                    f"systems.{name}.{part}",
-                    "another value",
-                    _STAYS,
-                )
-        if table != old:
-            found.append(table.build(name, after.simulation, present[name]))
-    return found
+                raise InvalidInput(f"systems.{name}.{part}", "another value", _STAYS)
+
+
+def whole(scenario: Scenario, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes as JSON has them, by keys from which nothing is left out."""
+    tables: dict[str, Any] = plain(scenario)
+    return {".".join(full_key(tables, key, each)): plain(each) for key, each in changes.items()}
 
 
 def change(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:

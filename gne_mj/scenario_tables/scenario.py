@@ -11,10 +11,12 @@ from pydantic_core import PydanticCustomError
 from gne_mj.errors import InvalidInput, named, nearest, part_of, renaming
 from gne_mj.loops.base import Present
 from gne_mj.scenario_tables.clock import RecordingTable, SimulationTable
+from gne_mj.scenario_tables.interventions import InterventionTable
 from gne_mj.scenario_tables.system import SystemTable
-from gne_mj.simulation import Remade, Simulation
+from gne_mj.simulation import Planned, Remade, Simulation
 from gne_mj.system import Clock, System
 from gne_mj.toml_table import Fills, Table
+from gne_mj.toml_text import toml_text
 
 
 class Scenario(Table):
@@ -30,6 +32,7 @@ class Scenario(Table):
     systems: dict[str, SystemTable] = Field(
         min_length=1, description="by names of letters, digits, '-' and '_'"
     )
+    interventions: list[InterventionTable] = Field([], description="what is done while it runs")
 
     @model_validator(mode="after")
     def _names(self) -> "Scenario":
@@ -74,6 +77,10 @@ class Scenario(Table):
         with renaming(self.key_of), named(system=f"systems.{system}" if system else "system"):
             yield
 
+    def toml(self) -> str:
+        """The text of a file that has this scenario; what is as if left out is left out."""
+        return toml_text(self.model_dump(mode="json", exclude_none=True, exclude_defaults=True))
+
     def clock(self) -> Clock:
         """The shared clock."""
         simulation = self.simulation
@@ -116,16 +123,52 @@ class Scenario(Table):
                 tolerance=self.simulation.tolerance,
                 seed=self.simulation.seed,
                 source=self.model_dump_json(exclude_none=True),
-                remade=self._remade,
+                remade=self.remade,
+                planned=self._planned(systems),
             )
 
-    def _remade(
+    def remade(
         self, changes: Mapping[str, Any], present: Mapping[str, Present]
-    ) -> tuple[list[System], Remade]:
-        from gne_mj.scenario_tables.changes import changed, changed_systems
+    ) -> tuple[list[System], dict[str, Any], Remade]:
+        """Systems as they go on with changed keys, see :class:`gne_mj.simulation.Remade`."""
+        from gne_mj.scenario_tables.changes import changed, changed_systems, whole
 
         scenario = changed(self, changes)
-        return changed_systems(self, scenario, present), scenario._remade
+        systems = changed_systems(self, scenario, present)
+        return systems, whole(self, changes), scenario.remade
+
+    def _planned(self, systems: list[System]) -> list[Planned]:
+        """What is done while it runs, of which all is refused now that can be."""
+        from gne_mj.scenario_tables.changes import changed, check_stays
+
+        scenario, found = self, []
+        for number, table in enumerate(self.interventions):
+            key = f"interventions.{number}"
+            if table.push is not None:
+                with part_of(f"{key}.push"):
+                    name = self.name_of(table.push.system)
+                    act = table.push.build(next(each for each in systems if each.name == name))
+            else:
+                with part_of(f"{key}.changes"):
+                    after = changed(scenario, table.changes)
+                    check_stays(scenario, after)
+                scenario, act = after, table.change(key)
+            found.append(Planned(table.time, act))
+        return found
+
+    def without_interventions(self, what: str) -> "Scenario":
+        """This one, where interventions would be left out and are refused.
+
+        Raises:
+            InvalidInput: there are some, and ``what`` (in words, in plural) know none.
+        """
+        if self.interventions:
+            raise InvalidInput(
+                "interventions",
+                f"{len(self.interventions)} of them",
+                f"{what} know none: leave them out (--set interventions=[])",
+            )
+        return self
 
 
 def _kind(table: Table) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from gne_mj.scenario import Scenario
@@ -114,10 +113,9 @@ def _push_unit(shown_system: ShownSystem) -> str:
     """Of forces at the outputs' joints."""
     assert shown_system.fleet is not None
     plant = shown_system.fleet.plant
-    joints = plant.output_joints[plant.output_joints >= 0]
-    kinds = plant.model.jnt_type[plant.model.dof_jntid[joints]]
-    hinges = kinds == mujoco.mjtJoint.mjJNT_HINGE
-    return "N m" if np.all(hinges) and len(hinges) else "N or N m" if np.any(hinges) else "N"
+    channels = np.flatnonzero(plant.output_joints >= 0).tolist()
+    units = sorted({plant.push_unit(channel) for channel in channels})
+    return " or ".join(units) or "N"
 
 
 def _positive(key: str, label: str, system: str, unit: str, value: float) -> Control:

@@ -34,7 +34,7 @@ def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
         InvalidInput: it holds no scenario, or the robots' own files are gone. Its game and law need
             not be there.
     """
-    source = trajectory.tree.attrs["scenario"]
+    source = trajectory.source
     if not source:
         raise InvalidInput(
             "trajectory", "of no scenario", "robots are drawn from the scenario that it must hold"

@@ -14,7 +14,7 @@ from meshcat import Visualizer
 
 from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, part_of
-from gne_mj.scenario import Scenario, load_scenario
+from gne_mj.scenario import Scenario, as_done, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System, mode_of
 from gne_mj.trajectory import Trajectory
@@ -161,9 +161,19 @@ class Session:
         left = simulation.clock.steps(simulation.clock.duration - simulation.time)
         steps = min(steps, left)
         if steps > 0:
-            started = real_time.perf_counter()
+            started, done = real_time.perf_counter(), len(simulation.interventions)
             simulation.advance(steps)
             self._pacer.took(steps, real_time.perf_counter() - started)
+            if len(simulation.interventions) > done:
+                self._follow(simulation.interventions[done:])
+
+    def _follow(self, planned: list[dict[str, Any]]) -> None:
+        """Let sliders and later changes know what the scenario itself did."""
+        for done in planned:
+            self._scenario = load_scenario(self._scenario, done.get("keys"))
+        self._values = {control.key: control.value for control in controls_of(self._scenario)}
+        self.server.tell({"kind": "controls", "values": self._values})
+        self._tell_interventions()
 
     def _look(self, wait: float) -> None:
         """Do what browsers ask for, waiting so long (s) for the first of them."""
@@ -209,6 +219,9 @@ class Session:
                 self._set(message.get("key"), message.get("value"))
             case "push":
                 self._push(message)
+            case "scenario":
+                scenario = as_done(self.simulation.source, self.simulation.interventions)
+                self.server.tell({"kind": "scenario", "text": scenario.toml()}, browser)
             case other:
                 raise InvalidInput("do", other, "the page asks for what this version does not know")
 
@@ -259,7 +272,10 @@ class Session:
             with scenario.naming(control.system), part_of("system", *own):
                 system = _changed(run, scenario, control, value)
                 self._try(system, control, value)
-                self.simulation.change(system, what, key=control.key, value=value)
+                self.simulation.change(
+                    system, what, remade=scenario.remade, key=control.key, value=value,
+                    keys={changed: given},
+                )  # fmt: skip
             self._tell_interventions()
         else:
             self._notice("This holds from the next start on: its run has ended.", level="info")

@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from gne_mj.controllers.table import DiscTable, EventTable, SwitchingTable
 from gne_mj.registry import TIMES, Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
+from gne_mj.scenario_tables.interventions import InterventionTable, PushTable
 from gne_mj.toml_table import Table, Unit
 
 PAGE = Path(__file__).parents[2] / "docs" / "keys.md"
@@ -36,6 +37,11 @@ A table without `information` is of full information.
 """
 
 
+INTERVENTIONS = """What is [done while it runs](view.md#keep-it), each of either changes or a push:
+`changes = {"barrier.rho" = 0.02}`, `push = {agent = 2, force = 5.0, duration = 0.2}`.
+"""
+
+
 TIME = """In the place of any number of a game, those within lists and of `parameters` too
 ([moving problems](moving-problems.md)):
 `reference_velocity = {type = "ramp", from = 3.0, to = 5.0, start = 1.0, rate = 0.5}`.
@@ -48,6 +54,8 @@ def page() -> str:
     parts = [HEAD, "## The whole file\n", _rows(Scenario)]
     for name in ("simulation", "recording"):
         parts += [f"## `[{name}]`\n", _rows(_table_of(Scenario.model_fields[name]))]
+    parts += ["## `[[interventions]]`\n", INTERVENTIONS, _rows(InterventionTable)]
+    parts += ["`push` has\n", _rows(PushTable)]
     parts += ["## `[systems.NAME]`\n", _rows(SystemTable)]
     for name, field in SystemTable.model_fields.items():
         parts += [f"## {TITLES.get(name, f'`[systems.NAME.{name}]`')}\n"]
