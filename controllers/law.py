@@ -94,6 +94,8 @@ class Law(ABC):
         guarded: whether the barrier's whole gradient at the measured outputs is part of the input,
             so that outputs which are measured and driven as they should be cannot leave the set in
             continuous time, whatever the agents do.
+        acts_outside: whether the law has an action where constraints are violated, as one without
+            a barrier: with ``simulation.on_exit = "continue"`` its runs go on there.
     """
 
     information: ClassVar[str] = "custom"
@@ -111,6 +113,7 @@ class Law(ABC):
     kept: Kept | None = None
     propagates: bool = True
     guarded: ClassVar[bool] = False
+    acts_outside: ClassVar[bool] = False
 
     @property
     def theorem(self) -> LawTheorem | None:
@@ -179,6 +182,7 @@ class Law(ABC):
         numbers[settings.LINKS] = 0.0
         numbers[settings.OBSERVER] = 0.0
         numbers[settings.GUARDED] = float(self.guarded)
+        numbers[settings.OUTSIDE] = settings.ENDS if self.acts_outside else settings.NO_ACTION
         return numbers
 
     def initial_memory(

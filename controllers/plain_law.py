@@ -7,7 +7,7 @@ The functions get NumPy arrays and the game as a Python object, and run in every
 import sys
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -102,6 +102,12 @@ class PlainLaw(Law):
                 self._memory, f"it must return one row of numbers, not shape {memory.shape}"
             )
         return memory.copy()
+
+
+class PlainLawOutside(PlainLaw):
+    """The same, of functions that also know what to do where constraints are violated."""
+
+    acts_outside: ClassVar[bool] = True
 
 
 def _name(function: Callable[..., Any]) -> str:

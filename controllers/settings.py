@@ -12,7 +12,11 @@ LINKS = 6  # where in the memory what was last heard over each link begins; 0: r
 GUARDED = 7  # 1: the whole barrier is at measured outputs, which hence stay inside
 FAST_WEIGHT = 8  # omega of W = V + omega V_fast, under the fully distributed law
 OBSERVER = 9  # gain of the observer of loads, mode implicit; 0: there is none
-COUNT = 10
+OUTSIDE = 10  # what a law does outside the set, one of the following
+COUNT = 11
+
+# It has no action there; it has one, but the run ends; it has one, and the run goes on
+NO_ACTION, ENDS, GOES_ON = 0.0, 1.0, 2.0
 
 
 class Now(Numbers):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import kept_apart, run_metrics, signals
+from gne_mj import kept_apart, outside, run_metrics, signals
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plants.agent_type import followed_position
@@ -88,6 +88,21 @@ class Runs:
             np.abs(self.y - self.system.equilibria(self.time)), axis=2
         )
         return greatest
+
+    @cached_property
+    def from_variational(self) -> NDArray[np.float64]:
+        """(runs, rows) max |y - y_v| to the variational equilibrium; not a number where that is not
+        known, and of games that move."""
+        found = self.system.variational
+        if found is None:
+            return np.full(self.y.shape[:2], np.nan)
+        greatest: NDArray[np.float64] = np.max(np.abs(self.y - found.action), axis=2)
+        return greatest
+
+    @cached_property
+    def outside(self) -> outside.Outside:
+        """How far, how often and how long outside the set."""
+        return outside.seen(self.system.game, self.monitors)
 
     @cached_property
     def worst(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -221,6 +236,27 @@ JUDGED = (
         long_name="least -g of each constraint",
     ),
     Variable(
+        "largest_violation", ("run",), lambda runs: runs.outside.largest,
+        long_name="greatest g over constraints and integration steps, 0 if none was positive",
+    ),
+    Variable(
+        "violation_of_bound", ("run",), lambda runs: runs.outside.of_bound,
+        long_name="the same as part of the bound",
+    ),
+    Variable("exits", ("run",), lambda runs: runs.outside.exits, long_name="how often it left"),
+    Variable(
+        "time_outside", ("run",), lambda runs: runs.outside.duration, unit="s",
+        long_name="outside the set, in all, of runs that go on there",
+    ),
+    Variable(
+        "violation_integral", ("run",), lambda runs: runs.outside.integral,
+        long_name="integral of the greatest g over the time outside",
+    ),
+    Variable(
+        "last_outside", ("run",), lambda runs: runs.outside.until, unit="s",
+        long_name="when it was outside last",
+    ),
+    Variable(
         "settling_time", ("run",), lambda runs: run_metrics.settling_time(runs.time, runs.distance),
         unit="s", long_name="until max |y - y*| stays within 2% of its start",
         panel=Panel("settling time", log=False, worst="max"),
@@ -238,6 +274,15 @@ JUDGED = (
             Column("final_error_median", "", _middle),
             Column("final_error_max", "final error", lambda values: values.max()),
         ),
+    ),
+    Variable(
+        "settling_time_to_variational", ("run",),
+        lambda runs: run_metrics.settling_time(runs.time, runs.from_variational), unit="s",
+        long_name="until max |y - y_v| to the variational equilibrium stays within 2% of its start",
+    ),
+    Variable(
+        "final_error_to_variational", ("run",), lambda runs: runs.from_variational[:, -1],
+        unit=lambda system: system.game.action_unit, long_name="max |y - y_v| at the end",
     ),
     Variable(
         "end_time", ("run",), lambda runs: _where(~runs.left, runs.seen("time")), unit="s"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import exits, kept_apart, monitored, run_metrics, tracking
+from gne_mj import exits, kept_apart, monitored, outside, run_metrics, tracking
 from gne_mj.epsilon import epsilon_bounds
-from gne_mj.equilibrium import measured_epsilon, variational_equilibrium
+from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
 from gne_mj.margins import of_the_set
@@ -32,9 +32,10 @@ class Certificate:
         worst_constraint: the least margin -g over all constraints and integration steps, and
             ``each`` constraint's own.
         worst_gap: for games of bounded gaps, the gap that used most of its bound.
-        equilibrium: penalised and variational, and how far from them the run ended; of a game that
-            moves those of the end, as is epsilon, and settling and ``converged`` are of the
-            distance to y*(t).
+        outside: how far, how often and how long outside the set (:func:`gne_mj.outside.report`).
+        equilibrium: penalised and variational, how far from them the run ended, and when it settled
+            to the variational one as ``settling_time`` has it; of a game that moves those of the
+            end, as is epsilon, and settling and ``converged`` are of the distance to y*(t).
         tracking: of games or penalties that move, the distance to y*(t) beside its bound
             (:func:`gne_mj.tracking.report`); None of others.
         epsilon: what agents could gain at the penalised equilibrium, against
@@ -57,21 +58,24 @@ class Certificate:
             equilibrium; None of others.
         network: of a graph that changes: how often it did (``changes``), and for how long it was
             not connected (``disconnected``, s); None of others.
-        messages: where agents send by triggers: how many came over links (``sent``), and how many
-            would have if all sent once a control period (``periodic``), and what is proven of
-            the triggers (``triggers``, see :mod:`gne_mj.theory.triggers`); None of others.
+        messages: in the held modes, under laws with a graph that stays: how many were sent over
+            links (``sent``), and how many are if all send once a control period (``periodic``);
+            where agents send by triggers what is proven of these besides (``triggers``, see
+            :mod:`gne_mj.theory.triggers`); None of others.
         exit: where the run left, the law and the input that led there; None if it did not.
         of_modes: each mode's section (:meth:`gne_mj.system.modes.Mode.report`) by its name, None in
             other modes: ``division``, of mode continuous with a fixed step, and ``implicit``, of
             how many periods of which (``covered``) the promise for control instants speaks.
         steps, end_time, wall_time: integration steps taken, pieces of divided ones counted;
             simulated and real time.
+        step_time: real time that a step took; None if there was none.
     """
 
     status: str
     message: str
     worst_constraint: dict[str, Any] | None
     worst_gap: dict[str, Any] | None
+    outside: dict[str, Any]
     equilibrium: dict[str, Any]
     tracking: dict[str, Any] | None
     epsilon: dict[str, Any]
@@ -89,6 +93,7 @@ class Certificate:
     steps: int
     end_time: float
     wall_time: float
+    step_time: float | None
 
     @property
     def holds(self) -> bool:
@@ -143,7 +148,8 @@ def certify_run(
         message=message,
         worst_constraint=monitored.worst_constraint(system, monitor),
         worst_gap=monitored.worst_gap(system, monitor),
-        equilibrium=_equilibrium(system, action[-1], time[-1]),
+        outside=outside.report(system.game, monitor, system.goes_on),
+        equilibrium=_equilibrium(system, action, time),
         tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
         epsilon=_epsilon(system, time[-1]),
         settling_time=None if np.isnan(settled) else float(settled),
@@ -154,12 +160,13 @@ def certify_run(
         between=monitored.between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
         network=network,
-        messages=_messages(system, monitor),
+        messages=_messages(system, monitor, clock),
         exit=exits.exit_report(system, monitor),
         of_modes=_of_modes(system, monitor),
         steps=int(monitor.steps),
         end_time=float(time[-1]),
         wall_time=wall_time,
+        step_time=wall_time / float(monitor.steps) if monitor.steps > 0 else None,
     )
 
 
@@ -208,10 +215,13 @@ def _status(
     interrupted: bool,
 ) -> tuple[str, str]:
     if monitor.exit != watch.INSIDE:
-        return exits.exit_status(system, monitor)
+        name, sentence = exits.exit_status(system, monitor)
+        return name, sentence + exits.certified_until(system, monitor)
     end = float(time[-1])
     if interrupted:
         return "interrupted", f"stopped by the user at {end:g} s of {duration:g} s"
+    if monitor.exits > 0:
+        return run_metrics.WENT_OUTSIDE, outside.sentence(system.game, monitor, end)
     (tail,) = run_metrics.tail_distance(time, distance[None], duration)
     (word,) = run_metrics.status(watch.together([monitor]), np.array([tail]), tolerance)
     moves = motion_of(system.game) is not None
@@ -253,12 +263,14 @@ def _spoilt(monitor: Any, intervened: bool) -> str:
     return "some inputs were not accurate" if monitor.unsolved else ""
 
 
-def _equilibrium(system: System, last: NDArray[np.float64], end: float) -> dict[str, Any]:
-    penalised = system.equilibrium_at(end)
+def _equilibrium(
+    system: System, action: NDArray[np.float64], time: NDArray[np.float64]
+) -> dict[str, Any]:
+    penalised, last = system.equilibrium_at(time[-1]), action[-1]
     if penalised is None:
         keys = (
             "penalised", "multipliers", "residual", "final_distance", "variational",
-            "final_distance_to_variational",
+            "final_distance_to_variational", "settling_time_to_variational",
         )  # fmt: skip
         return dict.fromkeys(keys)
     result: dict[str, Any] = {
@@ -267,13 +279,25 @@ def _equilibrium(system: System, last: NDArray[np.float64], end: float) -> dict[
         "residual": penalised.residual,
         "final_distance": float(np.max(np.abs(last - penalised.action))),
     }
-    try:
-        variational = variational_equilibrium(of_the_set(system.game_at(end)), penalised)
-        result["variational"] = variational.action.tolist()
-        result["final_distance_to_variational"] = float(np.max(np.abs(last - variational.action)))
-    except SolverError:
-        result["variational"] = result["final_distance_to_variational"] = None
+    still = motion_of(system.game) is None
+    variational = system.variational if still else _variational_at(system, penalised, time[-1])
+    known = variational is not None
+    y = variational.action if variational is not None else np.full(len(last), np.nan)
+    distance = np.max(np.abs(action - y), axis=1)
+    (settled,) = run_metrics.settling_time(time, distance[None])
+    result["variational"] = y.tolist() if known else None
+    result["final_distance_to_variational"] = float(distance[-1]) if known else None
+    settles = still and known and not np.isnan(settled)
+    result["settling_time_to_variational"] = float(settled) if settles else None
     return result
+
+
+def _variational_at(system: System, penalised: Equilibrium, time: float) -> Equilibrium | None:
+    """Of a game that moves, that of a time in s; None where none was found."""
+    try:
+        return variational_equilibrium(of_the_set(system.game_at(time)), penalised)
+    except SolverError:
+        return None
 
 
 def _epsilon(system: System, end: float) -> dict[str, Any]:
@@ -288,10 +312,11 @@ def _epsilon(system: System, end: float) -> dict[str, Any]:
     }
 
 
-def _messages(system: System, monitor: Any) -> dict[str, Any] | None:
-    seen, triggers = monitored.messages(system, monitor), Theorem(system).triggers
+def _messages(system: System, monitor: Any, clock: Clock | None) -> dict[str, Any] | None:
+    seen = monitored.messages(system, monitor, clock)
+    triggers = None if seen is None else Theorem(system).triggers
     if seen is None or triggers is None:
-        return None
+        return seen
     return {**seen, "triggers": triggers.report()}
 
 

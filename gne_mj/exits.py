@@ -9,6 +9,7 @@ from gne_mj.loops import monitor as watch
 from gne_mj.loops.division import PIECES
 from gne_mj.run_metrics import EXITS
 from gne_mj.system import System
+from gne_mj.system.data import CONTINUE
 
 
 def exit_status(system: System, monitor: Any) -> tuple[str, str]:
@@ -75,6 +76,16 @@ def _without_action(system: System, agent: int, constraint: str, at: str, value:
         f"agent {agent + 1}'s estimates violated constraint '{constraint}' {at}: g = {value:.6g},"
         " not negative, so its law has no action there (a smaller epsilon or gain keeps estimates"
         " closer to the actions)"
+    )
+
+
+def certified_until(system: System, monitor: Any) -> str:
+    """What is added where a run was to go on, but its law has no action outside."""
+    if system.on_exit != CONTINUE or system.goes_on:
+        return ""
+    return (
+        f"; what is certified is certified until then, {monitor.exit_time:.6g} s: the law has no"
+        " action outside, with which the run could go on"
     )
 
 

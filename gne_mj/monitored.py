@@ -5,17 +5,19 @@ What it returns are plain numbers for JSON, as :class:`gne_mj.certificate.Certif
 them; times in s.
 """
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import run_metrics
+from gne_mj.changing_graph import ChangingGraph
 from gne_mj.faults import triggered
 from gne_mj.loops import monitor as watch
 from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position
-from gne_mj.system import System
+from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.first_input import limits_at
 
 
@@ -92,16 +94,19 @@ def contacts(system: System, monitor: Any) -> dict[str, Any] | None:
     }
 
 
-def messages(system: System, monitor: Any) -> dict[str, Any] | None:
+def messages(system: System, monitor: Any, clock: Clock | None) -> dict[str, Any] | None:
     """What agents sent, and would have sent once a control period."""
-    if not triggered(system.faults):
+    graph = system.law.graph
+    if graph is None or isinstance(graph, ChangingGraph) or not mode_of(system).held:
         return None
-    assert system.law.graph is not None
-    links = 2 * len(system.law.graph.edges)
-    return {
-        "sent": int(monitor.messages),
-        "periodic": links * int(monitor.message_instants),
-    }
+    links = 2 * len(graph.edges)
+    if triggered(system.faults):
+        periodic = links * int(monitor.message_instants)
+        return {"sent": int(monitor.messages), "periodic": periodic}
+    if clock is None:
+        return None
+    periods = math.ceil(clock.steps(float(monitor.time)) / clock.steps(clock.control_period))
+    return {"sent": links * periods, "periodic": links * periods}
 
 
 def between(system: System, monitor: Any) -> dict[str, Any] | None:

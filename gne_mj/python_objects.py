@@ -68,6 +68,7 @@ class LawFunctions:
     """A law as plain functions (:class:`gne_mj.controllers.plain_law.PlainLaw`), for any game."""
 
     functions: Mapping[str, Callable[..., Any]]
+    acts_outside: bool = False
 
 
 @GAMES.register
@@ -113,5 +114,6 @@ class PythonLaw(NetworkTable):
         functions = made.functions
         name = getattr(functions["action"], "__name__", "law")
         return plain_law(
-            game, self.network(game.agents), functions, self.parameters, "object", name
-        )
+            game, self.network(game.agents), functions, self.parameters, ("object", name),
+            acts_outside=made.acts_outside,
+        )  # fmt: skip

@@ -13,6 +13,7 @@ from gne_mj.game_model import Game
 from gne_mj.loops import monitor as watch
 
 SUCCESSES = ("converged", "completed")
+WENT_OUTSIDE = "went_outside"  # of runs that go on where they leave, and have come to their end
 EXITS = {
     watch.LEFT_SET: "left_feasible_set",
     watch.ESTIMATE_LEFT: "estimate_left_feasible_set",
@@ -46,6 +47,7 @@ def status(monitors: Any, tail: NDArray[np.float64], tolerance: float) -> NDArra
         tolerance: of ``converged``.
     """
     found = np.where(tail <= tolerance, "converged", "completed").astype(STATUS)
+    found[monitors.exits > 0] = WENT_OUTSIDE
     for code, name in EXITS.items():
         found[monitors.exit == code] = name
     return found

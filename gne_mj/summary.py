@@ -16,6 +16,9 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
         f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
     }
+    seen = report.get("outside")  # which older results do not have
+    if seen is not None and seen["goes_on"] and seen["exits"]:
+        rows["outside"] = _outside(seen)
     if report["positions"] is not None:
         seen = report["positions"]
         rows["positions"] = (
@@ -51,6 +54,16 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
     return rows
 
 
+def _outside(seen: dict[str, Any]) -> str:
+    part = "" if seen["of_bound"] is None else f" ({100.0 * seen['of_bound']:.3g}% of the bound)"
+    text = f"by up to g = {seen['largest']:.6g}{part}, constraint '{seen['constraint']}'"
+    last = "still at the end" if seen["at_end"] else f"back inside after {seen['until']:.6g} s"
+    return (
+        f"{text}, for {seen['duration']:.4g} s in all from {seen['first']:.6g} s on, {last};"
+        f" integral of the violation {seen['integral']:.4g}"
+    )
+
+
 def _between(seen: dict[str, Any]) -> str:
     if not seen["periods_cut"]:
         return "none was cut, all being inside at every step as predicted"
@@ -84,9 +97,11 @@ def _network(seen: dict[str, Any]) -> str:
 
 
 def _messages(seen: dict[str, Any]) -> str:
+    triggers = seen.get("triggers")  # which older results do not have
+    if triggers is None and seen["sent"] == seen["periodic"]:
+        return f"{seen['sent']}, one over each link in every control period"
     share = 100.0 * seen["sent"] / max(seen["periodic"], 1)
     text = f"{seen['sent']}, {share:.3g}% of {seen['periodic']} with one in every control period"
-    triggers = seen.get("triggers")  # which older results do not have
     return text if triggers is None else f"{text}; triggers: {triggers_text(triggers)}"
 
 
@@ -109,9 +124,11 @@ def _convergence(report: dict[str, Any]) -> dict[str, str]:
     away = f"{distances['final_distance']:.3g} to the penalised equilibrium"
     if distances["final_distance_to_variational"] is not None:
         away += f", {distances['final_distance_to_variational']:.3g} to the vGNE"
+    by_variational = distances.get("settling_time_to_variational")
+    about = "" if by_variational is None else f"; to the vGNE {by_variational:.4g} s"
     tracking = report.get("tracking")  # which older results do not have
     return {
-        "settling time": "not settled" if settling is None else f"{settling:.4g} s",
+        "settling time": ("not settled" if settling is None else f"{settling:.4g} s") + about,
         "distance at the end": away,
         "Lyapunov function": "not followed: y* moves"
         if tracking is not None and tracking["game"]

@@ -43,6 +43,7 @@ _ORDER = (
     "bound_moved_past",
     "estimate_left_feasible_set",
     "step_too_small",
+    "went_outside",
     "interrupted",
     "completed",
     "converged",

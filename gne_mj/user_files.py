@@ -6,7 +6,8 @@ its functions are plain ones or all kernels (named in :mod:`gne_mj.game_model`).
 functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho, y, memory)``, and
 for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; or those of one
 agent, ``action(agent)`` and so on (:mod:`gne_mj.controllers.local_law`). All of them take the
-scenario's parameters too, by name. An agent type's file has constants and kernels as
+scenario's parameters too, by name. ``ACTS_OUTSIDE = True`` in the file says that these functions
+have an action outside the set as well. An agent type's file has constants and kernels as
 :mod:`gne_mj.plants.agent_type` lists them.
 """
 
@@ -28,6 +29,7 @@ from gne_mj import game_model
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
 from gne_mj.controllers.local_law import is_local, joined
+from gne_mj.controllers.plain_law import PlainLawOutside
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.errors import USER_MODULES, GneError, InvalidInput, named, raised
 from gne_mj.game_model import Game
@@ -98,7 +100,10 @@ def load_law(path: str | Path, game: Game, graph: Graph, parameters: Mapping[str
         raise InvalidInput("path", str(path), "it must define law(game, graph, ...) or action(...)")
     functions = {name: getattr(module, name) for name in _LAW_FUNCTIONS if hasattr(module, name)}
     with named(rate="path"):
-        return plain_law(game, graph, functions, parameters, "path", Path(path).name)
+        return plain_law(
+            game, graph, functions, parameters, ("path", Path(path).name),
+            acts_outside=bool(getattr(module, "ACTS_OUTSIDE", False)),
+        )  # fmt: skip
 
 
 def plain_law(
@@ -106,8 +111,9 @@ def plain_law(
     graph: Graph,
     functions: Mapping[str, Callable[..., Any]],
     parameters: Mapping[str, Any],
-    key: str,
-    name: str,
+    named_by: tuple[str, str],
+    *,
+    acts_outside: bool = False,
 ) -> PlainLaw:
     """The law of plain functions: ``action`` and, with a memory, ``rate`` and ``initial_memory``.
 
@@ -116,7 +122,8 @@ def plain_law(
         graph: what functions of one agent hear by (:mod:`gne_mj.controllers.local_law`).
         functions: by these names.
         parameters: which all of them take by name, besides their own arguments.
-        key, name: what messages call where they are from, and its name there.
+        named_by: what messages call where they are from, and its name there.
+        acts_outside: whether they have an action outside the set.
 
     Raises:
         InvalidInput: one takes other arguments, or ``rate`` is without ``initial_memory``.
@@ -125,11 +132,12 @@ def plain_law(
     made: dict[str, Callable[..., Any]] = {}
     for each, function in functions.items():
         arguments = (_LOCAL_FUNCTIONS if local else _LAW_FUNCTIONS)[each]
-        check_arguments(key, name, function, each, arguments, parameters)
+        check_arguments(*named_by, function, each, arguments, parameters)
         made[each] = partial(function, **parameters)
     if local:
         made = joined(made, game, graph)
-    return PlainLaw(game, memory=made.pop("initial_memory", None), **made)
+    kind = PlainLawOutside if acts_outside else PlainLaw
+    return kind(game, memory=made.pop("initial_memory", None), **made)
 
 
 def load_agent_type(path: str | Path) -> ModuleType:

@@ -47,6 +47,9 @@ STATE, GAME = robot_state(FIVE), velocity_game(5, 3.0, 3.0)
 DISC = region_of(radius=1.0)
 NETWORK = PartialInformation(graph.ring(5))
 
+# Parameters of a system that the clock's table has
+OF_THE_CLOCK = {"name", "seed", "rtol", "on_exit"}
+
 
 @pytest.fixture(scope="module")
 def system():
@@ -336,7 +339,7 @@ def test_the_key_is_found_by_what_the_tables_declare():
 def test_every_parameter_of_a_system_and_clock_has_a_key():
     """A new one needs a key of its name, or one that says that it fills it."""
     scenario = load_scenario("velocity-sync")
-    for name in set(inspect.signature(System).parameters) - {"name", "seed", "rtol"}:  # the clock's
+    for name in set(inspect.signature(System).parameters) - OF_THE_CLOCK:
         assert scenario.key_of(f"systems.robots.{name}").count(".") >= 2
         assert _found(scenario, f"systems.robots.{name}"), name
     for name in inspect.signature(Clock).parameters:

@@ -121,6 +121,7 @@ def own_law(
     *,
     graph: Network = "ring",
     mode: str = "continuous",
+    acts_outside: bool = False,
     **parameters: Any,
 ) -> LawTable:
     """A law of plain Python functions, for a first try; nothing is claimed of it.
@@ -143,11 +144,15 @@ def own_law(
             **parameters)``, returns the memory at the start.
         graph: over which agents hear each other.
         mode: "continuous"; a law without a memory also "sampled".
+        acts_outside: whether the functions have an action where constraints are violated, so that
+            runs may go on there (``simulation.on_exit``).
         **parameters: numbers and lists, which can be changed and swept as
             ``controller.parameters.NAME``.
     """
     given = {"action": action, "rate": rate, "initial_memory": initial_memory}
     functions = {name: function for name, function in given.items() if function is not None}
-    name = keep(LawFunctions(functions), getattr(action, "__name__", "law"), functions)
+    kept = LawFunctions(functions, acts_outside)
+    also = ("acts outside",) if acts_outside else ()
+    name = keep(kept, getattr(action, "__name__", "law"), functions, *also)
     return made(PythonLaw, information="python", object=name, graph=graph, mode=mode,
                 parameters=parameters)  # fmt: skip

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.settings import GUARDED
+from gne_mj.controllers.settings import GUARDED, OUTSIDE
 from gne_mj.loops import division, faultless, functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.adaptive_step import (
@@ -67,7 +67,8 @@ def try_step(faults, place, parts, vectors, pace, rtol, step):
     lesser_outputs(parts.channels, vectors, work.y, work.profile)
     for k in range(len(work.g)):
         vectors.less[k] = games.constraint(problem.data, k, work.profile)
-    error = weighted_error(rtol, parts, vectors)
+    slacks = len(work.g) if problem.settings[OUTSIDE] == 0.0 else 0  # which a barrier depends on
+    error = weighted_error(rtol, parts, vectors, slacks)
     return error if error < np.inf else np.inf
 
 

@@ -187,7 +187,7 @@ def build(agent: ModuleType, law: ModuleType, game: ModuleType) -> Any:
             for r in range(len(first)):
                 first[r] = where(fresh == LAST_RATE, last[r], first[r])
             good = sound & take_stages(agent, law, game, parts, vectors, scratch.known, pace.length)
-            error = weighted_error(rtol, parts, vectors)
+            error = weighted_error(rtol, parts, vectors, len(parts.work.g))
             error = where(good & (error < np.inf), error, np.inf)
             good = error <= 1.0
             hard = (not good) & ((pace.length <= least) | (not sound))

@@ -92,12 +92,13 @@ def lesser_outputs(channels, vectors, y, out):
 
 
 @kernel
-def weighted_error(rtol, parts, vectors):
+def weighted_error(rtol, parts, vectors, slacks):
     """A step's error, 1 being allowed: the worst of all states and slacks; perhaps not a number.
 
     A state is measured by its greatest magnitude so far in any channel. Near the boundary slacks
-    are what the barrier depends on, so that each is measured by itself. Given the trial state, its
-    error, constraints in work.g and, at the solution of lesser order, in vectors.less.
+    are what the barrier depends on, so that each of so many ``slacks`` is measured by itself. Given
+    the trial state, its error, constraints in work.g and, at the solution of lesser order, in
+    vectors.less.
     """
     work, channels = parts.work, parts.channels
     m, states = channels.equilibrium_state.shape
@@ -108,7 +109,7 @@ def weighted_error(rtol, parts, vectors):
         worst = max(worst, error)
         total += error
     part = min(SLACKS * rtol, MOST_OF_SLACK)
-    for k in range(len(work.g)):
+    for k in range(slacks):
         slack = -work.g[k] - parts.problem.data.tightening[k]
         error = abs(vectors.less[k] - work.g[k]) / (part * slack)
         worst = max(worst, error)

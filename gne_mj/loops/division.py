@@ -24,6 +24,9 @@ actuators do what it asks for, an exit can be the law's own or the integrator's.
 divided on, down to 2^-32 of the step, with as many pieces as a step may have: an exit that is still
 there is the law's own.
 
+A law that acts outside the set has no barrier: its pieces stand whatever becomes of the slacks, and
+steps are divided only where a run that must not go on has left.
+
 Outputs, slacks and (in runs without faults) the law are evaluated at a piece's end to be looked at;
 the next piece begins with them in place of evaluating them again.
 """
@@ -33,7 +36,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.controllers.settings import GUARDED
+from gne_mj.controllers.settings import GUARDED, OUTSIDE
 from gne_mj.lanes import where
 from gne_mj.loops import monitor as watch
 from gne_mj.native import copy, kernel
@@ -207,7 +210,7 @@ def judge(count, h, problem, work):
     division, stages, p = work.division, work.stages, len(work.g)
     division.calm += 1.0
     division.easy = 1.0 if division.calm >= CALM_FOR else 0.0
-    if ordinary(count, problem, work, stages):
+    if ordinary(count, problem, work, stages) or problem.settings[OUTSIDE] > 0.0:
         division.rated = 0.0
         return -1
     finest = division.level >= FINEST

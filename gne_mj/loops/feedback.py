@@ -7,11 +7,12 @@ import numpy as np
 from gne_mj import game_functions as games
 from gne_mj.controllers.kept import EVERYTHING, KeptData
 from gne_mj.controllers.propagation import Propagator, scratch_length
-from gne_mj.controllers.settings import RHO, Now
+from gne_mj.controllers.settings import OUTSIDE, RHO, Now
 from gne_mj.game_model import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
 from gne_mj.loops import monitor as watch
+from gne_mj.loops.outside import goes_on
 from gne_mj.motion import STANDING, Moving
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers
@@ -141,8 +142,9 @@ def work(actions: int, constraints: int, agents: int, sizes: Sizes = NO_SIZES) -
 def inside(problem, time, stage, y, work, monitor):
     """Fill work.g, work.weights and work.now; latch an exit, and return False, if g(y) is not < 0.
 
-    Outputs that are inside, but closer to the boundary than the barrier's tightening, are no exit;
-    the constraint is in work.now.shell, and its weight is of no use.
+    Where runs go on outside, that is noted instead. Outputs that are inside, but closer to the
+    boundary than the barrier's tightening, are no exit; the constraint is in work.now.tightened,
+    and its weight is of no use.
     """
     rho = functions.penalty(problem, time, problem.settings[RHO])
     work.now.penalty = rho
@@ -154,6 +156,8 @@ def inside(problem, time, stage, y, work, monitor):
     for k in range(outside, len(work.g)):
         value = work.g[k]
         if not value < 0.0:
+            if goes_on(problem, time, stage, work, monitor):
+                return True
             code = watch.LEFT_SET if np.isfinite(value) else watch.DIVERGED
             watch.leave(monitor, code, time, -1, k, value, stage)
             return False
@@ -181,7 +185,7 @@ def feedback(problem, time, stage, y, memory, work, monitor, u):
 def explicit_law(problem, time, stage, y, memory, work, monitor):
     """Fill work.commanded by the law at y (m,), weights being given; False: it has no action."""
     tightened = int(work.now.tightened)
-    if tightened >= 0:
+    if tightened >= 0 and problem.settings[OUTSIDE] == 0.0:
         watch.leave(
             monitor, watch.ESTIMATE_LEFT, time, -1, tightened, work.now.tightened_value, stage
         )

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.controllers.settings import OUTSIDE
 from gne_mj.lanes import WIDTH, empty
 from gne_mj.loops import adaptive_lanes, functions, lanes, lanes_held
 from gne_mj.loops import monitor as watch
@@ -45,7 +46,8 @@ def modules_for(
     """The modules of runs whose common steps can be taken in lanes, else None.
 
     That is in mode continuous with Runge-Kutta 4 or adaptive steps, and in mode sampled under laws
-    without memory. A module says that lanes can go through its kernels by ``LANES = True``.
+    without memory; laws that act outside the set go alone. A module says that lanes can go through
+    its kernels by ``LANES = True``.
     """
     modules = Modules(agent, law, game)
     clock, linked = setup.clock, setup.problem.functions
@@ -54,6 +56,7 @@ def modules_for(
         (clock.mode == CONTINUOUS and clock.method in (RK4, TSIT5))
         or (clock.mode == SAMPLED and memory == 0)
     )
+    able = able and setup.problem.settings[OUTSIDE] == 0.0  # lanes look at slacks alone
     able = able and not hasattr(game, "pseudo_gradient")  # whose sums have another order
     return modules if able and not np.any(linked[list(_ELSEWHERE)]) else None
 

@@ -33,6 +33,15 @@ class MonitorNumbers(Numbers):
     saturated_action: float
     saturated_command: float
     exit_between: float  # 1: the exit was not at a control instant
+    # Runs that go on outside the set, see gne_mj.loops.outside
+    exits: float  # how often it went outside
+    outside_first: float  # when first
+    outside_constraint: float  # which one was violated most then
+    outside_value: float  # and its value
+    outside_time: float  # of the last observation outside
+    outside_last: float  # the greatest value of a constraint then
+    outside_for: float  # for how long, in all
+    outside_integral: float  # of the greatest value of a constraint, over that time
     # Mode implicit
     solutions: float  # inputs that were solved for
     solver_steps: float  # of Newton's method, in all

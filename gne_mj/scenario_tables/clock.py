@@ -29,6 +29,11 @@ class SimulationTable(Table):
     tolerance: Annotated[float, Unit(ACTION)] = Field(
         1e-3, gt=0, description="on max |y - y*|, for status converged"
     )
+    on_exit: Literal["stop", "continue"] = Field(
+        "stop",
+        description="what runs do where they leave the set: they end, or, under laws that have an"
+        " action outside, go on; others end all the same",
+    )
     seed: int = Field(0, ge=0, le=2**53, description="of what is random in faults")
 
 

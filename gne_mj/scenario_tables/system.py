@@ -216,6 +216,7 @@ class SystemTable(Table):
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
             rtol=simulation.rtol,
+            on_exit=simulation.on_exit,
         )
         acts = mode_of(system).explicit_period(period, simulation.timestep)
         if schedule is None or self.barrier.floor is not None or acts is None:

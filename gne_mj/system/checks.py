@@ -25,7 +25,7 @@ from gne_mj.motion import motion_of
 from gne_mj.native import INTERPRETED
 from gne_mj.plants import integrator
 from gne_mj.plants.agent_type import has_ode, in_mujoco
-from gne_mj.system.data import ADAPTIVE, SystemData
+from gne_mj.system.data import ADAPTIVE, CONTINUE, STOP, SystemData
 from gne_mj.system.modes import mode_of
 
 # The Rosenbrock loop keeps the estimates' dense eigenbases, N x N x N numbers
@@ -47,6 +47,8 @@ def check_estimates(game: Game, law: Law) -> None:
 def check_parts(system: SystemData) -> None:
     """Refuse parts whose shapes or kinds do not go together."""
     m = system.game.actions
+    if system.on_exit not in (STOP, CONTINUE):
+        raise InvalidInput("on_exit", system.on_exit, f"it must be '{STOP}' or '{CONTINUE}'")
     if system.agents.channels != m:
         raise InvalidInput(
             "agents.count",

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import Law
-from gne_mj.equilibrium import Equilibrium, middle, penalised_equilibrium
+from gne_mj.equilibrium import (
+    Equilibrium,
+    middle,
+    penalised_equilibrium,
+    variational_equilibrium,
+)
 from gne_mj.equilibrium_path import EquilibriumPath
 from gne_mj.errors import SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
@@ -25,7 +30,7 @@ from gne_mj.loops import (
     standing,
 )
 from gne_mj.loops import faults as native_faults
-from gne_mj.margins import Disturbance
+from gne_mj.margins import Disturbance, of_the_set
 from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position, placed_state
 from gne_mj.plants.agents import Agents
@@ -35,6 +40,8 @@ ADAPTIVE = ("tsit5", "rosenbrock")  # integrators that choose their steps
 # What is done between two control instants: every step is watched; or a period that would lead
 # outside is cut before it begins
 WATCHED, GUARDED = "watched", "guarded"
+# What a run does where it leaves the set: it ends, or goes on if its law has an action there
+STOP, CONTINUE = "stop", "continue"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +69,18 @@ class SystemData:
     rtol: float = 1e-6
     observer: float = 0.0
     load: NDArray[np.float64] | None = None
+    on_exit: str = STOP
     barrier: LogBarrier = field(init=False)
 
     @property
     def guarded(self) -> bool:
         """Whether control periods end early where they would lead outside."""
         return self.between == GUARDED
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether runs go on where they leave the set."""
+        return self.on_exit == CONTINUE and self.law.acts_outside
 
     @property
     def start(self) -> NDArray[np.float64]:
@@ -127,6 +140,18 @@ class SystemData:
                 return penalised_equilibrium(self.game, self.rho, middle(self.game, self.start))
             except SolverError as error:
                 return error
+
+    @cached_property
+    def variational(self) -> Equilibrium | None:
+        """The variational equilibrium of the set itself, whatever keeps farther away from it; None
+        where none was found, and of a game that moves."""
+        known = self.known_equilibrium
+        if known is None or motion_of(self.game) is not None:
+            return None
+        try:
+            return variational_equilibrium(of_the_set(self.game), known)
+        except SolverError:
+            return None
 
     @property
     def fault_kernels(self) -> ModuleType:

@@ -36,6 +36,11 @@ def check_guard(system: SystemData) -> None:
     if not MODES[system.mode].guards:
         names = " and ".join(f"'{mode.name}'" for mode in MODES if mode.guards)
         raise InvalidInput(key, value, f"it cuts control periods, and is for modes {names}")
+    if system.law.acts_outside:
+        raise InvalidInput(
+            key, value, "it looks ahead for what a barrier keeps inside, and this law acts outside"
+            " too: leave it out",
+        )  # fmt: skip
     if system.law.alone:
         raise InvalidInput(
             key, value, "under this law agents do not know each other's outputs, which looking"

@@ -46,6 +46,8 @@ class System(Assembly):
         observer: mode implicit: gain of each agent's observer of loads (:mod:`gne_mj.loops.loads`),
             0 for none.
         load: (m,) the loads that are known at the start, in the input's unit; 0 if left out.
+        on_exit: "stop", or "continue": under a law that acts outside the set (``acts_outside``)
+            runs go on there, and what they do is measured; under others they end as ever.
 
     Raises:
         InvalidInput: parts that do not fit together.
