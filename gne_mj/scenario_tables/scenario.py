@@ -79,7 +79,11 @@ class Scenario(Table):
 
     def toml(self) -> str:
         """The text of a file that has this scenario; what is as if left out is left out."""
-        return toml_text(self.model_dump(mode="json", exclude_none=True, exclude_defaults=True))
+        tables = self.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+        for name, system in self.systems.items():
+            # whole: a number that moves is not as if left out, whatever it is at time 0
+            tables["systems"][name]["game"] = system.game.model_dump(mode="json", exclude_none=True)
+        return toml_text(tables)
 
     def clock(self) -> Clock:
         """The shared clock."""
