@@ -1,10 +1,10 @@
 """Primal-dual gradient play: each agent descends its Lagrangian, all share the multipliers.
 
-u = -k (F(y) + J_g(y)^T l) and l' = kappa [g(y)]^+_l, where [a]^+_l is a, but not negative where
-l = 0; constraints that belong to some agents alone are priced for these only. Of integrators it is
-the flow of Arrow, Hurwicz and Uzawa (Studies in Linear and Non-Linear Programming, 1958),
-with F for the gradient: Rosen's weights being equal, its equilibria are the variational ones
-(Existence and uniqueness of equilibrium points for concave N-person games, Econometrica 33, 1965).
+u = -k (F(y) + J_g(y)^T l) and l' = kappa [g(y)]^+_l, where [a]^+_l is a, but not negative where l =
+0; constraints that belong to some agents alone are priced for these only. Of integrators it is the
+flow of Arrow, Hurwicz and Uzawa (Studies in Linear and Non-Linear Programming, 1958), with F for
+the gradient: Rosen's weights being equal, its equilibria are the variational ones (Existence and
+uniqueness of equilibrium points for concave N-person games, Econometrica 33, 1965).
 
 |y - y*|^2 / k + |l - l*|^2 / kappa does not rise where F is monotone and g convex, and y tends to
 the only variational equilibrium where F is strictly monotone; storage functions add up, so that the

@@ -5,26 +5,36 @@ import pytest
 from builders import clock, integrators
 from random_games import RandomGame
 
-from gne_mj.controllers import PrimalDual
+from gne_mj.controllers import (
+    FeedbackSeeking,
+    L1Penalty,
+    PrimalDual,
+    QuadraticPenalty,
+    RecursiveSafeFlow,
+)
+from gne_mj.equilibrium import variational_equilibrium
+from gne_mj.errors import InvalidInput
 from gne_mj.loops import functions
 from gne_mj.loops.feedback import Problem, work
 from gne_mj.loops.layout import LoopClock, Setup, problem_and_parameter_block
 from gne_mj.loops.link import link
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.plants.functions import EULER
+from gne_mj.registry import LAWS
 from gne_mj.system import System
 from gne_mj.theory import certify
 
 H = 0.02
+GAMES = pytest.mark.parametrize("curved", [False, True])
 
 
-def ask(game, law, y, memory, *, held=False):
+def ask(game, law, y, memory, *, held=False, limit=np.inf):
     """u and the memory's rate (``held``: the memory a period of H later) by compiled kernels."""
     addresses = link(law.kernels, game.kernels, memory=len(memory) > 0, held=held)
     move = law.propagator if held else law.step_propagator
     m, p = game.actions, game.constraints_count
     problem = Problem(
-        game.data, law.graph_data, law.settings(0.1), np.full(m, np.inf), np.zeros(m), move(H),
+        game.data, law.graph_data, law.settings(0.1), np.full(m, limit), np.zeros(m), move(H),
         functions=addresses,
     )  # fmt: skip
     setup = Setup(problem, np.zeros((m, 1)), LoopClock(H, 1, CONTINUOUS, EULER))
@@ -39,11 +49,37 @@ def ask(game, law, y, memory, *, held=False):
     return u, out
 
 
+def at_the_end(made, law, *, h=H, duration=60.0, **options):
+    """Outputs and memory of integrators that begin at 0, at the end of a run."""
+    game = made.game
+    system = System(
+        "s",
+        game,
+        integrators(game.actions),
+        law,
+        0.1,
+        np.zeros((game.actions, 1)),
+        on_exit="continue",
+        **options,
+    )
+    loop = system.closed_loop(clock(h, duration))
+    loop.advance(1, round(duration / h))
+    now = loop.present()
+    return now.state[:, 0], now.memory
+
+
+def kkt_residual(made, y, multipliers):
+    """The greatest of |F + J^T l|, g^+ and |l g|."""
+    g = made.g(y)
+    found = made.F(y) + made.J(y).T @ multipliers, np.maximum(g, 0.0), multipliers * g
+    return max(np.max(np.abs(each)) for each in found)
+
+
 def projected(value, multiplier):
     return np.maximum(value, -multiplier / H)
 
 
-@pytest.mark.parametrize("curved", [False, True])
+@GAMES
 def test_primal_dual_play_is_its_formula(curved):
     law = PrimalDual(3, gain=1.7, dual_gain=0.6)
     for seed in range(10):
@@ -55,6 +91,144 @@ def test_primal_dual_play_is_its_formula(curved):
         _, moved = ask(made.game, law, y, l, held=True)
         expected = np.maximum(l + H * 0.6 * made.g(y), 0.0)
         np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
+
+
+def drawn(seed, curved, spread=1.5):
+    """A game, a profile inside or outside, and multipliers, some of them zero."""
+    made, rng = RandomGame(seed, curved=curved), np.random.default_rng(seed)
+    return made, spread * rng.normal(size=3), rng.uniform(0.0, 2.0, 3) * rng.integers(0, 2, 3)
+
+
+@GAMES
+def test_penalties_are_their_formulas(curved):
+    exact = L1Penalty(gain=1.7, strength=3.0, width=0.4)
+    for seed in range(10):
+        made, y, _ = drawn(seed, curved)
+        beyond = np.maximum(made.g(y), 0.0)
+        price = 3.0 * np.minimum(beyond / 0.4, 1.0)
+        u, _ = ask(made.game, exact, y, np.zeros(0))
+        np.testing.assert_allclose(u, -1.7 * (made.F(y) + made.J(y).T @ price), atol=1e-12)
+        u, _ = ask(made.game, QuadraticPenalty(1.7, 3.0), y, np.zeros(0))
+        expected = -1.7 * (made.F(y) + made.J(y).T @ (3.0 * beyond))
+        np.testing.assert_allclose(u, expected, rtol=1e-13, atol=1e-12)
+
+
+@GAMES
+def test_the_recursive_flow_is_its_formula(curved):
+    law = RecursiveSafeFlow(3, gain=1.7, alpha=0.8, time_constant=0.3)
+
+    def slope(made, y, v):
+        u = -1.7 * made.F(y) - made.J(y).T @ v
+        return u, (made.J(y) @ u + 0.8 * made.g(y)) / 0.3
+
+    for seed in range(10):
+        made, y, v = drawn(seed, curved)
+        u, rate = ask(made.game, law, y, np.append(v, np.zeros(3)))
+        expected, ascent = slope(made, y, v)
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rate[:3], projected(ascent, v), rtol=1e-13, atol=1e-12)
+        _, moved = ask(made.game, law, y, np.append(v, np.zeros(3)), held=True)
+        count = max(1, int(np.ceil(H * np.trace(made.J(y) @ made.J(y).T) / 0.3)))
+        for _ in range(count):
+            v = np.maximum(v + H / count * slope(made, y, v)[1], 0.0)
+        np.testing.assert_allclose(moved[:3], v, rtol=1e-13, atol=1e-12)
+        assert not np.any(rate[3:])
+        assert not np.any(moved[3:])
+
+
+def test_the_recursive_flow_moves_as_the_quadratic_program_says():
+    """With y held its multipliers tend to those of min |xi + F|^2, J xi <= -alpha g."""
+    law = RecursiveSafeFlow(3, alpha=0.8, time_constant=1e-4)
+    for seed in range(3):
+        made, y, _ = drawn(seed, curved=True, spread=0.5)
+        memory = np.zeros(6)
+        for _ in range(100):
+            _, memory = ask(made.game, law, y, memory, held=True)
+        u, _ = ask(made.game, law, y, memory)
+        assert np.all(made.J(y) @ u <= -0.8 * made.g(y) + 1e-6)
+        assert abs(memory[:3] @ (made.J(y) @ u + 0.8 * made.g(y))) < 1e-6
+
+
+@GAMES
+def test_feedback_seeking_is_its_formula(curved):
+    law = FeedbackSeeking(3, gain=2.5, seeking=0.7, dual_gain=0.6)
+    for seed in range(10):
+        made, y, l = drawn(seed, curved)  # noqa: E741
+        r = y + np.random.default_rng(seed).normal(size=3)
+        u, moved = ask(made.game, law, y, np.append(l, r), held=True, limit=1.0)
+        np.testing.assert_allclose(u, 2.5 * (r - y), rtol=0, atol=1e-12)
+        wanted = r - H * 0.7 * (made.F(y) + made.J(y).T @ l)
+        np.testing.assert_allclose(moved[3:], np.clip(wanted, y - 0.4, y + 0.4), rtol=0, atol=1e-12)
+        expected = np.maximum(l + H * 0.6 * made.g(y), 0.0)
+        np.testing.assert_allclose(moved[:3], expected, rtol=0, atol=1e-12)
+
+
+def test_feedback_seeking_is_refused_in_mode_continuous():
+    made = RandomGame(3, agents=2, constraints=1)
+    with pytest.raises(InvalidInput, match=r"mode: got 'continuous'.*once a control period"):
+        System("s", made.game, integrators(2), FeedbackSeeking(1), 0.1, np.zeros((2, 1)))
+
+
+def test_a_tuned_gain_is_a_key_and_its_grid_has_the_default_within():
+    rivals = [table for table in map(LAWS.__getitem__, LAWS) if table.tuned]
+    assert len(rivals) >= 5
+    for table in rivals:
+        assert len(table.tuned) <= 3
+        for key, grid in table.tuned.items():
+            default = table.model_fields[key].default
+            assert grid == tuple(sorted(grid)), key
+            assert grid[0] <= default <= grid[-1], key
+
+
+@GAMES
+@pytest.mark.parametrize("mode", ["continuous", "sampled"])
+def test_where_multipliers_lead_is_the_variational_equilibrium(curved, mode):
+    for seed in range(3):
+        made = RandomGame(seed, curved=curved)
+        found = variational_equilibrium(made.game, np.zeros(3))
+        assert np.max(found.multipliers) > 0.1
+        laws = [PrimalDual(3, 1.3, 2.0), RecursiveSafeFlow(3, 1.3, 1.0, 0.1)]
+        if mode == "sampled":
+            laws.append(FeedbackSeeking(3, 5.0, 0.5, 0.5))
+        for law in laws:
+            y, memory = at_the_end(made, law, duration=600.0, mode=mode)
+            np.testing.assert_allclose(y, found.action, rtol=0, atol=1e-6)
+            scale = law.gain if isinstance(law, RecursiveSafeFlow) else 1.0
+            assert kkt_residual(made, y, memory[:3] / scale) < 1e-6
+
+
+@GAMES
+def test_penalties_lead_where_wider_bounds_would(curved):
+    """Violations are w l / s < w, or l / s: half of it at half the width, or twice the strength."""
+    for seed in range(3):
+        made = RandomGame(seed, constraints=1, curved=curved)
+        found = variational_equilibrium(made.game, np.zeros(3))
+        for laws, price in (
+            ([L1Penalty(1.0, 10.0, width) for width in (0.04, 0.02)], lambda law: 10.0 / law.width),
+            ([QuadraticPenalty(1.0, 250.0 * n) for n in (1, 2)], lambda law: law.strength),
+        ):
+            errors = []
+            for law in laws:
+                y, _ = at_the_end(made, law, h=1e-3, duration=20.0)
+                beyond = np.maximum(made.g(y), 0.0)
+                l = price(law) * beyond  # noqa: E741
+                assert np.max(np.abs(made.F(y) + made.J(y).T @ l)) < 1e-6
+                assert np.max(l) < 10.0
+                np.testing.assert_allclose(l, found.multipliers, atol=0.2)
+                errors.append(np.max(np.abs(y - found.action)))
+            assert errors[1] == pytest.approx(0.5 * errors[0], rel=0.1)
+
+
+def test_the_recursive_flow_nearly_keeps_the_set_and_primal_dual_play_does_not():
+    made = RandomGame(1)
+    worst = []
+    for law in (RecursiveSafeFlow(3, 1.0, 1.0, 0.1), PrimalDual(3)):
+        system = System(
+            "s", made.game, integrators(3), law, 0.1, np.zeros((3, 1)), on_exit="continue"
+        )  # fmt: skip
+        loop = system.closed_loop(clock(H, 40.0))
+        worst.append(np.max(made.game.constraints(loop.advance(2000, 1).state[:, :, 0])))
+    assert worst[0] < 0.05 < 0.3 < worst[1]
 
 
 def test_a_certificate_says_what_a_rival_promises():

@@ -28,7 +28,13 @@ from gne_mj.interface.faults import (
     silence,
 )
 from gne_mj.interface.laws import full_information, fully_distributed, own_law, partial_information
-from gne_mj.interface.rivals import primal_dual_play
+from gne_mj.interface.rivals import (
+    feedback_seeking,
+    l1_penalty,
+    primal_dual_play,
+    quadratic_penalty,
+    recursive_safe_flow,
+)
 from gne_mj.interface.running import Run, run, setup
 from gne_mj.interface.show import Figures, plot, view
 
@@ -42,10 +48,12 @@ __all__ = [
     "compare",
     "custom_agents",
     "estimate_corruption",
+    "feedback_seeking",
     "flexible_robots",
     "full_information",
     "fully_distributed",
     "integrators",
+    "l1_penalty",
     "message_delay",
     "message_loss",
     "mixed_agents",
@@ -58,6 +66,8 @@ __all__ = [
     "plot",
     "primal_dual_play",
     "push",
+    "quadratic_penalty",
+    "recursive_safe_flow",
     "run",
     "saturation",
     "sensor_delay",

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gne_mj.errors import InvalidInput
 from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.system.data import ADAPTIVE, SystemData
 from gne_mj.system.modes.mode import Array, Figure, Mode, entry
@@ -33,6 +34,13 @@ class Continuous(Mode):
         ),
         Figure("smallest_step", _smallest, "s", "shortest piece of a divided step"),
     )  # fmt: skip
+
+    def check_law(self, system: SystemData) -> None:
+        """The law's memory must have a rate."""
+        super().check_law(system)
+        if not hasattr(system.law.kernels, "rate"):
+            words = f"the {system.law.information} law acts once a control period: use 'sampled'"
+            raise InvalidInput("mode", self.name, words)
 
     def measures_stages(self, system: SystemData) -> bool:
         """Of methods that have some."""
