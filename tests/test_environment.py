@@ -25,7 +25,7 @@ import gne_mj
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, PartialInformation
 from gne_mj.environment import environment_of, law_policy, load_environment
-from gne_mj.environment.task import NotFinite, finite_costs
+from gne_mj.environment.observation import NotFinite, finite_costs
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.game_model import Game
 from gne_mj.games import velocity_game

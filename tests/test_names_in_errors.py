@@ -17,7 +17,7 @@ from gne_mj import faults, graph, theory
 from gne_mj.barrier import LogBarrier, Schedule
 from gne_mj.batches import Plan, Store, Sweep, execute, make_plan, parse_record, parse_sweep
 from gne_mj.controllers import FullyDistributed, PartialInformation
-from gne_mj.environment import environment_of, law_policy
+from gne_mj.environment import environment_of, law_policy, setting_of
 from gne_mj.equilibrium import penalised_equilibrium
 from gne_mj.errors import InfeasibleStart, InvalidInput, Refusal, named, part_of
 from gne_mj.exit_map import Grid
@@ -181,7 +181,7 @@ def test_what_is_called_with_a_system_says_so(system):
         (solve_system, (system, (-1.0,)), "rhos"),
         (solve_system, (system, (), (-1.0,)), "path_rhos"),
         (environment_of, (system, times), "system.engine"),
-        (partial(environment_of, graph="rin", information="partial"),
+        (partial(setting_of, graph="rin", information="partial"),
          (replace(system, engine="mujoco"), times), "graph"),
         (law_policy, (replace(system, schedule=Schedule("halving", 1.0, 0.1, 1.0)),),
          "system.schedule"),

@@ -1,22 +1,28 @@
 """An environment of a system, or of a scenario's."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.environment.episodes import BOUND
 from gne_mj.environment.information import STRUCTURES, Information, Structure, information_of
-from gne_mj.environment.physics import FleetPhysics
-from gne_mj.environment.task import FleetEnvironment, FleetTask, Start, finite_costs
-from gne_mj.errors import InvalidInput, named, nearest, part_of
+from gne_mj.environment.observation import finite_costs
+from gne_mj.environment.parallel import FleetParallelEnv
+from gne_mj.environment.setting import Setting, Start
+from gne_mj.environment.single import FleetEnv
+from gne_mj.environment.task import FleetEnvironment
+from gne_mj.environment.vector import FleetVectorEnv
+from gne_mj.errors import InvalidInput, named, nearest
 from gne_mj.graph import NAMED, Graph
 from gne_mj.motion import motion_of
-from gne_mj.plants.fleet_plant import build_fleet
 from gne_mj.scenario import load_scenario
 from gne_mj.starts import random_starts
 from gne_mj.system import Clock, System
+
+Environment = TypeVar("Environment")
 
 
 def load_environment(
@@ -31,7 +37,7 @@ def load_environment(
         scenario: as :func:`gne_mj.load_scenario` has it.
         changes: likewise.
         system: which of the scenario's systems; may be left out if there is only one.
-        **options: as :func:`environment_of` has them.
+        **options: as :func:`environment_of` and :func:`setting_of` have them.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
@@ -41,27 +47,143 @@ def load_environment(
     >>> timestep = environment.reset()
     >>> timestep = environment.step(np.zeros(environment.action_spec().shape))
     """
+    return of_scenario(environment_of, scenario, changes, system, options)
+
+
+def of_scenario(
+    make: Callable[..., Environment],
+    scenario: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None,
+    system: str | None,
+    options: Mapping[str, Any],
+) -> Environment:
+    """What ``make`` makes of a scenario's system and clock, with its keys in messages."""
     with named(source="scenario"):
         loaded = load_scenario(scenario, changes).without_interventions("environments")
     name = loaded.name_of(system)
     built = loaded.systems[name].build(name, loaded.simulation)
     with loaded.naming(name):
-        return environment_of(built, loaded.clock(), **options)
+        return make(built, loaded.clock(), **options)
+
+
+def load_gymnasium(
+    scenario: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None = None,
+    system: str | None = None,
+    *,
+    bound: float = BOUND,
+    render_mode: str | None = None,
+    **options: Any,
+) -> FleetEnv:
+    """A Gymnasium environment of a scenario's fleet, in which one learner gives all forces.
+
+    Args:
+        scenario, changes, system: as :func:`load_environment` has them.
+        bound, render_mode: as :class:`FleetEnv` has them.
+        **options: as :func:`setting_of` has them.
+
+    Raises:
+        InvalidInput, InfeasibleStart: as :func:`load_environment`.
+    """
+
+    def made(built: System, clock: Clock, **given: Any) -> FleetEnv:
+        return FleetEnv(setting_of(built, clock, **given), bound=bound, render_mode=render_mode)
+
+    return of_scenario(made, scenario, changes, system, options)
+
+
+def load_vector(
+    scenario: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None = None,
+    system: str | None = None,
+    *,
+    num_envs: int,
+    threads: int | None = None,
+    bound: float = BOUND,
+    render_mode: str | None = None,
+    **options: Any,
+) -> FleetVectorEnv:
+    """A Gymnasium vector environment of many fleets of a scenario, stepped natively on threads.
+
+    Args:
+        scenario, changes, system: as :func:`load_environment` has them.
+        num_envs: how many fleets.
+        threads, bound, render_mode: as :class:`FleetVectorEnv` has them.
+        **options: as :func:`setting_of` has them.
+
+    Raises:
+        InvalidInput, InfeasibleStart: as :func:`load_environment`.
+    """
+
+    def made(built: System, clock: Clock, **given: Any) -> FleetVectorEnv:
+        setting = setting_of(built, clock, **given)
+        return FleetVectorEnv(
+            setting, num_envs, threads=threads, bound=bound, render_mode=render_mode
+        )
+
+    return of_scenario(made, scenario, changes, system, options)
+
+
+def load_pettingzoo(
+    scenario: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None = None,
+    system: str | None = None,
+    *,
+    bound: float = BOUND,
+    render_mode: str | None = None,
+    **options: Any,
+) -> FleetParallelEnv:
+    """A PettingZoo environment (parallel API) of a scenario's fleet.
+
+    Args:
+        scenario, changes, system: as :func:`load_environment` has them.
+        bound, render_mode: as :class:`FleetParallelEnv` has them.
+        **options: as :func:`setting_of` has them.
+
+    Raises:
+        InvalidInput, InfeasibleStart: as :func:`load_environment`.
+    """
+
+    def made(built: System, clock: Clock, **given: Any) -> FleetParallelEnv:
+        setting = setting_of(built, clock, **given)
+        return FleetParallelEnv(setting, bound=bound, render_mode=render_mode)
+
+    return of_scenario(made, scenario, changes, system, options)
 
 
 def environment_of(
     system: System,
     clock: Clock,
     *,
+    reward: Literal["sum", "each"] = "sum",
+    random: int | np.random.Generator | None = None,
+    **options: Any,
+) -> FleetEnvironment:
+    """A dm_env environment of a MuJoCo fleet and its game: :class:`FleetTask` says what is what.
+
+    Args:
+        system, clock: as :func:`setting_of` has them.
+        reward: "sum", minus the sum of all costs; "each", minus its cost to each agent, (N,).
+        random: seed or generator of the random starts.
+        **options: as :func:`setting_of` has them.
+
+    Raises:
+        InvalidInput, UserCodeError, NotFinite: as :func:`setting_of`.
+    """
+    return FleetEnvironment(setting_of(system, clock, **options), reward, random)
+
+
+def setting_of(
+    system: System,
+    clock: Clock,
+    *,
     information: Structure | None = None,
     graph: Graph | str | None = None,
-    reward: Literal["sum", "each"] = "sum",
     exit_cost: float | None = None,
     start: Literal["own", "random"] | Start = "own",
     spread: float = 0.9,
-    random: int | np.random.Generator | None = None,
-) -> FleetEnvironment:
-    """A dm_env environment of a MuJoCo fleet and its game: :class:`FleetTask` says what is what.
+) -> Setting:
+    """What an episode of a MuJoCo fleet and its game is, for every kind of environment.
 
     Args:
         system: game, agents and start; its law only sets what is observed unless that is given.
@@ -70,7 +192,6 @@ def environment_of(
         information: what each agent sees, "full", "partial" or "distributed"; the law's if left
             out (of a law of one's own "full", or "partial" if it has a graph).
         graph: who hears whom, or a named graph; the law's if left out.
-        reward: "sum", minus the sum of all costs; "each", minus its cost to each agent, (N,).
         exit_cost: what leaving the set costs. Costs end with the episode, so that without it a
             learner would find that leaving at once is best. If left out it is what standing still
             at the system's start would cost for a whole episode, and not less than 0.
@@ -78,7 +199,6 @@ def environment_of(
             equilibrium to the boundary; or a function that draws y(0), shape (m,), given a
             generator.
         spread: for random starts: up to which part of the way to the boundary, between 0 and 1.
-        random: seed or generator of the random starts.
 
     Raises:
         InvalidInput: agents that do not run in MuJoCo, faults or separation (there are none here),
@@ -90,17 +210,8 @@ def environment_of(
     if exit_cost is None:
         costs = finite_costs(system.game, system.start)
         exit_cost = float(np.maximum(0.0, periods * costs.sum()))
-    physics = _physics(system, clock.timestep)
-    task = FleetTask(
-        system,
-        _information(system, information, graph),
-        periods,
-        reward=reward,
-        exit_cost=exit_cost,
-        start=_start(system, start, spread),
-        rng=np.random.default_rng(random),
-    )
-    return FleetEnvironment(physics, task, n_sub_steps=clock.steps(clock.control_period))
+    told = _information(system, information, graph)
+    return Setting(system, clock, told, periods, float(exit_cost), _start(system, start, spread))
 
 
 def _check(system: System) -> None:
@@ -127,12 +238,6 @@ def _episode(clock: Clock) -> int:
             f"an episode is a multiple of the control period {clock.control_period:g} s",
         )
     return round(periods)
-
-
-def _physics(system: System, timestep: float) -> FleetPhysics:
-    with part_of("system"):
-        plant = build_fleet(system.agents, timestep, system.integrator)
-        return FleetPhysics(plant, system.game, system.state)
 
 
 def _information(system: System, structure: str | None, graph: Graph | str | None) -> Information:
