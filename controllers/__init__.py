@@ -1,5 +1,7 @@
 """Feedback laws, one information structure a file."""
 
+from gne_mj.controllers.cbf_filter import CbfFilter
+from gne_mj.controllers.cbf_filter_discrete import DiscreteCbfFilter
 from gne_mj.controllers.feedback_seeking import FeedbackSeeking
 from gne_mj.controllers.full_information import FullInformation
 from gne_mj.controllers.fully_distributed import FullyDistributed
@@ -10,8 +12,11 @@ from gne_mj.controllers.plain_law import PlainLaw
 from gne_mj.controllers.primal_dual_play import PrimalDual
 from gne_mj.controllers.quadratic_penalty import QuadraticPenalty
 from gne_mj.controllers.recursive_safe_flow import RecursiveSafeFlow
+from gne_mj.controllers.safe_monotone_flow import SafeMonotoneFlow
 
 __all__ = [
+    "CbfFilter",
+    "DiscreteCbfFilter",
     "FeedbackSeeking",
     "FullInformation",
     "FullyDistributed",
@@ -22,4 +27,5 @@ __all__ = [
     "PrimalDual",
     "QuadraticPenalty",
     "RecursiveSafeFlow",
+    "SafeMonotoneFlow",
 ]

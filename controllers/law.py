@@ -2,7 +2,8 @@
 
 The kernels of a law's module, each given the game's module or the loop's ``problem`` (see
 :mod:`gne_mj.loops.feedback`), are the following. ``work`` has ``profile`` (m,), to be overwritten,
-and ``now`` (:mod:`gne_mj.controllers.settings`).
+and ``now`` (:mod:`gne_mj.controllers.settings`). Laws that know the plant ask its equations by
+:mod:`gne_mj.controllers.plant_model`.
 
 =====================================================  =======================================
 ``action(game, problem, y, weights, memory, work, u)``  fills u; -1, or agent * p + constraint of
@@ -96,6 +97,7 @@ class Law(ABC):
             continuous time, whatever the agents do.
         acts_outside: whether the law has an action where constraints are violated, as one without
             a barrier: with ``simulation.on_exit = "continue"`` its runs go on there.
+        knows_plant: whether it asks for the agents' own equations and their whole state.
     """
 
     information: ClassVar[str] = "custom"
@@ -114,6 +116,7 @@ class Law(ABC):
     propagates: bool = True
     guarded: ClassVar[bool] = False
     acts_outside: ClassVar[bool] = False
+    knows_plant: ClassVar[bool] = False
 
     @property
     def theorem(self) -> LawTheorem | None:

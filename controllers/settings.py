@@ -28,6 +28,7 @@ class Now(Numbers):
     faults_step: float  # the step up to which faults were dealt with
     memory_step: float  # the step that the law's memory belongs to, held modes
     next_instant: float  # the step of the next control instant, where periods may end early
+    state: float  # address of the agents' flat state, for laws that know the plant
 
 
 LENGTH_OF_NOW = len(names_of(Now))

@@ -10,6 +10,7 @@ EXTRAS = {
     "plots": ("matplotlib",),
     "view": ("meshcat", "tornado", "umsgpack", "PIL"),
     "learning": ("dm_control", "dm_env", "gymnasium", "pettingzoo"),
+    "arena": ("daqp",),
 }
 # On Python 3.13 one of dm-control's own dependencies cannot be installed, see pyproject.toml
 _ALONE = " && pip install --no-deps dm-control==1.0.50" if sys.version_info >= (3, 13) else ""

@@ -201,6 +201,47 @@ def shaped(typingctx: Any, array: Any, shape: Any) -> Any:
     return kind(array, shape), codegen
 
 
+def _of_c(builder: Any, name: str, result: Any, argument: Any, given: Any) -> Any:
+    """For intrinsics: LLVM code that calls a function of the C library."""
+    from llvmlite import ir
+
+    kind = ir.FunctionType(result, [argument])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [given])
+
+
+@intrinsic_or(lambda length: np.zeros(length))
+def reserved(typingctx: Any, length: Any) -> Any:
+    """Room for so many floats, whatever they are, until :func:`released`.
+
+    For the few kernels whose scratch no loop has: it costs a call of the C library.
+    """
+    kind = types.Array(types.float64, 1, "C")
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = cgutils.intp_t
+        size = builder.mul(arguments[0], word(8))
+        found = _of_c(builder, "malloc", cgutils.voidptr_t, word, size)
+        address = builder.ptrtoint(found, word)
+        return array_at(context, builder, kind, address, arguments[0])
+
+    return kind(types.int64), codegen
+
+
+@intrinsic_or(lambda array: None)
+def released(typingctx: Any, array: Any) -> Any:
+    """Give back what :func:`reserved` gave."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from llvmlite import ir
+
+        data = make_array(array)(context, builder, arguments[0]).data
+        room = builder.bitcast(data, cgutils.voidptr_t)
+        _of_c(builder, "free", ir.VoidType(), cgutils.voidptr_t, room)
+        return context.get_dummy_value()
+
+    return types.none(array), codegen
+
+
 def call(result: Any, function: int, arguments: tuple[Any, ...]) -> Any:
     """Call the C function at an address from Python: whole numbers are int64_t, others double.
 

@@ -117,7 +117,7 @@ def test_locks_have_what_is_asked_for() -> None:
     extras = project["optional-dependencies"]
     asked = {
         "demo": ["plots", "view"],
-        "test": ["plots", "view", "learning", "test"],
+        "test": ["plots", "view", "learning", "arena", "test"],
         "docs": ["plots", "view", "docs"],
         "peers": ["plots", "view", "learning", "peers"],
         "release": ["release"],

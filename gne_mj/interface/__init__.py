@@ -28,6 +28,7 @@ from gne_mj.interface.faults import (
     silence,
 )
 from gne_mj.interface.laws import full_information, fully_distributed, own_law, partial_information
+from gne_mj.interface.program_rivals import cbf_filter, discrete_cbf_filter, safe_monotone_flow
 from gne_mj.interface.rivals import (
     feedback_seeking,
     l1_penalty,
@@ -43,10 +44,12 @@ __all__ = [
     "Figures",
     "Run",
     "bias",
+    "cbf_filter",
     "certify",
     "check",
     "compare",
     "custom_agents",
+    "discrete_cbf_filter",
     "estimate_corruption",
     "feedback_seeking",
     "flexible_robots",
@@ -69,6 +72,7 @@ __all__ = [
     "quadratic_penalty",
     "recursive_safe_flow",
     "run",
+    "safe_monotone_flow",
     "saturation",
     "sensor_delay",
     "setup",

@@ -61,6 +61,7 @@ class Faults(NamedTuple):
     numbers: FaultNumbers
 
 
+NO_MODEL = np.zeros(0, dtype=np.int64)
 NO_ORDER = Order(*(np.zeros(n, dtype=np.int64) for n in (0, 2, 0, 0, 0)))
 FAULT_COLUMNS, FAULT_KINDS = len(names_of(Fault)), 9
 NO_FAULTS = Faults(np.zeros(0), np.zeros(FAULT_KINDS + 1, dtype=np.int64), numbers(FaultNumbers))
@@ -87,6 +88,8 @@ class Problem(NamedTuple):
     # where control periods may end early, of every step and constraint: gne_mj.loops.guard
     ahead: Annotated[np.ndarray, "n"] = np.zeros(0)
     kept: KeptData = EVERYTHING  # the estimates that the law keeps, where these are not all
+    # the plant's equations by address, where the law asks for them: gne_mj.loops.plant_model
+    model: Annotated[np.ndarray, "n", int] = NO_MODEL
     motion: Moving = STANDING  # of the game's numbers, which functions.PENALTY moves too
     # addresses, see gne_mj.loops.functions; and that of the run's table, as loops know it
     functions: Annotated[np.ndarray, "n", int] = np.zeros(functions.COUNT, dtype=np.int64)

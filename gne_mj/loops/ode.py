@@ -27,7 +27,7 @@ from gne_mj.loops.layout import (
 )
 from gne_mj.loops.one_loop import Native, OneLoop, laid_out
 from gne_mj.loops.recorder import record
-from gne_mj.native import callback, copy, kernel, source_key
+from gne_mj.native import address_in, callback, copy, kernel, source_key
 from gne_mj.parameter_block import floats_at
 from gne_mj.plants import functions as agents_functions
 from gne_mj.plants.functions import EULER, RK4
@@ -95,6 +95,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
             faults.elapse(problem, at.step, work, memory)
             work.now.memory_step = at.step
         faults.begin(parts, at, state, memory)
+        work.now.state = address_in(state)
         if clock.mode == IMPLICIT:
             good = functions.act(problem, place, at.time, at.step, state, memory)
         else:

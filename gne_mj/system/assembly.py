@@ -17,12 +17,12 @@ from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.feed_forward import FeedForward, feed_forward
 from gne_mj.graph import GraphData
-from gne_mj.loops import functions
+from gne_mj.loops import functions, plant_model
 from gne_mj.loops.adaptive import TSIT5, AdaptiveLoop
 from gne_mj.loops.base import ClosedLoop
 from gne_mj.loops.changing_network import ChangingNetworkLoop
 from gne_mj.loops.division import sizes_at
-from gne_mj.loops.feedback import Order, Problem, Sizes
+from gne_mj.loops.feedback import NO_MODEL, Order, Problem, Sizes
 from gne_mj.loops.layout import LoopClock, Setup
 from gne_mj.loops.link import (
     link,
@@ -158,6 +158,11 @@ class Assembly(SystemData):
             others={**self._behind, **self._others},
         )  # fmt: skip
 
+    @property
+    def plant_model(self) -> NDArray[np.int64]:
+        """The addresses of the plant's equations, for a law that asks for them."""
+        return plant_model.addresses() if self.law.knows_plant else NO_MODEL
+
     def law_settings(self, rho: float) -> NDArray[np.float64]:
         """The law's numbers, with what they take from the rest of the system."""
         settings = self.law.settings(rho)
@@ -201,6 +206,7 @@ class Assembly(SystemData):
             size=self.typical_sizes,
             propagator=propagator,
             kept=self.law.kept_data,
+            model=self.plant_model,
             schedule=self._penalty_numbers,
             order=self.rows,
             separation=np.zeros(3) if self.separation is None else self.separation.numbers,

@@ -72,6 +72,11 @@ def check_parts(system: SystemData) -> None:
             "law", "plain functions", "they are given a game that stands still: let its numbers"
             " stand, or write the law as kernels",
         )  # fmt: skip
+    if system.law.knows_plant and not has_ode(system.agents.kind):
+        raise InvalidInput(
+            "law", type(system.law).__name__, "it asks for the agents' equations, which"
+            f" {system.agents.kind.NAME}s have in MuJoCo only",
+        )  # fmt: skip
     check_feed_forward(system)
     mode = mode_of(system)
     mode.check_law(system)

@@ -30,6 +30,8 @@ def law_at_start(system: System) -> Array:
     rho = problem.settings[RHO]
     scratch = work(game.actions, game.constraints_count, game.agents)
     scratch.now.penalty = rho
+    state = np.ascontiguousarray(system.state)
+    scratch.now.state = state.ctypes.data
     weights = rho / -(game.constraints(system.start) + game.margins)
     u = np.full(game.actions, np.nan)
     y = system.start.copy()
@@ -54,6 +56,7 @@ def problem_at_start(system: System) -> Problem:
         equilibrium=np.ascontiguousarray(system.start),  # nothing is measured from it here
         propagator=no_propagator(),
         kept=system.law.kept_data,
+        model=system.plant_model,
         size=system.typical_sizes,
         functions=system.functions,
     )

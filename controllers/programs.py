@@ -1,0 +1,88 @@
+"""What laws share that solve quadratic programs (:mod:`gne_mj.quadratic_program`).
+
+All of them look for the input nearest to that of gradient play, -k F(y), among those that keep
+constraints in some sense. None has a barrier.
+"""
+
+import sys
+from abc import abstractmethod
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj import game_functions as games
+from gne_mj import quadratic_program
+from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.settings import COUNT, GAIN
+from gne_mj.native import kernel
+
+# Entries of the settings behind the laws' numbers: DAQP's address, and the law's own
+SOLVER, OWN = COUNT, COUNT + 1
+
+
+class ProgramLaw(Law):
+    """A law that solves a quadratic program; a subclass is a frozen dataclass in a kernels' module.
+
+    Attributes:
+        gain: k.
+    """
+
+    acts_outside: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_positive(self, "gain")
+        quadratic_program.solver()
+
+    @property
+    @abstractmethod
+    def own(self) -> tuple[float, ...]:
+        """Its own numbers besides k."""
+
+    @property
+    def kernels(self) -> ModuleType:
+        """The module that it is defined in."""
+        return sys.modules[type(self).__module__]
+
+    def settings(self, rho: float) -> NDArray[np.float64]:
+        """See the base class; rho is not read."""
+        numbers = super().settings(rho)
+        numbers[GAIN] = self.gain
+        return np.append(numbers, [quadratic_program.solver(), *self.own])
+
+
+@kernel
+def gradient_play(problem, y, out):
+    """Fill out (m,) with -k F(y)."""
+    games.gradients(problem.data, problem.data.everyone, y, out)
+    for a in range(len(y)):
+        out[a] *= -problem.settings[GAIN]
+
+
+@kernel
+def linearised(problem, y, values, jacobian):
+    """Fill values (p,) with g(y) + t, t the barrier's margin, and jacobian (p, m), which is zero
+    before, with dg/dy."""
+    data = problem.data
+    at = data.offsets
+    games.values(data, data.all_constraints, y, values)
+    for k in range(len(values)):
+        values[k] += data.tightening[k]
+        for entry in range(data.member_pointer[k], data.member_pointer[k + 1]):
+            i = data.member_index[entry]
+            for a in range(at[i], at[i + 1]):
+                jacobian[k, a] = games.constraint_gradient(data, k, a, y)
+
+
+@kernel
+def solver_in(problem):
+    """DAQP's address."""
+    return np.int64(problem.settings[SOLVER])
+
+
+@kernel
+def give(program, ended, goal, u):
+    """Fill u (m,) with goal + x, x the solution; not a number where there is none."""
+    for a in range(len(u)):
+        u[a] = goal[a] + program.x[a] if ended > 0 else np.nan

@@ -1,0 +1,177 @@
+"""Rivals that solve quadratic programs: right-hand sides by SciPy, and what they keep."""
+
+import numpy as np
+import pytest
+from builders import UNEQUAL, clock, integrators, robots
+from random_games import RandomGame
+from scipy.optimize import minimize
+
+from gne_mj.controllers import CbfFilter, DiscreteCbfFilter, SafeMonotoneFlow
+from gne_mj.equilibrium import variational_equilibrium
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.ode import OdePlant
+from gne_mj.system import System
+from gne_mj.system.first_input import law_at_start
+
+N = 5
+H = 0.02
+
+
+def nearest(goal, g, slope, active=1e-9):
+    """The point nearest to goal with g(x) <= 0: by SLSQP, then Newton's method on what binds."""
+    found = minimize(
+        lambda x: 0.5 * np.sum((x - goal) ** 2), goal, jac=lambda x: x - goal, method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda x: -g(x), "jac": lambda x: -slope(x)},
+        options={"maxiter": 500, "ftol": 1e-14},
+    ).x  # fmt: skip
+    binding = np.flatnonzero(g(found) > -1e-6)
+    x, n = found, len(goal)
+    multipliers = np.linalg.lstsq(slope(x)[binding].T, goal - x, rcond=None)[0]
+    for _ in range(60):  # of first order in what bends, which is enough
+        rows = slope(x)[binding]
+        system = np.block([[np.eye(n), rows.T], [rows, np.zeros((len(binding),) * 2)]])
+        step = np.linalg.lstsq(
+            system, np.concatenate([goal - x - rows.T @ multipliers, -g(x)[binding]]), rcond=None
+        )[0]
+        x, multipliers = x + step[:n], multipliers + step[n:]
+    assert np.all(multipliers >= -1e-9)
+    assert np.max(g(x)) < 1e-9
+    return x
+
+
+def system_of(made, law, agents, y, state=None, **options):
+    rest = agents.equilibrium(y)
+    return System("s", made.game, agents, law, 0.1, rest if state is None else state, **options)
+
+
+def draw(seed, curved, agents=None):
+    """A random game, outputs strictly inside, and a state of these agents with such outputs."""
+    made, rng = (
+        RandomGame(seed, agents=N, constraints=4, curved=curved),
+        np.random.default_rng(seed),
+    )
+    y = rng.normal(size=N)
+    while np.max(made.g(y)) > -0.02:
+        y *= 0.8
+    state = (agents or integrators(N)).equilibrium(y)
+    state += rng.normal(size=state.shape) * (np.arange(state.shape[1]) != 1)
+    return made, y, state
+
+
+ROBOTS = robots(UNEQUAL)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_the_continuous_laws_are_their_programs(curved):
+    """Of robots with y' = (u - spring - damper)/M; J_g is zero where a gap's square is least."""
+    mass = np.array(UNEQUAL["main_mass"])
+    for seed in range(10):
+        made, y, state = draw(seed, curved, ROBOTS)
+        goal, g, J = -1.7 * made.F(y), made.g(y), made.J(y)
+        u = law_at_start(system_of(made, SafeMonotoneFlow(1.7, 2.5), ROBOTS, y, state))
+        expected = nearest(goal, lambda x: J @ x + 2.5 * g, lambda x: J)  # noqa: B023
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-12 * (1 + np.max(np.abs(goal))))
+        x = state[:, 0]
+        force = np.array(UNEQUAL["stiffness"]) * x + np.array(
+            UNEQUAL["atan_coefficient"]
+        ) * np.arctan(x)
+        force = force + np.array(UNEQUAL["damping"]) * (state[:, 1] - state[:, 2])
+        u = law_at_start(system_of(made, CbfFilter(1.7, 2.5), ROBOTS, y, state))
+        expected = nearest(
+            goal, lambda x: J @ ((x - force) / mass) + 2.5 * g, lambda x: J / mass  # noqa: B023
+        )  # fmt: skip
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-12 * (1 + np.max(np.abs(expected))))
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_the_discrete_law_meets_its_condition_at_the_periods_end(curved):
+    """The plant's own map, which is not affine, moved by another program than the law's."""
+    for seed in range(6):
+        made, y, state = draw(seed, curved, ROBOTS)
+        one = system_of(made, DiscreteCbfFilter(1.7, 0.3), ROBOTS, y, state, mode="sampled")
+        loop = one.closed_loop(clock(H / 4, control=H))
+        u = loop.advance(1, 1).input[0]
+        plant = OdePlant(ROBOTS, H / 4)
+
+        def ahead(u, plant=plant, state=state):
+            plant.reset(state)
+            plant.step(u, 4)
+            return plant.output
+
+        def slope(u):
+            at, steps = ahead(u), 1e-4 * np.eye(N)
+            rises = np.array([ahead(u + step) - ahead(u - step) for step in steps]).T / 2e-4
+            return made.J(at) @ rises  # noqa: B023
+
+        bound = 0.7 * made.g(y)
+        expected = nearest(
+            -1.7 * made.F(y), lambda u: made.g(ahead(u)) - bound, slope  # noqa: B023
+        )  # fmt: skip
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-7 * (1 + np.max(np.abs(u))))
+        assert np.max(made.g(ahead(u)) - bound) < 1e-10
+
+
+def test_the_discrete_law_of_integrators_is_its_program():
+    for seed in range(6):
+        made, y, _ = draw(seed, curved=True)
+        one = system_of(made, DiscreteCbfFilter(1.0, 1.0), integrators(N), y, mode="sampled")
+        u = one.closed_loop(clock(H)).advance(1, 1).input[0]
+        expected = nearest(
+            -made.F(y), lambda u: made.g(y + H * u), lambda u: H * made.J(y + H * u)  # noqa: B023
+        )  # fmt: skip
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-10 * (1 + np.max(np.abs(u))))
+
+
+def at_the_end(made, law, h, duration, **options):
+    """Outputs of integrators that begin at 0, at a run's end, and the greatest g on the way."""
+    one = system_of(made, law, integrators(N), np.zeros(N), **options)
+    loop = one.closed_loop(clock(h))
+    loop.advance(1, round(duration / h))
+    return loop.present().state[:, 0], np.max(loop.monitor.worst)
+
+
+@pytest.mark.parametrize(
+    ("law", "options"),
+    [
+        (SafeMonotoneFlow(1.0, 0.7), {}),
+        (CbfFilter(1.0, 0.7), {}),
+        (DiscreteCbfFilter(1.0, 0.03), {"mode": "sampled"}),
+    ],
+    ids=lambda given: getattr(given, "information", ""),
+)
+def test_integrators_stay_inside_and_end_at_the_variational_equilibrium(law, options):
+    """Slacks fall as exp(-alpha t) at most, so that none is gone when bounds are reached."""
+    made, duration = RandomGame(3, agents=N, constraints=4, curved=True), 20.0
+    y, worst = at_the_end(made, law, H, duration, **options)
+    found = variational_equilibrium(made.game, np.zeros(N))
+    assert np.max(found.multipliers) > 0.1
+    np.testing.assert_allclose(y, found.action, rtol=0, atol=1e-6)
+    assert worst < 0
+    assert np.max(made.g(y)) > -1e-5
+
+
+def test_where_no_input_will_do_limits_are_kept_and_bounds_are_soft():
+    """A spring pulls the robot towards its bound, harder than its motor can hold, or away."""
+    made, limit = RandomGame(3, agents=1, constraints=1), 2.0
+    agents = robots({name: numbers[:1] for name, numbers in UNEQUAL.items()}, limit)
+    y = 0.99 * made.b / made.A[0]
+    state = agents.equilibrium(y)
+    for extension, expected in ((-8.0, -limit), (8.0, min(-made.F(y)[0], limit))):
+        state[:, 0] = extension
+        for law, mode in ((CbfFilter(), "continuous"), (DiscreteCbfFilter(), "sampled")):
+            one = system_of(made, law, agents, y, state, mode=mode)
+            u = one.closed_loop(clock(H)).advance(1, 1).input[0]
+            assert u[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_laws_of_periods_are_for_held_modes_and_numbers_are_looked_at():
+    made = RandomGame(0, agents=N, constraints=4)
+    with pytest.raises(InvalidInput, match="use 'sampled'"):
+        system_of(made, DiscreteCbfFilter(), integrators(N), np.zeros(N))
+    with pytest.raises(InvalidInput, match="must be above 0 and at most 1"):
+        DiscreteCbfFilter(alpha=1.5)
+    for law in (SafeMonotoneFlow, CbfFilter):
+        with pytest.raises(InvalidInput, match="alpha"):
+            law(alpha=0.0)
+        with pytest.raises(InvalidInput, match="gain"):
+            law(gain=-1.0)
