@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.measured import memory_outputs as memory_outputs
@@ -36,6 +39,10 @@ class FullInformation(Law):
     def kernels(self) -> ModuleType:
         """This module."""
         return sys.modules[__name__]
+
+    def among(self, there: NDArray[np.bool_]) -> Law:
+        """See the base class."""
+        return self
 
 
 @kernel

@@ -103,6 +103,10 @@ class FullyDistributed(Law):
         """1 / epsilon."""
         return 1.0 / self.epsilon
 
+    def among(self, there: NDArray[np.bool_]) -> Law:
+        """See the base class."""
+        return self._over_fewer(there)
+
     def initial_memory(
         self,
         y: NDArray[np.float64],

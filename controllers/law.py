@@ -30,6 +30,7 @@ memory, out)``                                        agents in J_i only; its sy
 """
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from types import ModuleType
 from typing import ClassVar, NamedTuple
 
@@ -207,6 +208,25 @@ class Law(ABC):
         if filtered is not None:
             raise InvalidInput("filtered", "given", f"the {self.information} law has no z")
         return np.zeros(0)
+
+    def among(self, there: NDArray[np.bool_]) -> "Law":
+        """The law of those agents that are there, (N,).
+
+        Raises:
+            InvalidInput: it does not say what that is, or their graph is not connected.
+        """
+        raise InvalidInput(
+            "law", self.information, "it does not say how it goes on among fewer agents"
+        )
+
+    def _over_fewer(self, there: NDArray[np.bool_]) -> "Law":
+        """:meth:`among` of a law that is a dataclass with a graph."""
+        if self.kept is not None:
+            expected = "agents must keep all estimates where some leave or join: use 'all'"
+            raise InvalidInput("law.estimates", "some", expected)
+        assert self.graph is not None
+        fewer: Law = replace(self, graph=self.graph.among(there))  # type: ignore[type-var]
+        return fewer
 
     def barrier_profiles(
         self, game_actions: NDArray[np.int64], memory: NDArray[np.float64]

@@ -98,6 +98,10 @@ class PartialInformation(Law):
         numbers[COUPLING], numbers[TIME_CONSTANT] = self.coupling, self.time_constant
         return numbers
 
+    def among(self, there: NDArray[np.bool_]) -> Law:
+        """See the base class."""
+        return self._over_fewer(there)
+
     def initial_memory(
         self,
         y: NDArray[np.float64],

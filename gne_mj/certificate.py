@@ -18,6 +18,7 @@ from gne_mj.registry import MODES
 from gne_mj.run_metrics import SUCCESSES, TAIL
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.theory import Theorem
+from gne_mj.those_present import ThosePresent, distances, those_present
 
 # V may rise by this much of its start through rounding alone.
 ROUNDING = 1e-12
@@ -56,6 +57,9 @@ class Certificate:
         separation: of agents that keep apart: the least distance of two positions (None if no two
             came within reach), and the pairs that hold a run which rests away from the
             equilibrium; None of others.
+        membership: of agents that leave and join: who was there ``at_start``, and each of the
+            ``changes`` with its time, what, whether it was done (if not, why) and who was there
+            then; None of others. ``equilibrium`` and ``epsilon`` are of those there at the end.
         network: of a graph that changes: how often it did (``changes``), and for how long it was
             not connected (``disconnected``, s); None of others.
         messages: in the held modes, under laws with a graph that stays: how many were sent over
@@ -86,6 +90,7 @@ class Certificate:
     contacts: dict[str, Any] | None
     between: dict[str, Any] | None
     separation: dict[str, Any] | None
+    membership: dict[str, Any] | None
     network: dict[str, Any] | None
     messages: dict[str, Any] | None
     exit: dict[str, Any] | None
@@ -121,6 +126,7 @@ def certify_run(
     interrupted: bool,
     intervened: bool,
     network: dict[str, Any] | None = None,
+    membership: dict[str, Any] | None = None,
     clock: Clock | None = None,
 ) -> Certificate:
     """Put together what a run of ``system`` showed.
@@ -128,37 +134,36 @@ def certify_run(
     Args:
         system: what was run.
         time: sample times (samples,).
-        action: y at the sample times (samples, m).
-        inputs: u there (samples, m), not a number where there is none.
+        action, inputs: y and u there (samples, m), not numbers where there are none.
         monitor: the loop's flat array of what was seen at every step.
         tolerance: for the status ``converged``.
         duration: how long the run was meant to last.
         wall_time: real time that it took.
         interrupted: the user stopped it.
         intervened: the user pushed agents or changed numbers meanwhile, so that nothing is claimed.
-        clock: how it stepped; None where that is not known.
+        network, membership, clock: what the loop tells, and how it stepped, where that is known.
     """
-    distance = np.max(np.abs(action - system.equilibria(time)), axis=1)
-    (settled,) = run_metrics.settling_time(time, distance[None])
+    distance = distances(system, time, action)
     status, message = _status(system, time, distance, monitor, tolerance, duration, interrupted)
-    holding = kept_apart.holding(system, time, action, (status, duration, tolerance))
-    message += kept_apart.held_text(holding) + _interpolated_text(inputs, monitor)
+    present = those_present(system, time, action, membership)
+    holding = present.holding((status, duration, tolerance))
     return Certificate(
         status=status,
-        message=message,
+        message=message + present.told(holding) + _interpolated_text(inputs, action, monitor),
         worst_constraint=monitored.worst_constraint(system, monitor),
         worst_gap=monitored.worst_gap(system, monitor),
         outside=outside.report(system.game, monitor, system.goes_on),
-        equilibrium=_equilibrium(system, action, time),
+        equilibrium=present.spread(_equilibrium(present.system, present.action, present.time)),
         tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
-        epsilon=_epsilon(system, time[-1]),
-        settling_time=None if np.isnan(settled) else float(settled),
-        lyapunov=_lyapunov(system, monitor, intervened),
+        epsilon=_epsilon(present.system, time[-1]),
+        settling_time=_settling_time(time, distance),
+        lyapunov=_lyapunov(present, monitor, intervened),
         actuators=monitored.actuators(system, monitor),
         positions=monitored.positions(system, monitor),
         contacts=monitored.contacts(system, monitor),
         between=monitored.between(system, monitor),
         separation=kept_apart.report(system, monitor, holding),
+        membership=membership,
         network=network,
         messages=_messages(system, monitor, clock),
         exit=exits.exit_report(system, monitor),
@@ -170,9 +175,16 @@ def certify_run(
     )
 
 
-def _interpolated_text(inputs: NDArray[np.float64], monitor: Any) -> str:
-    """What is added to a status where samples between steps have no input."""
-    missing = int(np.sum(np.any(np.isnan(inputs), axis=1)))
+def _settling_time(time: NDArray[np.float64], distance: NDArray[np.float64]) -> float | None:
+    (settled,) = run_metrics.settling_time(time, distance[None])
+    return None if np.isnan(settled) else float(settled)
+
+
+def _interpolated_text(
+    inputs: NDArray[np.float64], action: NDArray[np.float64], monitor: Any
+) -> str:
+    """What is added to a status where samples between steps have no input, of who is there."""
+    missing = int(np.sum(np.any(np.isnan(inputs) & ~np.isnan(action), axis=1)))
     if not missing or monitor.exit != watch.INSIDE:
         return ""
     return (
@@ -232,7 +244,7 @@ def _status(
             f"within {tail:.2g} of the {which} over the last"
             f" {TAIL * duration:g} s (tolerance {tolerance:g})",
         )
-    if system.equilibrium_at(end) is None:
+    if np.isnan(distance[-1]):
         return (
             "completed",
             f"ran its {duration:g} s inside the set; no penalised equilibrium was found, so that"
@@ -320,13 +332,16 @@ def _messages(system: System, monitor: Any, clock: Clock | None) -> dict[str, An
     return {**seen, "triggers": triggers.report()}
 
 
-def _lyapunov(system: System, monitor: Any, intervened: bool) -> dict[str, Any]:
+def _lyapunov(present: ThosePresent, monitor: Any, intervened: bool) -> dict[str, Any]:
+    system = present.system
     start, rise = float(monitor.storage_start), float(monitor.storage_rise)
     still = motion_of(system.game) is None
-    about = still and system.known_equilibrium is not None  # V is about y*
+    # V is about y*
+    about = still and all(each.known_equilibrium is not None for each in present.systems)
     known = about and system.agents.knows_storage
     unhindered = bool(monitor.started) and not monitor.saturated
-    claimed = known and unhindered and not intervened and Theorem(system).lyapunov
+    claimed = known and unhindered and not intervened and present.all_known
+    claimed = claimed and all(Theorem(each).lyapunov for each in present.systems)
     return {
         "claimed": claimed,
         "known": known,

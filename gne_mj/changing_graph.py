@@ -90,6 +90,11 @@ class SwitchingGraph(ChangingGraph):
         order = "random" if self.random else "given"
         return {"type": "switching", "graphs": list(self.graphs), "every": every, "order": order}
 
+    def among(self, there: NDArray[np.bool_]) -> "SwitchingGraph":
+        """See the base class."""
+        every = self.durations[0] if self.random else self.durations
+        return switching([graph.among(there) for graph in self.graphs], every, random=self.random)
+
     @cached_property
     def data(self) -> GraphData:
         """Those of the first graph."""
@@ -203,6 +208,10 @@ class DiscGraph(ChangingGraph):
     def table(self) -> dict[str, Any]:
         """See the base class."""
         return {"type": "disc", "radius": self.radius, "interval": self.interval}
+
+    def among(self, there: NDArray[np.bool_]) -> "DiscGraph":
+        """See the base class."""
+        return disc(int(np.sum(there)), self.radius, self.interval)
 
     @cached_property
     def algebraic_connectivity(self) -> float:

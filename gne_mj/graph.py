@@ -126,6 +126,18 @@ class Graph:
         degrees = np.bincount(hearer, minlength=self.agents)
         return GraphData(np.concatenate([[0], np.cumsum(degrees)]), heard[order])
 
+    def among(self, there: NDArray[np.bool_]) -> "Graph":
+        """The graph among some agents, (N,), with numbers of their own.
+
+        Raises:
+            InvalidInput: it is not connected.
+        """
+        number = np.cumsum(there) - 1
+        kept = tuple(
+            (int(number[i]), int(number[j])) for i, j in self.edges if there[i] and there[j]
+        )
+        return Graph(int(np.sum(there)), kept)
+
     @property
     def members(self) -> "tuple[Graph, ...] | None":
         """The graphs that it can be, or of which it always has one's edges: itself.

@@ -183,7 +183,7 @@ def _equilibrium(system: SystemData) -> Iterator[Variable]:
     """y*, over time where the game moves."""
     yield Variable(
         "equilibrium", (AXIS,), lambda rows: equilibrium_of(rows.system),
-        there=lambda system: motion_of(system.game) is None,
+        there=lambda system: motion_of(system.game) is None and system.membership is None,
         unit=_action_unit, long_name="y*", batch=False,
         runs=(
             Variable(
@@ -192,6 +192,11 @@ def _equilibrium(system: SystemData) -> Iterator[Variable]:
                 unit=_action_unit, long_name="y*",
             ),
         ),
+    )  # fmt: skip
+    yield Variable(
+        "equilibrium", ("time", AXIS), lambda rows: rows.system.equilibria_among(rows.time, rows.y),
+        there=lambda system: system.membership is not None,
+        unit=_action_unit, long_name="y* of those present", batch=False,
     )  # fmt: skip
     yield Variable(
         "equilibrium", ("time", AXIS), lambda rows: rows.system.equilibria(rows.time),

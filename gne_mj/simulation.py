@@ -441,6 +441,10 @@ class SystemRun:
                     "another one",
                     "one that changes stays what it is while a run goes on",
                 )
+        if system.membership is not None:
+            raise InvalidInput(
+                "membership", "given", "where agents leave and join numbers stay as they are"
+            )
         if system.between != self.system.between:
             raise InvalidInput(
                 "between", system.between, "it stays as it is while a simulation goes on"
@@ -492,6 +496,7 @@ class SystemRun:
             interrupted=interrupted,
             intervened=intervened,
             network=self.loop.network,
+            membership=self.loop.membership,
             clock=self.clock,
         )
         return parts, certificate

@@ -32,6 +32,8 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         rows["contacts"] = _contacts(report["contacts"])
     if report["separation"] is not None:
         rows["separation"] = _separation(report["separation"])
+    if report.get("membership") is not None:  # which older results do not have
+        rows["agents"] = _membership(report["membership"])
     if report["network"] is not None:
         rows["network"] = _network(report["network"])
     if report["messages"] is not None:
@@ -86,6 +88,19 @@ def _least_margin(worst: dict[str, Any] | None) -> str:
     if worst is None:
         return "nothing was observed"
     return f"-g = {worst['margin']:.6g}, constraint '{worst['name']}' at {worst['time']:.4g} s"
+
+
+def _membership(seen: dict[str, Any]) -> str:
+    done = [
+        f"{', '.join(map(str, each['agents']))} {each['what']} at {each['time']:.4g} s"
+        for each in seen["changes"]
+        if each["done"]
+    ]
+    shown = "; ".join(done[:6]) + (f"; {len(done) - 6} changes more" if len(done) > 6 else "")
+    refused = len(seen["changes"]) - len(done)
+    count = f"{len(seen['at_start'])} at the start"
+    text = f"{count}; {shown}" if done else count
+    return f"{text}; {refused} not admitted or not let go" if refused else text
 
 
 def _network(seen: dict[str, Any]) -> str:

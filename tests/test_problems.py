@@ -189,9 +189,9 @@ def test_rates_without_the_shared_bound_are_those_of_water_filling():
 # The verdict under full information, and the assumption that is not met or unknown
 VERDICTS = {
     "a12": None, "a13": None, "a15": None, "a17": None, "harker": None, "rosen": None,
-    "transport": None, "a1": ("eq:GNE", "private"), "a5": ("eq:GNE", "private"),
+    "transport": None, "a11": None, "a1": ("eq:GNE", "private"), "a5": ("eq:GNE", "private"),
     "a8": ("eq:GNE", "private"), "a3": ("asmp:pseudo(a)", "not monotone"),
-    "a11": ("asmp:cost", "not strictly convex"), "a14": ("asmp:pseudo(a)", "too coarse"),
+    "a14": ("asmp:pseudo(a)", "too coarse"),
     "a16": ("asmp:pseudo(a)", "sampled"), "a18": ("asmp:pseudo(a)", "merely monotone"),
     "rate": ("asmp:pseudo(a)", "too coarse"),
 }  # fmt: skip

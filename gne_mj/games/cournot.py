@@ -153,6 +153,10 @@ class CournotTable(GameTable):
         """The game for ``count`` agents."""
         return cournot_game(count, **self.model_dump(exclude={"type"}))
 
+    def away(self, count: int) -> NDArray[np.float64]:
+        """A firm that is away makes nothing."""
+        return np.zeros(count)
+
     def default_start(self, count: int) -> NDArray[np.float64]:
         """Every firm half way between its bounds."""
         middle = 0.5 * (np.asarray(self.lower_bound) + np.asarray(self.upper_bound))

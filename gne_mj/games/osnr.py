@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.resources import files
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -215,6 +215,7 @@ def constraint_hessian(q, l, a, b, y):
 class OsnrTable(GameTable):
     """Power control [eq:osnrGNE]; what is left out is taken from the ten-channel link."""
 
+    keeps: ClassVar[tuple[str, ...]] = ("total power",)
     type: Literal["osnr"]
     total_power_limit: Annotated[float | None, Unit("mW")] = Field(None, gt=0, description="P_0")
     price: Annotated[list[float] | None, Unit("1/mW", "> 0")] = Field(None, description="a_i")
@@ -240,6 +241,10 @@ class OsnrTable(GameTable):
                     f"agents.count is {count}; every list must have that many entries",
                 )
         return osnr_game(**parameters)
+
+    def away(self, count: int) -> NDArray[np.float64]:
+        """A channel that is away sends nothing."""
+        return np.zeros(count)
 
     def default_start(self, count: int) -> NDArray[np.float64]:
         """80% of the power limit, shared equally."""

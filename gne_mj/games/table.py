@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,12 @@ class GameTable(Table):
     """A game's numbers in a scenario file, any of which may be a function of time.
 
     A function's number is that of time 0 for all that asks for the key.
+
+    Attributes:
+        keeps: names of constraints that go on without some of their agents, where these leave.
     """
+
+    keeps: ClassVar[tuple[str, ...]] = ()
 
     _moving: dict[Place, TimeTable] = PrivateAttr(default_factory=dict)
 
@@ -66,6 +71,13 @@ class GameTable(Table):
         """(m,) actions strictly inside, from which it is started if none are given.
 
         None lets a profile inside be looked for.
+        """
+        return None
+
+    def away(self, count: int) -> NDArray[np.float64] | None:
+        """(m,) what the action of an agent that is away counts as in others' costs.
+
+        None lets whoever lets agents leave say it.
         """
         return None
 

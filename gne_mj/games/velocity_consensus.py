@@ -283,6 +283,10 @@ class VelocityConsensusTable(GameTable):
             self.leader_gap_bound,
         )
 
+    def away(self, count: int) -> NDArray[np.float64]:
+        """The reference velocity."""
+        return np.tile(np.array(self.reference_velocity), count)
+
     def default_start(self, count: int) -> NDArray[np.float64]:
         """Everyone half a leader's bound below the reference, along the first axis."""
         start = np.tile(np.array(self.reference_velocity), (count, 1))

@@ -184,6 +184,10 @@ class VelocityTable(GameTable):
             per_agent("desired_weight", self.desired_weight, count),
         )
 
+    def away(self, count: int) -> NDArray[np.float64]:
+        """The reference velocity, which whoever follows an agent that is away follows then."""
+        return np.full(count, self.reference_velocity)
+
     def default_start(self, count: int) -> NDArray[np.float64]:
         """The named start for five agents; else everyone half a bound below the reference."""
         if count == len(DEFAULT_VELOCITIES):

@@ -14,6 +14,7 @@ from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.interface.laws import own_law
+from gne_mj.membership import MembershipTable
 from gne_mj.progress import if_asked, of_time
 from gne_mj.scenario import Scenario, Source, load_scenario
 from gne_mj.scenario_tables.faults import FaultTable
@@ -35,6 +36,7 @@ KEYS = {
     "rho": "barrier.rho",
     "start": "initial.action",
     "faults": "faults",
+    "membership": "membership",
     "engine": "plant.engine",
     "integrator": "simulation.integrator",
     "duration": "simulation.duration",
@@ -62,6 +64,7 @@ def setup(
     engine: str | None = None,
     integrator: str | None = None,
     faults: Sequence[FaultTable] | None = None,
+    membership: MembershipTable | Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     seed: int | None = None,
 ) -> Scenario:
@@ -86,6 +89,8 @@ def setup(
         integrator: "rk4", "euler" or, of ODE agents, "tsit5" (adaptive steps); "rosenbrock" is a
             change of ``plant.integrator``.
         faults: what goes wrong.
+        membership: who leaves and joins meanwhile, ``{"changes": [{"time": 2.0, "leaves": [3]}]}``
+            (docs/networks.md, *Agents that leave and join*).
         tolerance: on the greatest distance to y*, for the status ``converged``.
         seed: of what is random in faults.
 
@@ -180,6 +185,7 @@ def run(
     engine: str | None = None,
     integrator: str | None = None,
     faults: Sequence[FaultTable] | None = None,
+    membership: MembershipTable | Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     seed: int | None = None,
     progress: Callable[[float], None] | bool = False,

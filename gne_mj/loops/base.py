@@ -68,12 +68,15 @@ class ClosedLoop(ABC):
         monitor: what :mod:`gne_mj.loops.monitor` measures, by name.
         network: of a graph that changes: how often it did, and for how many s it was not connected;
             None of others.
+        membership: of agents that leave and join: who did when, or was not admitted; None of
+            others (:mod:`gne_mj.loops.membership`).
         kept_alive: what must live as long as the loop, as plain functions that it knows by address.
     """
 
     monitor: Any
     kept_alive: object = None
     network: dict[str, Any] | None = None
+    membership: dict[str, Any] | None = None
 
     @abstractmethod
     def advance(self, samples: int, every: int) -> Samples:
@@ -119,6 +122,14 @@ class ClosedLoop(ABC):
     @abstractmethod
     def _adopt(self, setup: "Setup") -> None:
         """Take the numbers."""
+
+    def start_at(self, step: int) -> None:
+        """Let the start be that of a later step, which begins a control period.
+
+        Raises:
+            EngineError: this loop knows no other start.
+        """
+        raise EngineError("only loops with a fixed timestep can go on where others ended")
 
     def push(self, force: NDArray[np.float64]) -> None:
         """Forces (m,) on the agents' outputs besides their inputs, from now until changed.

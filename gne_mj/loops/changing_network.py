@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.propagation import Propagator
 from gne_mj.graph import GraphData, connected
-from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import ClosedLoop, Present, Samples
 from gne_mj.loops.layout import Setup
+from gne_mj.loops.pieces import LoopInPieces
 
 KEPT = 256  # graphs whose numbers are kept for when they come again
 
 
-class ChangingNetworkLoop(ClosedLoop):
+class ChangingNetworkLoop(LoopInPieces):
     """Another loop, which is given the graph's numbers whenever the graph becomes another one.
 
     The storage function does not know the graph, so that it goes on across a change. In the held
@@ -73,28 +73,6 @@ class ChangingNetworkLoop(ClosedLoop):
     def _step(self) -> int:
         return round(self.time / self._setup.clock.h)
 
-    @property
-    def _inside(self) -> bool:
-        return bool(self.monitor.exit == watch.INSIDE)
-
-    def advance(self, samples: int, every: int) -> Samples:
-        """See the base class."""
-        rows: list[Samples] = []
-        while samples > 0 and self._inside:
-            ahead = self._look()
-            whole = min(ahead // every, samples)
-            if whole > 0:
-                rows.append(self._go(whole, every))
-                samples -= whole
-                continue
-            rows.append(self._go(1, ahead))  # the graph changes before the next sample
-            samples, left = samples - 1, every - ahead
-            while left > 0 and self._inside:
-                steps = min(self._look(), left)
-                self._go(1, steps)
-                left -= steps
-        return Samples.join(rows) if rows else self._loop.advance(0, every)
-
     def finish(self) -> Samples:
         """See the base class."""
         if self._inside:
@@ -108,6 +86,10 @@ class ChangingNetworkLoop(ClosedLoop):
     def push(self, force: NDArray[np.float64]) -> None:
         """See the base class."""
         self._loop.push(force)
+
+    def start_at(self, step: int) -> None:
+        """See the base class."""
+        self._loop.start_at(step)
 
     def _adopt(self, setup: Setup) -> None:
         self._setup = setup

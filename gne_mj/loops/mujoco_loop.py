@@ -99,6 +99,11 @@ class MujocoLoop(ClosedLoop):
         qpos = self.plant.data.qpos[: self.plant.configuration].copy()
         return Present(self.plant.state, self._memory.copy(), qpos)
 
+    def start_at(self, step: int) -> None:
+        """See the base class."""
+        self._progress.step = self._progress.work.memory_step = step
+        self.plant.data.time = self.time
+
     def _adopt(self, setup: Setup) -> None:
         self._parameter_block = mujoco_parameter_block(
             self.plant, setup, self.plant.agents, len(self._memory)

@@ -134,6 +134,11 @@ class OneLoop(ClosedLoop):
         size = len(now) - self._memory
         return Present(now[:size].reshape(self._shape), now[size:], now[:0])
 
+    def start_at(self, step: int) -> None:
+        """See the base class."""
+        loop = self._workspace.loop
+        loop.step = loop.work.memory_step = step
+
     def _take(self, setup: Setup) -> None:
         """Let this be what the loop reads."""
         self._parameter_block = ode_parameter_block(setup, self._agents, self._memory)

@@ -77,6 +77,12 @@ class Agents:
             input_limit=np.tile(self.input_limit, copies),
         )
 
+    def among(self, channels: NDArray[np.bool_]) -> Self:
+        """The agents of these channels, (m,)."""
+        return replace(
+            self, parameters=self.parameters[channels], input_limit=self.input_limit[channels]
+        )
+
     @cached_property
     def mobility(self) -> NDArray[np.float64] | None:
         """dy'/du of each channel, shape (m,), as 1/M of a robot; None where no ODE is known."""

@@ -23,6 +23,7 @@ from gne_mj.games.table import GameTable
 from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
+from gne_mj.membership import Membership, MembershipTable
 from gne_mj.plants.agent_type import placed_state, start_keys, start_of
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
@@ -134,6 +135,9 @@ class SystemTable(Table):
     margin: Annotated[MarginTable | None, Fills("disturbance")] = Field(
         None, description="the barrier is tightened so that these disturbances keep all inside"
     )
+    membership: MembershipTable | None = Field(
+        None, description="agents that leave and join during the run"
+    )
     faults: list[Annotated[FaultTable, FAULTS]] = Field(
         [], description="what goes wrong, each from a start (s) to an end"
     )
@@ -212,6 +216,7 @@ class SystemTable(Table):
             between=self.controller.between,
             observer=self.controller.observer,
             load=self._load(game),
+            membership=self._membership(game),
             feed_forward=self.controller.feed_forward,
             engine=self.plant.engine or self.agents.engine,
             integrator=self.plant.integrator or simulation.integrator,
@@ -346,6 +351,13 @@ class SystemTable(Table):
     def _load(self, game: Game) -> NDArray[np.float64] | None:
         given = self.initial.load
         return None if given is None else per_action("initial.load", given, game.sizes)
+
+    def _membership(self, game: Game) -> Membership | None:
+        if self.membership is None:
+            return None
+        with part_of("membership"):
+            away = self.game.away(self.agents.count)
+            return self.membership.build(game, away, self.game.keeps)
 
     def _separation(self) -> Separation | None:
         if self.separation is None:

@@ -35,12 +35,14 @@ from gne_mj.loops.link import (
 from gne_mj.loops.ode import OdeLoop
 from gne_mj.loops.one_loop import OneLoop
 from gne_mj.loops.separation import neighbours_length
+from gne_mj.membership import There
 from gne_mj.motion import STANDING, Frame, Motion, Moving, motion_of
 from gne_mj.plants.functions import METHODS
 from gne_mj.system import checks, steps
 from gne_mj.system.clock import Clock
 from gne_mj.system.data import SystemData
 from gne_mj.system.guard import room_ahead
+from gne_mj.system.membership import Present, check_instants, groups, membership_loop, present_of
 from gne_mj.system.modes import mode_of
 
 if TYPE_CHECKING:
@@ -79,12 +81,42 @@ class Assembly(SystemData):
                 over which an agent's output does not rise with its input, mode implicit.
         """
         setup = self.setup(clock)
+        if self.membership is not None:
+            loop: ClosedLoop = membership_loop(self, clock)
+            loop.kept_alive = self
+            return loop
         loop = self._closed_loop(setup, clock, plant)
         if isinstance(self.law.graph, ChangingGraph):
             loop.kept_alive = self
             loop = self._over_changing_network(loop, setup, clock)
         loop.kept_alive = self
         return loop
+
+    def among(self, there: There, y: NDArray[np.float64]) -> Present:
+        """Those that are there by themselves, at rest at outputs y (m,); made once."""
+        key = there.tobytes()
+        if key not in self._present:
+            self._present[key] = present_of(self, there, self.agents.equilibrium(y))
+        return self._present[key]
+
+    @cached_property
+    def _present(self) -> dict[bytes, Present]:
+        return {}
+
+    def equilibria_among(
+        self, times: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """What outputs y (samples, m) at times (samples,) are judged by: y* of those present.
+
+        Not numbers where it is not known, and for who is away.
+        """
+        if self.membership is None:
+            return self.equilibria(times)
+        found = np.full(y.shape, np.nan)
+        for there, rows in groups(self, y):
+            present = self.among(there, y[np.argmax(rows)])
+            found[np.ix_(rows, present.among.actions)] = present.system.equilibria(times[:1])[0]
+        return found
 
     def _over_changing_network(self, loop: ClosedLoop, setup: Setup, clock: Clock) -> ClosedLoop:
         law, held = self.law, mode_of(self).held
@@ -184,6 +216,7 @@ class Assembly(SystemData):
         """
         steps.check_step(self, clock)
         steps.check_network(self, clock)
+        check_instants(self, clock, held=mode_of(self).held)
         mode = mode_of(self)
         mode.check_period(self, clock)
         settings = self.law_settings(self.rho)

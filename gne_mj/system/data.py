@@ -31,6 +31,7 @@ from gne_mj.loops import (
 )
 from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance, of_the_set
+from gne_mj.membership import Membership
 from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position, placed_state
 from gne_mj.plants.agents import Agents
@@ -70,6 +71,7 @@ class SystemData:
     observer: float = 0.0
     load: NDArray[np.float64] | None = None
     on_exit: str = STOP
+    membership: Membership | None = None
     barrier: LogBarrier = field(init=False)
 
     @property

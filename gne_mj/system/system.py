@@ -9,6 +9,7 @@ from gne_mj.system import checks
 from gne_mj.system.apart import check_separation
 from gne_mj.system.assembly import Assembly
 from gne_mj.system.guard import check_guard
+from gne_mj.system.membership import check_membership
 from gne_mj.system.observer import check_observer
 
 
@@ -45,6 +46,7 @@ class System(Assembly):
             relative to its greatest magnitude so far.
         observer: mode implicit: gain of each agent's observer of loads (:mod:`gne_mj.loops.loads`),
             0 for none.
+        membership: who leaves and joins during a run, if anybody does.
         load: (m,) the loads that are known at the start, in the input's unit; 0 if left out.
         on_exit: "stop", or "continue": under a law that acts outside the set (``acts_outside``)
             runs go on there, and what they do is measured; under others they end as ever.
@@ -84,3 +86,4 @@ class System(Assembly):
         check_separation(self)
         check_guard(self)
         check_observer(self)
+        check_membership(self)

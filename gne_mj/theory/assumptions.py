@@ -38,7 +38,8 @@ def costs(system: System, slopes: Slopes) -> Assumption:
         if part.status == FAILS:
             return Assumption(label, FAILS, part.why)
     strict = strictly_convex_barrier(system)
-    if not strict:
+    strong = slopes.monotone and slopes.label == EXACT  # then one y* without strict convexity
+    if not strict and not strong:
         return Assumption(
             label, FAILS, "phi is not strictly convex: some actions are in no constraint's reach"
         )
@@ -46,12 +47,14 @@ def costs(system: System, slopes: Slopes) -> Assumption:
     if status == MET and (ASSUMED in (own.status, constraints.status) or game.box is None):
         status = ASSUMED
     why = f"{own.why}; {constraints.why}"
+    if not strict:
+        why += "; phi is not strictly convex, nor need it be where F is strongly monotone"
     if game.affine_constraints is not None:
         why += (
             f"; by the {game.affine_constraints} affine constraints of the same set and barrier,"
             " since the squared gaps as printed are neither affine nor is any strictly convex"
         )
-    elif game.gap_bounds is not None:
+    elif game.gap_bounds is not None and strict:
         why += (
             "; in substance: no squared gap is strictly convex, but phi is, which is what the"
             " proofs use"
