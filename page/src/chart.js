@@ -22,10 +22,10 @@ export const optionsOf = (plot, width, height) => ({
   legend: { show: false },
   padding: [6, 16, 0, 0],
   scales: {
-    x: { time: false, range: () => [0, plot.plots.span()] },
-    y: { range: (u, low, high) => rangeY(plot.spec.bounds, u.height, low, high) },
+    x: { time: false, range: () => plot.plots.window },
+    y: { distr: plot.look.log ? 3 : 1, range: (u, low, high) => valuesOf(plot, u, low, high) },
   },
-  axes: axesOf(plot.spec.unit),
+  axes: axesOf(plot.spec.unit, plot.look.log),
   series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
   focus: { alpha: 0.22 },
   cursor: {
@@ -46,8 +46,9 @@ export const optionsOf = (plot, width, height) => ({
 /**
  * @returns {uPlot.Axis[]}
  * @param {string} unit
+ * @param {boolean} log
  */
-const axesOf = (unit) => {
+const axesOf = (unit, log) => {
   const axis = {
     stroke: colour("muted"),
     font: FONT,
@@ -71,7 +72,8 @@ const axesOf = (unit) => {
       labelSize: 18,
       labelGap: 0,
       labelFont: FONT,
-      values: (_, ticks) => ticks.map((v) => number(v, 6)),
+      // of powers of ten those that uPlot leaves in
+      ...(!log && { values: (/** @type {uPlot} */ _, /** @type {number[]} */ ticks) => ticks.map((v) => number(v, 6)) }),
     },
   ];
 };
@@ -92,6 +94,20 @@ const seriesOf = (plot, label, k) => {
     points: { show: false },
     spanGaps: false,
   };
+};
+
+/**
+ * @returns {[number, number]}
+ * @param {Plot} plot
+ * @param {uPlot} u
+ * @param {number | null} low
+ * @param {number | null} high
+ */
+const valuesOf = ({ look, spec }, u, low, high) => {
+  if (look.values) return look.values;
+  if (!look.log) return rangeY(spec.bounds, u.height, low, high);
+  if (low === null || high === null || !(low > 0)) return [1e-3, 1];
+  return [low / 1.5, high * 1.5];
 };
 
 /**
@@ -124,7 +140,8 @@ const drawMarks = (u, plot) => {
   context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   context.clip();
   drawInterventions(u, plot.plots.source.interventions);
-  drawBounds(u, plot.spec);
+  drawApproach(u, plot);
+  if (!plot.look.log) drawBounds(u, plot.spec);
   context.restore();
 };
 
@@ -144,6 +161,31 @@ const drawInterventions = (u, interventions) => {
     context.lineTo(x, bbox.top + bbox.height);
     context.stroke();
   }
+};
+
+/**
+ * Where the run's least margin was.
+ * @param {uPlot} u
+ * @param {Plot} plot
+ */
+const drawApproach = (u, { spec, plots }) => {
+  const { margin_time: time } = plots.source.stateOf(spec.system);
+  if (typeof time !== "number") return;
+  const { ctx: context, bbox } = u;
+  const ratio = uPlot.pxRatio;
+  const x = u.valToPos(time, "x", true);
+  context.fillStyle = colour("limit");
+  context.beginPath();
+  context.moveTo(x, bbox.top + 8 * ratio);
+  context.lineTo(x - 5 * ratio, bbox.top);
+  context.lineTo(x + 5 * ratio, bbox.top);
+  context.fill();
+  if (spec.name !== "constraint") return;
+  context.font = `${12 * ratio}px system-ui, sans-serif`;
+  context.textBaseline = "top";
+  const leftward = x > bbox.left + 0.7 * bbox.width;
+  context.textAlign = leftward ? "right" : "left";
+  context.fillText("closest approach", x + (leftward ? -8 : 8) * ratio, bbox.top);
 };
 
 /**

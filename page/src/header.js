@@ -7,6 +7,11 @@ export class Header {
   chipKey = ""; // of what the chips say
   bannerText = "";
 
+  /** @param {(time: number) => void} lead to a moment */
+  constructor(lead) {
+    this.lead = lead;
+  }
+
   /**
    * @param {Scene} meta
    * @param {Source} source
@@ -27,8 +32,8 @@ export class Header {
     const key = JSON.stringify(systems.map((system) => source.stateOf(system)));
     if (key === this.chipKey) return;
     this.chipKey = key;
-    const of = source.seekable ? "the run's least margin" : "least margin so far";
-    const chips = systems.map((system) => chipOf(system, source.stateOf(system), of));
+    const of = source.seekable ? "closest approach" : "closest approach so far";
+    const chips = systems.map((system) => chipOf(system, source.stateOf(system), of, this.lead));
     byId("chips").replaceChildren(...chips);
     announce(systems, source);
   }
@@ -76,8 +81,9 @@ const announce = (systems, source) => {
  * @param {System} system
  * @param {State} state
  * @param {string} of what the margin is
+ * @param {(time: number) => void} lead to a moment
  */
-const chipOf = (system, state, of) => {
+const chipOf = (system, state, of, lead) => {
   const { kind, symbol, words } = status(state.status);
   const about = [
     system.game,
@@ -94,18 +100,24 @@ const chipOf = (system, state, of) => {
     },
     element("span", { class: "sign", "aria-hidden": true, text: symbol }),
     element("span", {}, element("b", { text: system.name }), `: ${words}`),
-    element("span", { class: "margin", text: marginText(state, of) }),
+    marginOf(state, of, lead),
   );
 };
 
 /**
+ * The least margin, which leads to where it was.
  * @param {State} state
  * @param {string} of what it is
+ * @param {(time: number) => void} lead
  */
-const marginText = ({ margin, margin_name: name, margin_time: time }, of) => {
-  if (typeof margin !== "number") return "no margin known";
-  const when = typeof time === "number" ? ` at ${fixed(time, time < 10 ? 2 : 1)} s` : "";
-  return `${of} ${number(margin)}${name ? ` · ${name}` : ""}${when}`;
+const marginOf = ({ margin, margin_name: name, margin_time: time }, of, lead) => {
+  if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
+  const text = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
+  if (typeof time !== "number") return element("span", { class: "margin", text });
+  const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;
+  const onclick = () => lead(time);
+  const title = "Show it";
+  return element("button", { type: "button", class: "margin", text: text + when, title, onclick });
 };
 
 /**

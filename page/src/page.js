@@ -12,6 +12,7 @@ import { Toolbar } from "./toolbar.js";
 import { Transport } from "./transport.js";
 import { Tuning } from "./tuning.js";
 import { wire } from "./wiring.js";
+import { number } from "./words.js";
 /** @import { Agent, Instant, Numbers, Pack, Scene as Meta, Source, System } from "./types.d.ts" */
 /** @import { Plot } from "./plot.js" */
 
@@ -28,7 +29,7 @@ export class Page {
       seek: (time) => this.seek(time),
       highlight: (which, plot) => this.highlight(which, plot),
     });
-    this.header = new Header();
+    this.header = new Header((time) => this.lead(time));
     this.toolbar = new Toolbar(this.scene, this.overlay);
     this.transport = new Transport(this);
     /** @type {Live | null} */
@@ -169,13 +170,19 @@ export class Page {
    * Exits and interventions of a replay, marked along the slider.
    * @param {Playback} playback
    */
-  markOutcome({ exits, interventions, end }) {
+  markOutcome(playback) {
+    const { exits, interventions, end } = playback;
     const marks = Object.entries(exits).map(([name, time]) => ({
       time,
       what: `${name} left the set`,
       bad: true,
     }));
-    this.transport.mark([...interventions, ...marks], end);
+    const near = (this.meta?.systems ?? []).flatMap((system) => {
+      const { margin, margin_time: time } = playback.stateOf(system);
+      const what = `${system.name}: closest approach, margin ${number(margin)}`;
+      return typeof time === "number" ? [{ time, what, near: true }] : [];
+    });
+    this.transport.mark([...interventions, ...near, ...marks], end);
   }
 
   // ---- what users ask for
@@ -207,6 +214,15 @@ export class Page {
   /** @param {number} time */
   seek(time) {
     this.source?.seek(time);
+  }
+
+  /**
+   * To a moment, with plots around it.
+   * @param {number} time
+   */
+  lead(time) {
+    this.seek(time);
+    this.plots.showAround(time);
   }
 
   /** To where the first system left the set. */

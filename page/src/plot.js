@@ -1,95 +1,34 @@
 // One plot over time: its caption, a chip for each line, and uPlot's chart.
 import uPlot from "uplot";
+import { captionOf, swatchOf } from "./caption.js";
 import { MOST_CHIPS, optionsOf } from "./chart.js";
 import { line } from "./colours.js";
-import { element } from "./dom.js";
+import { element, press } from "./dom.js";
+import { Reading } from "./reading.js";
 import { colour } from "./theme.js";
+import { exitLine, TimeLine } from "./timeline.js";
+import { Hands, scaled } from "./window.js";
 import { decimals, fixed } from "./words.js";
 /** @import { Plots } from "./plots.js" */
 /** @import { Spec } from "./specs.js" */
 /** @import { Agent } from "./types.d.ts" */
 
 /**
- * A little TeX as text with subscripts: "y_i - y_{i-1}"; null if it holds more than that.
- * @param {string} tex
+ * How a plot is looked at, which stays while its theme or its run changes.
+ * @typedef {{hidden: Set<number>, log: boolean, values: [number, number] | null}} Look
  */
-const symbolOf = (tex) => {
-  const plain = tex
-    .replace(/\\(lVert|rVert|Vert|\|)/g, "‖")
-    .replace(/\\(left|right|,|;|mathrm|text)/g, "")
-    .replace(/-/g, "−");
-  if (!plain || /[\\^]/.test(plain)) return null;
-  const made = element("span", { class: "symbol" });
-  for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
-    made.append(other ?? element("sub", { text: sub ?? one }));
-  return made;
-};
-
-/**
- * @param {Spec} spec
- * @param {HTMLElement} note
- */
-const captionOf = (spec, note) =>
-  element(
-    "figcaption",
-    {},
-    element("span", { class: "plot-system", text: spec.system.name }),
-    element("span", { class: "plot-title", text: spec.title }),
-    symbolOf(spec.symbol),
-    note,
-  );
-
-const exitLine = () =>
-  element(
-    "div",
-    { class: "exit-line", hidden: true },
-    element("span", { text: "left the set" }),
-  );
-
-/**
- * A short piece of a line as it is drawn in the plot.
- * @param {{colour: string, dash: number[]}} look
- */
-const swatchOf = (look) => {
-  const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
-  const context = /** @type {CanvasRenderingContext2D} */ (made.getContext("2d"));
-  Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
-  context.setLineDash(look.dash.map((length) => 1.6 * length));
-  context.moveTo(0, 3);
-  context.lineTo(28, 3);
-  context.stroke();
-  return made;
-};
-
-/** A vertical line over the chart, at a time. */
-class TimeLine {
-  /** @param {HTMLElement} root */
-  constructor(root) {
-    this.root = root;
-    this.x = NaN;
-  }
-
-  /**
-   * @param {uPlot} u
-   * @param {number} time
-   */
-  place(u, time) {
-    const x = Math.round(u.valToPos(time, "x"));
-    if (this.x === x) return; // painting anew costs more than all else here
-    this.x = x;
-    this.root.style.transform = `translateX(${x}px)`;
-    this.root.style.visibility = Number.isFinite(x) ? "visible" : "hidden";
-  }
-}
 
 export class Plot {
   /**
    * @param {Plots} plots
    * @param {Spec} spec
+   * @param {Look} look
    */
-  constructor(plots, spec) {
+  constructor(plots, spec, look) {
     this.plots = plots;
     this.spec = spec;
+    this.look = look;
+    this.hidden = look.hidden; // lines that are switched off
     /** @type {number | null} */
     this.hovered = null; // index into the samples
     /** @type {number | null} */
@@ -98,18 +37,27 @@ export class Plot {
     this.uplot = null; // from when there is a size
     this.mouseInside = false;
     this.chips = element("div", { class: "plot-chips" });
-    this.chart = element("div", { class: "chart" });
     const shown = spec.columns.length;
     this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
     this.note = element("span", { class: "plot-note", text: this.several });
+    this.reading = new Reading(this);
     const name = `${spec.system.name}: ${spec.title} over time`;
+    this.chart = element("div", {
+      class: "chart",
+      tabindex: 0,
+      role: "group",
+      "aria-label": `${name}; arrow keys read values`,
+      onkeydown: (/** @type {KeyboardEvent} */ event) => this.reading.key(event),
+      onblur: () => this.reading.at(null),
+    });
     this.root = element("figure", { class: "plot", "aria-label": name });
-    this.root.append(captionOf(spec, this.note), this.chips, this.chart);
+    this.root.append(captionOf(this), this.chips, this.chart, this.reading.spoken);
     this.timeLine = new TimeLine(element("div", { class: "time-line" }));
     this.exitLine = new TimeLine(exitLine());
     this.values = shown > MOST_CHIPS ? [] : spec.labels.map((_, k) => this.addChip(k));
     this.readout = element("span", { class: "readout" });
     if (!this.values.length) this.chips.append(this.readout);
+    this.chips.append(this.note);
   }
 
   /**
@@ -123,21 +71,53 @@ export class Plot {
   }
 
   /**
-   * The chip of the k-th line; returns where its value is written.
+   * The chip of the k-th line, which switches it; returns where its value is written.
    * @param {number} k
    */
   addChip(k) {
     const { spec } = this;
-    const value = element("span", { class: "chip-value" });
-    const attributes = {
-      class: "plot-chip",
-      title: `${spec.noun} ${spec.labels[k]}`.trim(),
-      onmouseenter: () => this.point(k),
-      onmouseleave: () => this.point(null),
-    };
-    const text = spec.total === 1 ? "" : spec.shorts[k];
-    this.chips.append(element("span", attributes, swatchOf(this.lineOf(k)), text, value));
+    const value = element("span", { class: "chip-value", "aria-hidden": true });
+    const what = `${spec.noun} ${spec.labels[k]}`.trim();
+    const chip = element(
+      "button",
+      {
+        type: "button",
+        class: "plot-chip",
+        title: `${what}: click switches the line, a double click shows it alone`,
+        "aria-label": `line of ${what}`,
+        onmouseenter: () => this.point(k),
+        onmouseleave: () => this.point(null),
+        onclick: () => this.toggle(k),
+        ondblclick: () => this.showOnly(k),
+      },
+      swatchOf(this.lineOf(k)),
+      spec.total === 1 ? "" : spec.shorts[k],
+      value,
+    );
+    press(chip, !this.hidden.has(k));
+    this.chips.append(chip);
     return value;
+  }
+
+  /** @param {number} k */
+  toggle(k) {
+    if (!this.hidden.delete(k)) this.hidden.add(k);
+    this.showLines();
+  }
+
+  /** @param {number} k */
+  showOnly(k) {
+    this.hidden.clear();
+    for (const each of this.spec.columns.keys()) if (each !== k) this.hidden.add(each);
+    this.showLines();
+  }
+
+  showLines() {
+    const { uplot, hidden } = this;
+    uplot?.batch(() => {
+      for (const k of this.spec.columns.keys()) uplot.setSeries(k + 1, { show: !hidden.has(k) });
+    });
+    this.values.forEach((value, k) => value.parentElement && press(value.parentElement, !hidden.has(k)));
   }
 
   /**
@@ -186,16 +166,84 @@ export class Plot {
    */
   setSize(width, height) {
     if (this.uplot) return this.uplot.setSize({ width, height });
+    this.make(width, height);
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  make(width, height) {
+    this.uplot?.destroy();
     this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
-    this.uplot.over.append(this.timeLine.root, this.exitLine.root);
-    this.listen(this.uplot, this.uplot.over);
+    const { over } = this.uplot;
+    over.append(this.timeLine.root, this.exitLine.root);
+    this.timeLine.x = this.exitLine.x = NaN;
+    new Hands(this, this.uplot);
+    over.addEventListener("mouseenter", () => (this.mouseInside = true));
+    over.addEventListener("mouseleave", () => {
+      this.mouseInside = false;
+      this.point(null);
+    });
+    this.plots.place(this);
+  }
+
+  /** @param {boolean} log */
+  setLogarithmic(log) {
+    Object.assign(this.look, { log, values: null });
+    if (this.uplot) this.make(this.uplot.width, this.uplot.height);
+  }
+
+  /** Whether what is drawn is the values' negative: of what must stay below 0 the margin. */
+  get turned() {
+    return this.look.log && this.spec.name === "constraint";
+  }
+
+  /** The columns as they are. */
+  columns() {
+    const { store } = this.plots.source;
+    return this.spec.columns.map((k) => store.column(this.spec.array, k));
   }
 
   /** @returns {uPlot.AlignedData} */
   data() {
-    const { store } = this.plots.source;
-    return [store.time, ...this.spec.columns.map((k) => store.column(this.spec.array, k))];
+    const { time } = this.plots.source.store;
+    if (!this.look.log) return [time, ...this.columns()];
+    const sign = this.turned ? -1 : 1;
+    const drawn = this.columns().map((column) =>
+      column.map((value) => (value !== null && sign * value > 0 ? sign * value : null)),
+    );
+    return [time, ...drawn];
   }
+
+  /** @param {(position: number) => number} move of where an edge is, px, to where it was */
+  moveValues(move) {
+    const u = this.uplot;
+    if (!u) return;
+    const [top, bottom] = [0, u.over.clientHeight].map((edge) => u.posToVal(move(edge), "y"));
+    this.look.values = [Math.min(top, bottom), Math.max(top, bottom)];
+    u.setData(u.data, true);
+  }
+
+  /**
+   * @param {number} factor
+   * @param {number} around px
+   */
+  zoomValues(factor, around) {
+    const [top, bottom] = scaled([0, this.uplot?.over.clientHeight ?? 1], around, factor);
+    const high = this.uplot?.over.clientHeight ?? 1;
+    this.moveValues((edge) => top + ((bottom - top) * edge) / high);
+  }
+
+  /**
+   * @param {number} from px
+   * @param {number} to
+   */
+  panValues(from, to) {
+    this.moveValues((edge) => edge + from - to);
+  }
+
+  // ---- values
 
   /**
    * The mouse is somewhere over this plot, or over one beside it.
@@ -221,32 +269,6 @@ export class Plot {
     this.tell(focused);
   }
 
-  /**
-   * @param {uPlot} u
-   * @param {HTMLElement} over
-   */
-  listen(u, over) {
-    let dragging = false;
-    const seek = (/** @type {MouseEvent} */ event) => {
-      const left = event.clientX - over.getBoundingClientRect().left;
-      this.plots.callbacks.seek(u.posToVal(left, "x"));
-    };
-    over.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0 || !this.plots.source.seekable) return;
-      dragging = true;
-      over.setPointerCapture(event.pointerId);
-      seek(event);
-    });
-    over.addEventListener("pointermove", (event) => dragging && seek(event));
-    over.addEventListener("pointerup", () => (dragging = false));
-    over.addEventListener("pointercancel", () => (dragging = false));
-    over.addEventListener("mouseenter", () => (this.mouseInside = true));
-    over.addEventListener("mouseleave", () => {
-      this.mouseInside = false;
-      this.point(null);
-    });
-  }
-
   refresh() {
     this.uplot?.setData(this.data(), true);
     this.writeValues();
@@ -261,24 +283,34 @@ export class Plot {
     root.hidden = !Number.isFinite(exit);
     if (root.hidden) return;
     this.exitLine.place(this.uplot, exit);
-    root.classList.toggle("leftward", exit > 0.7 * this.plots.span());
+    const [from, to] = this.plots.window;
+    root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+  }
+
+  /**
+   * @param {number} k
+   * @param {number} i
+   */
+  valueText(k, i) {
+    const { store } = this.plots.source;
+    const value = this.uplot?.data[k + 1][i] ?? null;
+    return fixed(value, decimals(store.greatest(this.spec.array)));
   }
 
   /** Values at the mouse, or now. */
   writeValues() {
     const u = this.uplot;
     if (!u) return;
-    const digits = decimals(this.plots.source.store.greatest(this.spec.array));
     const i = this.hovered ?? u.valToIdx(this.plots.now);
     const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
-    this.note.textContent = [this.several, hover].filter(Boolean).join(" · ");
-    const value = (/** @type {number} */ k) => fixed(u.data[k + 1][i] ?? null, digits);
-    this.values.forEach((place, k) => (place.textContent = value(k)));
+    const turned = this.turned ? "margin −g, log" : this.look.log ? "log" : "";
+    this.note.textContent = [this.several, turned, hover].filter(Boolean).join(" · ");
+    this.values.forEach((place, k) => (place.textContent = this.valueText(k, i)));
     if (this.values.length) return;
     const { spec, focused: k } = this;
     this.readout.textContent =
       k === null
         ? "point at a line for its value"
-        : `${spec.noun} ${spec.labels[k]}: ${value(k)} ${spec.unit}`.trim();
+        : `${spec.noun} ${spec.labels[k]}: ${this.valueText(k, i)} ${spec.unit}`.trim();
   }
 }

@@ -1,7 +1,14 @@
 // Plots over time, one below the other: each system's actions and bounded quantities.
+import { element } from "./dom.js";
 import { Plot } from "./plot.js";
 import { specsOf } from "./specs.js";
+import { scaled, STEP, within } from "./window.js";
+import { number } from "./words.js";
+/** @import { Look } from "./plot.js" */
 /** @import { Agent, Scene, Source } from "./types.d.ts" */
+/** @import { Stretch } from "./window.js" */
+
+const AROUND = 0.04; // of the run, that is shown on both sides of a moment
 
 /** @param {number} t */
 const niceSpan = (t) => {
@@ -27,7 +34,30 @@ export class Plots {
     this.source = /** @type {any} */ (null); // from the first scene on
     this.now = 0;
     this.size = "";
+    /** @type {Stretch | null} */
+    this.stretch = null; // of time that is shown; null: all
+    /** @type {Map<string, Look>} */
+    this.looks = new Map();
+    this.shown = element("span", { class: "muted", role: "status" });
+    this.all = this.tool("All", "All of the run (0)", () => this.showAll());
+    this.tools = element(
+      "div",
+      { id: "plot-tools", role: "toolbar", "aria-label": "time that plots show" },
+      this.tool("−", "More time (−)", () => this.zoom(1 / STEP)),
+      this.tool("+", "Less time (+)", () => this.zoom(STEP)),
+      this.all,
+      this.shown,
+    );
     new ResizeObserver(() => this.resize()).observe(column);
+  }
+
+  /**
+   * @param {string} text
+   * @param {string} title
+   * @param {() => void} onclick
+   */
+  tool(text, title, onclick) {
+    return element("button", { type: "button", class: "tool", text, title, onclick });
   }
 
   /**
@@ -36,12 +66,70 @@ export class Plots {
    * @param {Source} source
    */
   setScene(meta, source) {
+    if (meta !== this.meta) {
+      this.looks.clear();
+      this.stretch = null;
+    }
     this.meta = meta;
     this.source = source;
-    this.plots = meta.systems.flatMap(specsOf).map((spec) => new Plot(this, spec));
-    this.column.replaceChildren(...this.plots.map((plot) => plot.root));
+    this.plots = meta.systems.flatMap(specsOf).map((spec) => {
+      const key = `${spec.array} ${spec.axis}`;
+      const look = this.looks.get(key) ?? { hidden: new Set(), log: false, values: null };
+      this.looks.set(key, look);
+      return new Plot(this, spec, look);
+    });
+    this.column.replaceChildren(this.tools, ...this.plots.map((plot) => plot.root));
     this.size = "";
     this.resize();
+    this.tellStretch();
+  }
+
+  // ---- the time that is shown
+
+  /** @returns {Stretch} */
+  get window() {
+    return this.stretch ?? [0, this.span()];
+  }
+
+  /** @param {Stretch | null} stretch */
+  show(stretch) {
+    this.stretch = stretch && within(stretch, this.span());
+    for (const { uplot } of this.plots) uplot?.setData(uplot.data, true);
+    this.tellStretch();
+  }
+
+  showAll() {
+    for (const { look } of this.plots) look.values = null;
+    this.show(null);
+  }
+
+  /**
+   * @param {number} factor
+   * @param {number} around s
+   */
+  zoom(factor, around = this.now) {
+    const [from, to] = this.window;
+    const middle = around < from || around > to ? (from + to) / 2 : around;
+    this.show(scaled([from, to], middle, factor));
+  }
+
+  /** @param {number} seconds */
+  pan(seconds) {
+    if (this.stretch) this.show([this.stretch[0] + seconds, this.stretch[1] + seconds]);
+  }
+
+  /**
+   * A moment, with some time on both sides.
+   * @param {number} time
+   */
+  showAround(time) {
+    const far = AROUND * this.span();
+    this.show([time - far, time + far]);
+  }
+
+  tellStretch() {
+    const [from, to] = this.window;
+    this.shown.textContent = this.stretch ? `${number(from, 4)} to ${number(to, 4)} s` : "";
   }
 
   /** @param {Source} source */
@@ -72,7 +160,7 @@ export class Plots {
     const count = Math.max(this.plots.length, 1);
     const extra = this.plots.reduce(
       (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-      0,
+      this.tools.offsetHeight,
     );
     const room = (this.column.clientHeight - extra - 16) / count;
     const height = Math.floor(Math.min(Math.max(room, 112), 300));
@@ -81,6 +169,13 @@ export class Plots {
     this.size = size;
     for (const plot of this.plots) plot.setSize(width, height);
     for (const plot of this.plots) plot.setTime(this.now);
+  }
+
+  /** @param {Plot} plot whose chart is new */
+  place(plot) {
+    plot.setTime(this.now);
+    plot.showLines();
+    plot.writeValues();
   }
 
   refresh() {
@@ -106,7 +201,7 @@ export class Plots {
   }
 
   describe() {
-    return this.plots.map(({ spec, uplot }) => ({
+    return this.plots.map(({ spec, uplot, look }) => ({
       system: spec.system.name,
       name: spec.name,
       axis: spec.axis,
@@ -116,6 +211,10 @@ export class Plots {
       bounds: spec.bounds.map(({ value }) => value),
       width: uplot?.width ?? 0,
       samples: uplot?.data[0].length ?? 0,
+      time: uplot && [uplot.scales.x.min, uplot.scales.x.max],
+      values: uplot && [uplot.scales.y.min, uplot.scales.y.max],
+      hidden: [...look.hidden],
+      log: look.log,
     }));
   }
 }

@@ -23,6 +23,7 @@ export class Transport {
     this.speed.onchange = () =>
       page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
     this.slider.oninput = () => page.seek(Number(this.slider.value));
+    this.lead = (/** @type {number} */ time) => page.lead(time);
   }
 
   /**
@@ -76,16 +77,19 @@ export class Transport {
   }
 
   /**
-   * Marks along the slider.
-   * @param {(Intervention & {bad?: boolean})[]} marks
+   * Marks along the slider, each of which leads there.
+   * @param {(Intervention & {bad?: boolean, near?: boolean})[]} marks
    * @param {number} end
    */
   mark(marks, end) {
     byId("time-marks").replaceChildren(
-      ...marks.map(({ time, what, bad }) =>
-        element("span", {
-          class: bad ? "mark bad" : "mark",
+      ...marks.map(({ time, what, bad, near }) =>
+        element("button", {
+          type: "button",
+          class: `mark ${bad ? "bad" : near ? "near" : ""}`,
           title: `${time.toFixed(2)} s: ${what}`,
+          "aria-label": `${time.toFixed(2)} s: ${what}`,
+          onclick: () => this.lead(time),
           style: `left: ${(100 * time) / (end || 1)}%`,
         }),
       ),

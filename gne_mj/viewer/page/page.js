@@ -178,6 +178,10 @@
     chipKey = "";
     // of what the chips say
     bannerText = "";
+    /** @param {(time: number) => void} lead to a moment */
+    constructor(lead) {
+      this.lead = lead;
+    }
     /**
      * @param {Scene} meta
      * @param {Source} source
@@ -197,8 +201,8 @@
       const key = JSON.stringify(systems.map((system) => source.stateOf(system)));
       if (key === this.chipKey) return;
       this.chipKey = key;
-      const of = source.seekable ? "the run's least margin" : "least margin so far";
-      const chips = systems.map((system) => chipOf(system, source.stateOf(system), of));
+      const of = source.seekable ? "closest approach" : "closest approach so far";
+      const chips = systems.map((system) => chipOf(system, source.stateOf(system), of, this.lead));
       byId("chips").replaceChildren(...chips);
       announce(systems, source);
     }
@@ -229,7 +233,7 @@
     const place = byId("announcement");
     if (place.textContent !== text) place.textContent = text;
   };
-  var chipOf = (system, state, of) => {
+  var chipOf = (system, state, of, lead) => {
     const { kind, symbol, words } = status(state.status);
     const about = [
       system.game,
@@ -246,13 +250,17 @@
       },
       element("span", { class: "sign", "aria-hidden": true, text: symbol }),
       element("span", {}, element("b", { text: system.name }), `: ${words}`),
-      element("span", { class: "margin", text: marginText(state, of) })
+      marginOf(state, of, lead)
     );
   };
-  var marginText = ({ margin, margin_name: name, margin_time: time }, of) => {
-    if (typeof margin !== "number") return "no margin known";
-    const when = typeof time === "number" ? ` at ${fixed(time, time < 10 ? 2 : 1)} s` : "";
-    return `${of} ${number(margin)}${name ? ` · ${name}` : ""}${when}`;
+  var marginOf = ({ margin, margin_name: name, margin_time: time }, of, lead) => {
+    if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
+    const text = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
+    if (typeof time !== "number") return element("span", { class: "margin", text });
+    const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;
+    const onclick = () => lead(time);
+    const title = "Show it";
+    return element("button", { type: "button", class: "margin", text: text + when, title, onclick });
   };
   var exitText = (system, source) => {
     const { status: word, message } = source.stateOf(system);
@@ -5625,6 +5633,122 @@
     paths.spline = monotoneCubic;
   }
 
+  // src/export.js
+  var DIGITS = 9;
+  var download = (name, blob) => {
+    const url = URL.createObjectURL(blob);
+    element("a", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  };
+  var fileOf = ({ spec }) => [spec.system.name, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
+  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  var csvOf = (plot) => {
+    const { spec, plots, hidden } = plot;
+    const [from, to] = plots.window;
+    const { time } = plots.source.store;
+    const columns = plot.columns();
+    const on2 = [...columns.keys()].filter((k) => !hidden.has(k));
+    const unit = spec.unit ? ` (${spec.unit})` : "";
+    const names = on2.map((k) => quoted(`${spec.noun} ${spec.labels[k]}`.trim() + unit));
+    const rows = [["time (s)", ...names].join(",")];
+    time.forEach((t, i) => {
+      if (t < from || t > to) return;
+      const values = on2.map((k) => columns[k][i]);
+      const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
+      rows.push(texts.join(","));
+    });
+    return [...rows, ""].join("\n");
+  };
+  var saveCsv = (plot) => download(`${fileOf(plot)}.csv`, new Blob([csvOf(plot)], { type: "text/csv" }));
+  var pictureOf = ({ uplot, spec, hidden, lineOf }) => {
+    if (!uplot) return null;
+    const chart = uplot.ctx.canvas;
+    const ratio = chart.width / uplot.width;
+    const on2 = [...spec.labels.keys()].filter((k) => !hidden.has(k));
+    const perRow = Math.max(1, Math.floor(uplot.width / 110));
+    const key = on2.length > 14 || spec.total === 1 ? [] : on2;
+    const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
+    const canvas = element("canvas", {
+      width: chart.width,
+      height: chart.height + ratio * (above + below)
+    });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      canvas.getContext("2d")
+    );
+    context.fillStyle = colour("panel");
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(chart, 0, ratio * above);
+    context.scale(ratio, ratio);
+    context.textBaseline = "middle";
+    context.fillStyle = colour("text");
+    context.font = "600 14px system-ui, sans-serif";
+    context.fillText(`${spec.system.name}: ${spec.title}`, 8, above / 2);
+    context.font = "12px system-ui, sans-serif";
+    key.forEach((k, n) => {
+      const look = lineOf.call({ spec }, k);
+      const x = 8 + 110 * (n % perRow);
+      const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
+      Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
+      context.setLineDash(look.dash);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x + 20, y);
+      context.stroke();
+      context.fillText(spec.shorts[k], x + 26, y, 80);
+    });
+    return canvas;
+  };
+  var savePng = (plot) => pictureOf(plot)?.toBlob((blob) => blob && download(`${fileOf(plot)}.png`, blob));
+
+  // src/caption.js
+  var symbolOf = (tex) => {
+    const plain = tex.replace(/\\(lVert|rVert|Vert|\|)/g, "‖").replace(/\\(left|right|,|;|mathrm|text)/g, "").replace(/-/g, "−");
+    if (!plain || /[\\^]/.test(plain)) return null;
+    const made = element("span", { class: "symbol" });
+    for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
+      made.append(other ?? element("sub", { text: sub ?? one }));
+    return made;
+  };
+  var captionOf = (plot) => {
+    const { spec } = plot;
+    const what = `${spec.system.name}, ${spec.title}`;
+    const tool = (text, title, act) => element("button", { type: "button", text, title, "aria-label": `${title}: ${what}`, onclick: act });
+    const log = tool("log", "Logarithmic scale", () => {
+      plot.setLogarithmic(!plot.look.log);
+      press(log, plot.look.log);
+    });
+    press(log, plot.look.log);
+    log.className = "toggle";
+    return element(
+      "figcaption",
+      {},
+      element("span", { class: "plot-system", text: spec.system.name }),
+      element("span", { class: "plot-title", text: spec.title }),
+      symbolOf(spec.symbol),
+      element(
+        "span",
+        { class: "plot-tools" },
+        log,
+        tool("CSV", "Save the numbers that are shown", () => saveCsv(plot)),
+        tool("PNG", "Save the picture", () => savePng(plot))
+      )
+    );
+  };
+  var swatchOf = (look) => {
+    const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      made.getContext("2d")
+    );
+    Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
+    context.setLineDash(look.dash.map((length) => 1.6 * length));
+    context.moveTo(0, 3);
+    context.lineTo(28, 3);
+    context.stroke();
+    return made;
+  };
+
   // src/chart.js
   var MOST_CHIPS = 14;
   var FONT = "12px system-ui, sans-serif";
@@ -5635,10 +5759,10 @@
     legend: { show: false },
     padding: [6, 16, 0, 0],
     scales: {
-      x: { time: false, range: () => [0, plot.plots.span()] },
-      y: { range: (u, low, high) => rangeY(plot.spec.bounds, u.height, low, high) }
+      x: { time: false, range: () => plot.plots.window },
+      y: { distr: plot.look.log ? 3 : 1, range: (u, low, high) => valuesOf(plot, u, low, high) }
     },
-    axes: axesOf(plot.spec.unit),
+    axes: axesOf(plot.spec.unit, plot.look.log),
     series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
     focus: { alpha: 0.22 },
     cursor: {
@@ -5660,7 +5784,7 @@
       )]
     }
   });
-  var axesOf = (unit) => {
+  var axesOf = (unit, log) => {
     const axis = {
       stroke: colour("muted"),
       font: FONT,
@@ -5684,7 +5808,8 @@
         labelSize: 18,
         labelGap: 0,
         labelFont: FONT,
-        values: (_2, ticks2) => ticks2.map((v) => number(v, 6))
+        // of powers of ten those that uPlot leaves in
+        ...!log && { values: (_2, ticks2) => ticks2.map((v) => number(v, 6)) }
       }
     ];
   };
@@ -5698,6 +5823,12 @@
       points: { show: false },
       spanGaps: false
     };
+  };
+  var valuesOf = ({ look, spec }, u, low, high) => {
+    if (look.values) return look.values;
+    if (!look.log) return rangeY(spec.bounds, u.height, low, high);
+    if (low === null || high === null || !(low > 0)) return [1e-3, 1];
+    return [low / 1.5, high * 1.5];
   };
   var rangeY = (bounds, height, low, high) => {
     for (const { value } of bounds) {
@@ -5716,7 +5847,8 @@
     context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     context.clip();
     drawInterventions(u, plot.plots.source.interventions);
-    drawBounds(u, plot.spec);
+    drawApproach(u, plot);
+    if (!plot.look.log) drawBounds(u, plot.spec);
     context.restore();
   };
   var drawInterventions = (u, interventions) => {
@@ -5731,6 +5863,25 @@
       context.lineTo(x, bbox.top + bbox.height);
       context.stroke();
     }
+  };
+  var drawApproach = (u, { spec, plots }) => {
+    const { margin_time: time } = plots.source.stateOf(spec.system);
+    if (typeof time !== "number") return;
+    const { ctx: context, bbox } = u;
+    const ratio = uPlot.pxRatio;
+    const x = u.valToPos(time, "x", true);
+    context.fillStyle = colour("limit");
+    context.beginPath();
+    context.moveTo(x, bbox.top + 8 * ratio);
+    context.lineTo(x - 5 * ratio, bbox.top);
+    context.lineTo(x + 5 * ratio, bbox.top);
+    context.fill();
+    if (spec.name !== "constraint") return;
+    context.font = `${12 * ratio}px system-ui, sans-serif`;
+    context.textBaseline = "top";
+    const leftward = x > bbox.left + 0.7 * bbox.width;
+    context.textAlign = leftward ? "right" : "left";
+    context.fillText("closest approach", x + (leftward ? -8 : 8) * ratio, bbox.top);
   };
   var drawBounds = (u, { bounds, unit }) => {
     const { ctx: context, bbox } = u;
@@ -5755,41 +5906,182 @@
     }
   };
 
-  // src/plot.js
-  var symbolOf = (tex) => {
-    const plain = tex.replace(/\\(lVert|rVert|Vert|\|)/g, "‖").replace(/\\(left|right|,|;|mathrm|text)/g, "").replace(/-/g, "−");
-    if (!plain || /[\\^]/.test(plain)) return null;
-    const made = element("span", { class: "symbol" });
-    for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
-      made.append(other ?? element("sub", { text: sub ?? one }));
-    return made;
+  // src/window.js
+  var NARROWEST = 1e-4;
+  var STEP = 0.7;
+  var scaled = ([from, to], around, factor) => [
+    around - (around - from) * factor,
+    around + (to - around) * factor
+  ];
+  var within = ([from, to], whole) => {
+    const width = Math.max(to - from, NARROWEST * whole);
+    if (!(width < 0.999 * whole)) return null;
+    const begin = Math.min(Math.max(from, 0), whole - width);
+    return [begin, begin + width];
   };
-  var captionOf = (spec, note) => element(
-    "figcaption",
-    {},
-    element("span", { class: "plot-system", text: spec.system.name }),
-    element("span", { class: "plot-title", text: spec.title }),
-    symbolOf(spec.symbol),
-    note
-  );
-  var exitLine = () => element(
-    "div",
-    { class: "exit-line", hidden: true },
-    element("span", { text: "left the set" })
-  );
-  var swatchOf = (look) => {
-    const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
-    const context = (
-      /** @type {CanvasRenderingContext2D} */
-      made.getContext("2d")
-    );
-    Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
-    context.setLineDash(look.dash.map((length) => 1.6 * length));
-    context.moveTo(0, 3);
-    context.lineTo(28, 3);
-    context.stroke();
-    return made;
+  var Hands = class {
+    /**
+     * @param {Plot} plot
+     * @param {uPlot} u
+     */
+    constructor(plot, u) {
+      this.plot = plot;
+      this.u = u;
+      this.mark = element("div", { class: "stretch", hidden: true });
+      u.over.append(this.mark);
+      this.down = /* @__PURE__ */ new Map();
+      this.doing = null;
+      this.begun = 0;
+      u.root.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+      u.root.addEventListener("pointerdown", (event) => this.press(event));
+      u.root.addEventListener("pointermove", (event) => this.drag(event));
+      for (
+        const name of
+        /** @type {const} */
+        ["pointerup", "pointercancel"]
+      )
+        u.root.addEventListener(name, (event) => this.release(event));
+      u.root.addEventListener("dblclick", () => plot.plots.showAll());
+    }
+    /**
+     * Which part of the plot a point is in, and where in it.
+     * @param {MouseEvent} event
+     */
+    at({ clientX, clientY }) {
+      const box = this.u.over.getBoundingClientRect();
+      const [x, y] = [clientX - box.left, clientY - box.top];
+      const part = x < 0 ? "values" : y > box.height ? "time" : "lines";
+      return { part, x, y };
+    }
+    /** @param {WheelEvent} event */
+    wheel(event) {
+      const { part, x, y } = this.at(event);
+      if (part === "lines" && !event.ctrlKey) return;
+      event.preventDefault();
+      const factor = event.deltaY > 0 ? 1 / STEP : STEP;
+      if (part === "values") this.plot.zoomValues(factor, y);
+      else this.plot.plots.zoom(factor, this.u.posToVal(x, "x"));
+    }
+    /** @param {PointerEvent} event */
+    press(event) {
+      if (event.button !== 0) return;
+      const { part, x, y } = this.at(event);
+      this.down.set(event.pointerId, { x, y });
+      this.u.root.setPointerCapture(event.pointerId);
+      if (this.down.size > 1) this.doing = "pinch";
+      else if (part === "values" || part === "time") this.doing = part;
+      else if (event.shiftKey || !this.plot.plots.source.seekable)
+        this.doing = event.pointerType === "touch" ? "time" : "stretch";
+      else this.doing = "seek";
+      this.begun = x;
+      if (this.doing === "seek") this.seek(x);
+    }
+    /** @param {PointerEvent} event */
+    drag(event) {
+      const before = this.down.get(event.pointerId);
+      if (!before) return;
+      const { x, y } = this.at(event);
+      const { plots } = this.plot;
+      if (this.doing === "seek") this.seek(x);
+      if (this.doing === "stretch") this.showMark(x);
+      if (this.doing === "time") plots.pan(this.u.posToVal(before.x, "x") - this.u.posToVal(x, "x"));
+      if (this.doing === "values") this.plot.panValues(before.y, y);
+      if (this.doing === "pinch") this.pinch(event.pointerId, x);
+      this.down.set(event.pointerId, { x, y });
+    }
+    /**
+     * Two fingers stretch time between them.
+     * @param {number} finger that moves
+     * @param {number} x where it is now
+     */
+    pinch(finger, x) {
+      const other = [...this.down].find(([id]) => id !== finger)?.[1].x;
+      const before = this.down.get(finger)?.x;
+      if (other === void 0 || before === void 0) return;
+      const [wide, now] = [Math.abs(before - other), Math.abs(x - other)];
+      if (wide > 10 && now > 10) this.plot.plots.zoom(wide / now, this.u.posToVal(other, "x"));
+    }
+    /** @param {PointerEvent} event */
+    release(event) {
+      const stands = this.down.get(event.pointerId);
+      this.down.delete(event.pointerId);
+      this.mark.hidden = true;
+      if (this.doing === "stretch" && stands && Math.abs(stands.x - this.begun) > 4) {
+        const ends = [this.begun, stands.x].map((x) => this.u.posToVal(x, "x"));
+        this.plot.plots.show([Math.min(...ends), Math.max(...ends)]);
+      }
+      if (!this.down.size) this.doing = null;
+    }
+    /** @param {number} x */
+    seek(x) {
+      this.plot.plots.callbacks.seek(this.u.posToVal(x, "x"));
+    }
+    /** @param {number} x */
+    showMark(x) {
+      this.mark.hidden = false;
+      this.mark.style.left = `${Math.min(x, this.begun)}px`;
+      this.mark.style.width = `${Math.abs(x - this.begun)}px`;
+    }
   };
+
+  // src/reading.js
+  var FAR = 10;
+  var Reading = class {
+    /** @param {Plot} plot */
+    constructor(plot) {
+      this.plot = plot;
+      this.spoken = element("span", { class: "unseen", role: "status" });
+    }
+    /**
+     * Keys of a plot that has the focus read its values, and zoom.
+     * @param {KeyboardEvent} event
+     */
+    key(event) {
+      const u = this.plot.uplot;
+      if (!u || event.ctrlKey || event.metaKey || event.altKey) return;
+      const last = u.data[0].length - 1;
+      const now = this.plot.hovered ?? u.valToIdx(this.plot.plots.now);
+      const by = event.shiftKey ? FAR : 1;
+      const actions = {
+        ArrowLeft: () => this.at(Math.max(now - by, 0)),
+        ArrowRight: () => this.at(Math.min(now + by, last)),
+        Home: () => this.at(u.valToIdx(this.plot.plots.window[0])),
+        End: () => this.at(u.valToIdx(this.plot.plots.window[1])),
+        Escape: () => this.at(null),
+        "+": () => this.plot.plots.zoom(STEP, u.data[0][now]),
+        "=": () => this.plot.plots.zoom(STEP, u.data[0][now]),
+        "-": () => this.plot.plots.zoom(1 / STEP, u.data[0][now]),
+        0: () => this.plot.plots.showAll()
+      };
+      if (!actions[event.key]) return;
+      event.preventDefault();
+      event.stopPropagation();
+      actions[event.key]();
+    }
+    /** @param {number | null} i of a sample */
+    at(i) {
+      const u = this.plot.uplot;
+      if (!u) return;
+      this.plot.hovered = i;
+      const left = i === null ? -10 : u.valToPos(u.data[0][i], "x");
+      u.setCursor({ left, top: i === null ? -10 : 1 }, false);
+      this.plot.hovered = i;
+      this.plot.writeValues();
+      this.spoken.textContent = i === null ? "" : this.sentence(u, i);
+    }
+    /**
+     * @param {uPlot} u
+     * @param {number} i
+     */
+    sentence(u, i) {
+      const { spec } = this.plot;
+      const on2 = [...spec.labels.keys()].filter((k) => !this.plot.hidden.has(k)).slice(0, MOST_CHIPS);
+      const values = on2.map((k) => `${spec.noun} ${spec.labels[k]} ${this.plot.valueText(k, i)}`);
+      return `${fixed(u.data[0][i], 2)} s: ${values.join(", ")} ${spec.unit}`;
+    }
+  };
+
+  // src/timeline.js
   var TimeLine = class {
     /** @param {HTMLElement} root */
     constructor(root) {
@@ -5805,34 +6097,54 @@
       if (this.x === x) return;
       this.x = x;
       this.root.style.transform = `translateX(${x}px)`;
-      this.root.style.visibility = Number.isFinite(x) ? "visible" : "hidden";
+      const seen = x >= 0 && x <= u.over.clientWidth;
+      this.root.style.visibility = seen ? "visible" : "hidden";
     }
   };
+  var exitLine = () => element(
+    "div",
+    { class: "exit-line", hidden: true },
+    element("span", { text: "left the set" })
+  );
+
+  // src/plot.js
   var Plot = class {
     /**
      * @param {Plots} plots
      * @param {Spec} spec
+     * @param {Look} look
      */
-    constructor(plots, spec) {
+    constructor(plots, spec, look) {
       this.plots = plots;
       this.spec = spec;
+      this.look = look;
+      this.hidden = look.hidden;
       this.hovered = null;
       this.focused = null;
       this.uplot = null;
       this.mouseInside = false;
       this.chips = element("div", { class: "plot-chips" });
-      this.chart = element("div", { class: "chart" });
       const shown = spec.columns.length;
       this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
       this.note = element("span", { class: "plot-note", text: this.several });
+      this.reading = new Reading(this);
       const name = `${spec.system.name}: ${spec.title} over time`;
+      this.chart = element("div", {
+        class: "chart",
+        tabindex: 0,
+        role: "group",
+        "aria-label": `${name}; arrow keys read values`,
+        onkeydown: (event) => this.reading.key(event),
+        onblur: () => this.reading.at(null)
+      });
       this.root = element("figure", { class: "plot", "aria-label": name });
-      this.root.append(captionOf(spec, this.note), this.chips, this.chart);
+      this.root.append(captionOf(this), this.chips, this.chart, this.reading.spoken);
       this.timeLine = new TimeLine(element("div", { class: "time-line" }));
       this.exitLine = new TimeLine(exitLine());
       this.values = shown > MOST_CHIPS ? [] : spec.labels.map((_2, k) => this.addChip(k));
       this.readout = element("span", { class: "readout" });
       if (!this.values.length) this.chips.append(this.readout);
+      this.chips.append(this.note);
     }
     /**
      * Colour and dash of the k-th line.
@@ -5844,21 +6156,50 @@
       return line(spec.agents[k] ?? spec.columns[k]);
     }
     /**
-     * The chip of the k-th line; returns where its value is written.
+     * The chip of the k-th line, which switches it; returns where its value is written.
      * @param {number} k
      */
     addChip(k) {
       const { spec } = this;
-      const value = element("span", { class: "chip-value" });
-      const attributes = {
-        class: "plot-chip",
-        title: `${spec.noun} ${spec.labels[k]}`.trim(),
-        onmouseenter: () => this.point(k),
-        onmouseleave: () => this.point(null)
-      };
-      const text = spec.total === 1 ? "" : spec.shorts[k];
-      this.chips.append(element("span", attributes, swatchOf(this.lineOf(k)), text, value));
+      const value = element("span", { class: "chip-value", "aria-hidden": true });
+      const what = `${spec.noun} ${spec.labels[k]}`.trim();
+      const chip = element(
+        "button",
+        {
+          type: "button",
+          class: "plot-chip",
+          title: `${what}: click switches the line, a double click shows it alone`,
+          "aria-label": `line of ${what}`,
+          onmouseenter: () => this.point(k),
+          onmouseleave: () => this.point(null),
+          onclick: () => this.toggle(k),
+          ondblclick: () => this.showOnly(k)
+        },
+        swatchOf(this.lineOf(k)),
+        spec.total === 1 ? "" : spec.shorts[k],
+        value
+      );
+      press(chip, !this.hidden.has(k));
+      this.chips.append(chip);
       return value;
+    }
+    /** @param {number} k */
+    toggle(k) {
+      if (!this.hidden.delete(k)) this.hidden.add(k);
+      this.showLines();
+    }
+    /** @param {number} k */
+    showOnly(k) {
+      this.hidden.clear();
+      for (const each of this.spec.columns.keys()) if (each !== k) this.hidden.add(each);
+      this.showLines();
+    }
+    showLines() {
+      const { uplot, hidden } = this;
+      uplot?.batch(() => {
+        for (const k of this.spec.columns.keys()) uplot.setSeries(k + 1, { show: !hidden.has(k) });
+      });
+      this.values.forEach((value, k) => value.parentElement && press(value.parentElement, !hidden.has(k)));
     }
     /**
      * One line is pointed at: it stands out, and so does its agent in the scene.
@@ -5903,15 +6244,75 @@
      */
     setSize(width, height) {
       if (this.uplot) return this.uplot.setSize({ width, height });
+      this.make(width, height);
+    }
+    /**
+     * @param {number} width
+     * @param {number} height
+     */
+    make(width, height) {
+      this.uplot?.destroy();
       this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
-      this.uplot.over.append(this.timeLine.root, this.exitLine.root);
-      this.listen(this.uplot, this.uplot.over);
+      const { over } = this.uplot;
+      over.append(this.timeLine.root, this.exitLine.root);
+      this.timeLine.x = this.exitLine.x = NaN;
+      new Hands(this, this.uplot);
+      over.addEventListener("mouseenter", () => this.mouseInside = true);
+      over.addEventListener("mouseleave", () => {
+        this.mouseInside = false;
+        this.point(null);
+      });
+      this.plots.place(this);
+    }
+    /** @param {boolean} log */
+    setLogarithmic(log) {
+      Object.assign(this.look, { log, values: null });
+      if (this.uplot) this.make(this.uplot.width, this.uplot.height);
+    }
+    /** Whether what is drawn is the values' negative: of what must stay below 0 the margin. */
+    get turned() {
+      return this.look.log && this.spec.name === "constraint";
+    }
+    /** The columns as they are. */
+    columns() {
+      const { store } = this.plots.source;
+      return this.spec.columns.map((k) => store.column(this.spec.array, k));
     }
     /** @returns {uPlot.AlignedData} */
     data() {
-      const { store } = this.plots.source;
-      return [store.time, ...this.spec.columns.map((k) => store.column(this.spec.array, k))];
+      const { time } = this.plots.source.store;
+      if (!this.look.log) return [time, ...this.columns()];
+      const sign2 = this.turned ? -1 : 1;
+      const drawn = this.columns().map(
+        (column) => column.map((value) => value !== null && sign2 * value > 0 ? sign2 * value : null)
+      );
+      return [time, ...drawn];
     }
+    /** @param {(position: number) => number} move of where an edge is, px, to where it was */
+    moveValues(move) {
+      const u = this.uplot;
+      if (!u) return;
+      const [top, bottom] = [0, u.over.clientHeight].map((edge) => u.posToVal(move(edge), "y"));
+      this.look.values = [Math.min(top, bottom), Math.max(top, bottom)];
+      u.setData(u.data, true);
+    }
+    /**
+     * @param {number} factor
+     * @param {number} around px
+     */
+    zoomValues(factor, around) {
+      const [top, bottom] = scaled([0, this.uplot?.over.clientHeight ?? 1], around, factor);
+      const high = this.uplot?.over.clientHeight ?? 1;
+      this.moveValues((edge) => top + (bottom - top) * edge / high);
+    }
+    /**
+     * @param {number} from px
+     * @param {number} to
+     */
+    panValues(from, to) {
+      this.moveValues((edge) => edge + from - to);
+    }
+    // ---- values
     /**
      * The mouse is somewhere over this plot, or over one beside it.
      * @param {uPlot} u
@@ -5934,31 +6335,6 @@
       this.markChip(focused);
       this.tell(focused);
     }
-    /**
-     * @param {uPlot} u
-     * @param {HTMLElement} over
-     */
-    listen(u, over) {
-      let dragging = false;
-      const seek = (event) => {
-        const left = event.clientX - over.getBoundingClientRect().left;
-        this.plots.callbacks.seek(u.posToVal(left, "x"));
-      };
-      over.addEventListener("pointerdown", (event) => {
-        if (event.button !== 0 || !this.plots.source.seekable) return;
-        dragging = true;
-        over.setPointerCapture(event.pointerId);
-        seek(event);
-      });
-      over.addEventListener("pointermove", (event) => dragging && seek(event));
-      over.addEventListener("pointerup", () => dragging = false);
-      over.addEventListener("pointercancel", () => dragging = false);
-      over.addEventListener("mouseenter", () => this.mouseInside = true);
-      over.addEventListener("mouseleave", () => {
-        this.mouseInside = false;
-        this.point(null);
-      });
-    }
     refresh() {
       this.uplot?.setData(this.data(), true);
       this.writeValues();
@@ -5972,21 +6348,30 @@
       root.hidden = !Number.isFinite(exit);
       if (root.hidden) return;
       this.exitLine.place(this.uplot, exit);
-      root.classList.toggle("leftward", exit > 0.7 * this.plots.span());
+      const [from, to] = this.plots.window;
+      root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+    }
+    /**
+     * @param {number} k
+     * @param {number} i
+     */
+    valueText(k, i) {
+      const { store } = this.plots.source;
+      const value = this.uplot?.data[k + 1][i] ?? null;
+      return fixed(value, decimals(store.greatest(this.spec.array)));
     }
     /** Values at the mouse, or now. */
     writeValues() {
       const u = this.uplot;
       if (!u) return;
-      const digits = decimals(this.plots.source.store.greatest(this.spec.array));
       const i = this.hovered ?? u.valToIdx(this.plots.now);
       const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
-      this.note.textContent = [this.several, hover].filter(Boolean).join(" · ");
-      const value = (k2) => fixed(u.data[k2 + 1][i] ?? null, digits);
-      this.values.forEach((place, k2) => place.textContent = value(k2));
+      const turned = this.turned ? "margin −g, log" : this.look.log ? "log" : "";
+      this.note.textContent = [this.several, turned, hover].filter(Boolean).join(" · ");
+      this.values.forEach((place, k2) => place.textContent = this.valueText(k2, i));
       if (this.values.length) return;
       const { spec, focused: k } = this;
-      this.readout.textContent = k === null ? "point at a line for its value" : `${spec.noun} ${spec.labels[k]}: ${value(k)} ${spec.unit}`.trim();
+      this.readout.textContent = k === null ? "point at a line for its value" : `${spec.noun} ${spec.labels[k]}: ${this.valueText(k, i)} ${spec.unit}`.trim();
     }
   };
 
@@ -6075,6 +6460,7 @@
   ].map(thinned);
 
   // src/plots.js
+  var AROUND = 0.04;
   var niceSpan = (t) => {
     const ten = 10 ** Math.floor(Math.log10(t));
     return ten * ([1, 1.5, 2, 3, 5, 7.5].find((step) => step * ten >= t) ?? 10);
@@ -6095,7 +6481,27 @@
       null;
       this.now = 0;
       this.size = "";
+      this.stretch = null;
+      this.looks = /* @__PURE__ */ new Map();
+      this.shown = element("span", { class: "muted", role: "status" });
+      this.all = this.tool("All", "All of the run (0)", () => this.showAll());
+      this.tools = element(
+        "div",
+        { id: "plot-tools", role: "toolbar", "aria-label": "time that plots show" },
+        this.tool("−", "More time (−)", () => this.zoom(1 / STEP)),
+        this.tool("+", "Less time (+)", () => this.zoom(STEP)),
+        this.all,
+        this.shown
+      );
       new ResizeObserver(() => this.resize()).observe(column);
+    }
+    /**
+     * @param {string} text
+     * @param {string} title
+     * @param {() => void} onclick
+     */
+    tool(text, title, onclick) {
+      return element("button", { type: "button", class: "tool", text, title, onclick });
     }
     /**
      * Plots for a scene.
@@ -6103,12 +6509,62 @@
      * @param {Source} source
      */
     setScene(meta, source) {
+      if (meta !== this.meta) {
+        this.looks.clear();
+        this.stretch = null;
+      }
       this.meta = meta;
       this.source = source;
-      this.plots = meta.systems.flatMap(specsOf).map((spec) => new Plot(this, spec));
-      this.column.replaceChildren(...this.plots.map((plot) => plot.root));
+      this.plots = meta.systems.flatMap(specsOf).map((spec) => {
+        const key = `${spec.array} ${spec.axis}`;
+        const look = this.looks.get(key) ?? { hidden: /* @__PURE__ */ new Set(), log: false, values: null };
+        this.looks.set(key, look);
+        return new Plot(this, spec, look);
+      });
+      this.column.replaceChildren(this.tools, ...this.plots.map((plot) => plot.root));
       this.size = "";
       this.resize();
+      this.tellStretch();
+    }
+    // ---- the time that is shown
+    /** @returns {Stretch} */
+    get window() {
+      return this.stretch ?? [0, this.span()];
+    }
+    /** @param {Stretch | null} stretch */
+    show(stretch) {
+      this.stretch = stretch && within(stretch, this.span());
+      for (const { uplot } of this.plots) uplot?.setData(uplot.data, true);
+      this.tellStretch();
+    }
+    showAll() {
+      for (const { look } of this.plots) look.values = null;
+      this.show(null);
+    }
+    /**
+     * @param {number} factor
+     * @param {number} around s
+     */
+    zoom(factor, around = this.now) {
+      const [from, to] = this.window;
+      const middle = around < from || around > to ? (from + to) / 2 : around;
+      this.show(scaled([from, to], middle, factor));
+    }
+    /** @param {number} seconds */
+    pan(seconds) {
+      if (this.stretch) this.show([this.stretch[0] + seconds, this.stretch[1] + seconds]);
+    }
+    /**
+     * A moment, with some time on both sides.
+     * @param {number} time
+     */
+    showAround(time) {
+      const far = AROUND * this.span();
+      this.show([time - far, time + far]);
+    }
+    tellStretch() {
+      const [from, to] = this.window;
+      this.shown.textContent = this.stretch ? `${number(from, 4)} to ${number(to, 4)} s` : "";
     }
     /** @param {Source} source */
     setSource(source) {
@@ -6134,7 +6590,7 @@
       const count = Math.max(this.plots.length, 1);
       const extra = this.plots.reduce(
         (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-        0
+        this.tools.offsetHeight
       );
       const room = (this.column.clientHeight - extra - 16) / count;
       const height = Math.floor(Math.min(Math.max(room, 112), 300));
@@ -6143,6 +6599,12 @@
       this.size = size;
       for (const plot of this.plots) plot.setSize(width, height);
       for (const plot of this.plots) plot.setTime(this.now);
+    }
+    /** @param {Plot} plot whose chart is new */
+    place(plot) {
+      plot.setTime(this.now);
+      plot.showLines();
+      plot.writeValues();
     }
     refresh() {
       for (const plot of this.plots) plot.refresh();
@@ -6163,7 +6625,7 @@
       for (const plot of this.plots) if (plot !== except) plot.highlight(which);
     }
     describe() {
-      return this.plots.map(({ spec, uplot }) => ({
+      return this.plots.map(({ spec, uplot, look }) => ({
         system: spec.system.name,
         name: spec.name,
         axis: spec.axis,
@@ -6172,7 +6634,11 @@
         total: spec.total,
         bounds: spec.bounds.map(({ value }) => value),
         width: uplot?.width ?? 0,
-        samples: uplot?.data[0].length ?? 0
+        samples: uplot?.data[0].length ?? 0,
+        time: uplot && [uplot.scales.x.min, uplot.scales.x.max],
+        values: uplot && [uplot.scales.y.min, uplot.scales.y.max],
+        hidden: [...look.hidden],
+        log: look.log
       }));
     }
   };
@@ -7084,12 +7550,12 @@
 
   // src/plan.js
   var STRIP = new THREE.PlaneGeometry(1, 1);
-  var AROUND = 48;
-  var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND);
+  var AROUND2 = 48;
+  var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND2);
   var WIDTH3 = 0.05;
   var LEAD = 0.02;
   var RIM = 0.025;
-  var STEP = 4e-3;
+  var STEP2 = 4e-3;
   var used = (value, high, low) => {
     const middle = typeof high === "number" && typeof low === "number" ? (high + low) / 2 : 0;
     const up = typeof high === "number" ? (value - middle) / (high - middle) : -Infinity;
@@ -7150,7 +7616,7 @@
     }
     /** @param {number} radius */
     addDisc(radius) {
-      return this.add(new THREE.RingGeometry(Math.max(radius - RIM, 0), radius, AROUND), 0.8);
+      return this.add(new THREE.RingGeometry(Math.max(radius - RIM, 0), radius, AROUND2), 0.8);
     }
     restyle() {
       this.region?.fill.material.color.set(colour("limit"));
@@ -7183,13 +7649,13 @@
     update(instant, layout) {
       const own = instant.systems[this.system.name];
       const [x, y] = this.origin(instant.time);
-      const level = layout.floor + STEP;
+      const level = layout.floor + STEP2;
       if (this.region)
         for (const part of [this.region.fill, this.region.edge]) part.position.set(x, y, level);
       for (const distance of this.distances) this.placeDistance(distance, own, layout);
       for (let agent = 0; agent < this.system.agents; agent++) {
         const [px, py] = layout.agentAt(this.system, agent);
-        this.discs[agent]?.position.set(px, py, level + STEP);
+        this.discs[agent]?.position.set(px, py, level + STEP2);
         this.placeOutput(agent, [px, py], own.action, instant.time, level);
       }
     }
@@ -7203,7 +7669,7 @@
       const share = used(value, quantity.bound?.[entry], quantity.lower_bound?.[entry]);
       strip.material.color.setRGB(...ramp(share));
       const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
-      this.stretch(strip, ends[0], ends[1], WIDTH3, layout.floor + 2 * STEP);
+      this.stretch(strip, ends[0], ends[1], WIDTH3, layout.floor + 2 * STEP2);
     }
     /**
      * The mark at an agent's output, and the line that leads to it.
@@ -7220,8 +7686,8 @@
       const axes = owner.flatMap((each, k) => each === agent + 1 ? [k] : []);
       axes.forEach((k, axis) => to[axis] += action[k]);
       if (axes.length === 1) to[1] = from[1];
-      this.marks[agent].position.set(to[0], to[1], level + 3 * STEP);
-      this.stretch(this.leads[agent], from, to, LEAD, level + 2 * STEP);
+      this.marks[agent].position.set(to[0], to[1], level + 3 * STEP2);
+      this.stretch(this.leads[agent], from, to, LEAD, level + 2 * STEP2);
     }
     /**
      * @param {Three} strip
@@ -7611,6 +8077,7 @@
       byId("restart").onclick = () => page.restart();
       this.speed.onchange = () => page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
       this.slider.oninput = () => page.seek(Number(this.slider.value));
+      this.lead = (time) => page.lead(time);
     }
     /**
      * @param {Source} source what is shown
@@ -7658,16 +8125,19 @@
       this.slider.style.setProperty("--done", `${end ? 100 * time / end : 0}%`);
     }
     /**
-     * Marks along the slider.
-     * @param {(Intervention & {bad?: boolean})[]} marks
+     * Marks along the slider, each of which leads there.
+     * @param {(Intervention & {bad?: boolean, near?: boolean})[]} marks
      * @param {number} end
      */
     mark(marks, end) {
       byId("time-marks").replaceChildren(
         ...marks.map(
-          ({ time, what, bad }) => element("span", {
-            class: bad ? "mark bad" : "mark",
+          ({ time, what, bad, near }) => element("button", {
+            type: "button",
+            class: `mark ${bad ? "bad" : near ? "near" : ""}`,
             title: `${time.toFixed(2)} s: ${what}`,
+            "aria-label": `${time.toFixed(2)} s: ${what}`,
+            onclick: () => this.lead(time),
             style: `left: ${100 * time / (end || 1)}%`
           })
         )
@@ -7911,7 +8381,7 @@
   };
 
   // src/wiring.js
-  var NARROWEST = 280;
+  var NARROWEST2 = 280;
   var VIEW = 380;
   var wire = (page) => {
     const { scene, toolbar } = page;
@@ -7979,7 +8449,7 @@
   var wireDivider = () => {
     const divider = byId("divider");
     const set = (width) => {
-      const fitting = Math.round(Math.min(Math.max(width, NARROWEST), innerWidth - VIEW));
+      const fitting = Math.round(Math.min(Math.max(width, NARROWEST2), innerWidth - VIEW));
       document.documentElement.style.setProperty("--plots", `${fitting}px`);
       divider.setAttribute("aria-valuenow", String(fitting));
     };
@@ -8008,7 +8478,7 @@
         seek: (time) => this.seek(time),
         highlight: (which, plot) => this.highlight(which, plot)
       });
-      this.header = new Header();
+      this.header = new Header((time) => this.lead(time));
       this.toolbar = new Toolbar(this.scene, this.overlay);
       this.transport = new Transport(this);
       this.live = null;
@@ -8135,13 +8605,19 @@
      * Exits and interventions of a replay, marked along the slider.
      * @param {Playback} playback
      */
-    markOutcome({ exits, interventions, end }) {
+    markOutcome(playback) {
+      const { exits, interventions, end } = playback;
       const marks = Object.entries(exits).map(([name, time]) => ({
         time,
         what: `${name} left the set`,
         bad: true
       }));
-      this.transport.mark([...interventions, ...marks], end);
+      const near = (this.meta?.systems ?? []).flatMap((system) => {
+        const { margin, margin_time: time } = playback.stateOf(system);
+        const what = `${system.name}: closest approach, margin ${number(margin)}`;
+        return typeof time === "number" ? [{ time, what, near: true }] : [];
+      });
+      this.transport.mark([...interventions, ...near, ...marks], end);
     }
     // ---- what users ask for
     playPause() {
@@ -8167,6 +8643,14 @@
     /** @param {number} time */
     seek(time) {
       this.source?.seek(time);
+    }
+    /**
+     * To a moment, with plots around it.
+     * @param {number} time
+     */
+    lead(time) {
+      this.seek(time);
+      this.plots.showAround(time);
     }
     /** To where the first system left the set. */
     seekExit() {

@@ -1,0 +1,135 @@
+"""Plots that one can work with: time and values, lines, scales, files, and the closest approach."""
+
+import csv
+
+import numpy as np
+import pytest
+from test_view_browser import opened, origins, quiet, seek, until
+
+import gne_mj
+from gne_mj.viewer import serve
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return gne_mj.run("paper", {"simulation.duration": 4.0})
+
+
+@pytest.fixture
+def shown(page, recorded, paper):
+    server = serve(paper, "the paper")
+    opened(page, server.url)
+    page.set_viewport_size({"width": 1440, "height": 900})
+    yield page
+    quiet(recorded, *origins(server))
+    server.close()
+
+
+def plot(page, number):
+    return page.evaluate("n => window.gne.plots[n]", number)
+
+
+def figure(page, number):
+    return page.locator("figure.plot").nth(number)
+
+
+def times(page):
+    return plot(page, 0)["time"]
+
+
+def wheel(page, figure_, x, y, delta):
+    """Over a point of the lines' area, given in parts of its width and height."""
+    box = figure_.locator(".u-over").bounding_box()
+    page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    page.mouse.wheel(0, delta)
+    page.evaluate("() => new Promise(resolve => setTimeout(resolve, 60))")
+
+
+def test_time_and_values_are_zoomed_and_moved(shown):
+    first = figure(shown, 0)
+    assert times(shown) == [0, 4]
+    whole = plot(shown, 0)["values"]
+    wheel(shown, first, 0.25, 1.1, -100)  # below: time, about the point
+    begin, end = times(shown)
+    assert end - begin == pytest.approx(0.7 * 4)
+    assert begin + 0.25 * (end - begin) == pytest.approx(1.0, abs=0.02)
+    assert [plot(shown, n)["time"] for n in range(6)] == [[begin, end]] * 6
+    values = plot(shown, 0)["values"]
+    wheel(shown, first, -0.05, 0.5, -100)  # beside: values, of this plot alone
+    low, high = plot(shown, 0)["values"]
+    assert high - low == pytest.approx(0.7 * (values[1] - values[0]), rel=0.05)
+    wheel(shown, first, 0.5, 0.5, -100)  # over the lines it scrolls
+    assert times(shown) == [begin, end]
+
+    box = first.locator(".u-over").bounding_box()
+    shown.keyboard.down("Shift")  # a stretch of time
+    shown.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 20)
+    shown.mouse.down()
+    shown.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 20, steps=3)
+    shown.mouse.up()
+    shown.keyboard.up("Shift")
+    wide = end - begin
+    expected = [begin + 0.2 * wide, begin + 0.6 * wide]
+    assert np.allclose(times(shown), expected, atol=0.02 * wide)
+    shown.locator("#plot-tools button", has_text="All").click()
+    assert times(shown) == [0, 4]
+    assert plot(shown, 0)["values"] == whole
+
+
+def test_lines_are_switched_read_and_kept(shown, paper):
+    data = paper["robots"]
+    first = figure(shown, 0)
+    high = plot(shown, 0)["values"][1]
+    chip = first.locator(".plot-chip").nth(int(data["action"].to_numpy().max(axis=0).argmax()))
+    chip.click()
+    assert chip.get_attribute("aria-pressed") == "false"
+    assert plot(shown, 0)["values"][1] < high
+    first.locator(".plot-chip").nth(1).dblclick()
+    assert plot(shown, 0)["hidden"] == [0, 2, 3, 4]
+
+    first.locator(".chart").focus()
+    shown.keyboard.press("Home")
+    shown.keyboard.press("Shift+ArrowRight")
+    said = first.locator("[role=status]").text_content()
+    assert said == f"0.50 s: robot 2 {float(data['action'][10, 1]):.2f} m/s"
+    assert shown.evaluate("window.gne.time()") == 0  # the key was the plot's
+    shown.keyboard.press("Escape")
+
+    shown.evaluate("document.activeElement.blur()")
+    wheel(shown, first, 0.0, 1.1, -100)
+    with shown.expect_download() as loading:
+        first.get_by_text("CSV").click()
+    assert loading.value.suggested_filename == "robots-action.csv"
+    head, *rows = csv.reader(loading.value.path().read_text().splitlines())
+    assert head == ["time (s)", "robot 2 (m/s)"]
+    assert 20 < len(rows) < 81  # what is shown
+    found = np.array(rows, dtype=float)
+    assert np.allclose(found[:, 1], data["action"].sel(time=found[:, 0], method="nearest")[:, 1])
+    with shown.expect_download() as loading:
+        first.get_by_text("PNG").click()
+    assert loading.value.path().read_bytes()[:4] == b"\x89PNG"
+
+
+def test_margins_on_a_logarithmic_scale(shown, paper):
+    number = 2
+    assert plot(shown, number)["name"] == "constraint"
+    figure(shown, number).locator(".plot-tools .toggle").click()
+    margins = -paper["robots"]["constraint"].to_numpy()
+    low, high = plot(shown, number)["values"]
+    assert (low, high) == pytest.approx((margins.min() / 1.5, margins.max() * 1.5), rel=1e-5)
+    shown.keyboard.press("d")  # what is switched stays in another theme
+    assert plot(shown, number)["log"]
+
+
+def test_the_closest_approach_is_found(shown, paper):
+    worst = paper.reports["robots"]["worst_constraint"]
+    chip = shown.locator(".chip button.margin").first
+    assert worst["name"] in chip.inner_text()
+    seek(shown, 3.0)
+    chip.click()
+    until(shown, "t => Math.abs(window.gne.time() - t) < 1e-9", arg=worst["time"])
+    begin, end = times(shown)
+    assert begin <= worst["time"] <= end
+    assert end - begin == pytest.approx(0.08 * 4)
+    marks = shown.locator("#time-marks button")
+    assert "channels: closest approach" in marks.nth(1).get_attribute("aria-label")
