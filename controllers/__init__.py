@@ -9,6 +9,7 @@ from gne_mj.controllers.l1_penalty import L1Penalty
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.partial_information import PartialInformation
 from gne_mj.controllers.plain_law import PlainLaw
+from gne_mj.controllers.primal_dual_partial import PrimalDualPartial
 from gne_mj.controllers.primal_dual_play import PrimalDual
 from gne_mj.controllers.quadratic_penalty import QuadraticPenalty
 from gne_mj.controllers.recursive_safe_flow import RecursiveSafeFlow
@@ -25,6 +26,7 @@ __all__ = [
     "PartialInformation",
     "PlainLaw",
     "PrimalDual",
+    "PrimalDualPartial",
     "QuadraticPenalty",
     "RecursiveSafeFlow",
     "SafeMonotoneFlow",

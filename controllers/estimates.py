@@ -6,13 +6,15 @@ the law writes there before anything else at every evaluation (:func:`prepare`).
 
 Where messages can be lost or late, the memory has one more row for each link of the graph (each
 agent's neighbours in turn): what came over it last. Then that is what an agent has of a neighbour.
+A law can have two rows more an agent, behind all estimates, that are sent with them
+(``sent_besides``).
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.propagation import propagate_estimates
-from gne_mj.controllers.settings import LINKS, RATE
+from gne_mj.controllers.settings import BESIDES, LINKS, RATE
 from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
 
@@ -45,7 +47,18 @@ def given_estimates(
 def heard_at(problem, m, link):
     """Where in the memory an agent has a neighbour's row: the row itself, or what came last."""
     links = int(problem.settings[LINKS])
-    return links + link * m if links > 0 else problem.graph.neighbour[link] * m
+    message = m + 2 * int(problem.settings[BESIDES])
+    return links + link * message if links > 0 else problem.graph.neighbour[link] * m
+
+
+@kernel
+def besides_at(problem, m, block, link):
+    """Where it has the neighbour's row of the first or second block behind the estimates."""
+    links, size = int(problem.settings[LINKS]), int(problem.settings[BESIDES])
+    if links > 0:
+        return links + link * (m + 2 * size) + m + block * size
+    agents = len(problem.data.offsets) - 1
+    return agents * m + (block * agents + problem.graph.neighbour[link]) * size
 
 
 @kernel

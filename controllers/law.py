@@ -92,6 +92,8 @@ class Law(ABC):
             takes for the profile. Others may (``decentralised``), or solve all together.
         rosenbrock: whether integrator rosenbrock knows its Jacobian.
         kept: the estimates that it keeps, where these are not all.
+        sent_besides: entries of each of the two rows an agent that stand behind all estimates and
+            are sent with them; 0 for none.
         propagates: whether its memory can be propagated, as mode sampled needs.
         guarded: whether the barrier's whole gradient at the measured outputs is part of the input,
             so that outputs which are measured and driven as they should be cannot leave the set in
@@ -114,6 +116,7 @@ class Law(ABC):
     alone: ClassVar[bool] = False
     rosenbrock: ClassVar[bool] = False
     kept: Kept | None = None
+    sent_besides: int = 0
     propagates: bool = True
     guarded: ClassVar[bool] = False
     acts_outside: ClassVar[bool] = False
@@ -185,6 +188,7 @@ class Law(ABC):
         numbers[settings.RATE] = self.estimate_rate
         numbers[settings.LINKS] = 0.0
         numbers[settings.OBSERVER] = 0.0
+        numbers[settings.BESIDES] = self.sent_besides
         numbers[settings.GUARDED] = float(self.guarded)
         numbers[settings.OUTSIDE] = settings.ENDS if self.acts_outside else settings.NO_ACTION
         return numbers

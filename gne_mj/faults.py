@@ -357,14 +357,17 @@ def for_native(faults: Sequence[Fault], game: Game, graph: Graph | None, seed: i
 
 
 def links_memory(
-    graph: Graph, actions: int, memory: NDArray[np.float64], delay: int
+    graph: Graph, actions: int, memory: NDArray[np.float64], delay: int, besides: int = 0
 ) -> NDArray[np.float64]:
     """What a law's memory needs behind it where messages can be lost or late, flat.
 
     Over every link the sender's row, as if it had come just before the start; then room for the
-    rows sent during the last ``delay`` + 1 control periods.
+    rows sent during the last ``delay`` + 1 control periods. ``besides`` is the law's
+    ``sent_besides``.
     """
-    rows = memory[: graph.agents * actions].reshape(graph.agents, actions)
-    return np.concatenate(
-        [rows[graph.data.neighbour].ravel(), np.tile(rows, (delay + 1, 1)).ravel()]
-    )
+    agents = graph.agents
+    sent = memory[: agents * (actions + 2 * besides)]
+    estimates, others = sent[: agents * actions], sent[agents * actions :]
+    blocks = estimates.reshape(agents, -1), *others.reshape(2, agents, -1)
+    rows = np.concatenate(blocks, axis=1)
+    return np.concatenate([rows[graph.data.neighbour].ravel(), np.tile(sent, delay + 1)])

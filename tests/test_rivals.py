@@ -9,11 +9,16 @@ from gne_mj.controllers import (
     FeedbackSeeking,
     L1Penalty,
     PrimalDual,
+    PrimalDualPartial,
     QuadraticPenalty,
     RecursiveSafeFlow,
 )
+from gne_mj.controllers.affine_bounds import affine_bounds
 from gne_mj.equilibrium import variational_equilibrium
 from gne_mj.errors import InvalidInput
+from gne_mj.faults import MessageDelay, MessageLoss
+from gne_mj.games import velocity_game
+from gne_mj.graph import line, ring
 from gne_mj.loops import functions
 from gne_mj.loops.feedback import Problem, work
 from gne_mj.loops.layout import LoopClock, Setup, problem_and_parameter_block
@@ -97,6 +102,127 @@ def drawn(seed, curved, spread=1.5):
     """A game, a profile inside or outside, and multipliers, some of them zero."""
     made, rng = RandomGame(seed, curved=curved), np.random.default_rng(seed)
     return made, spread * rng.normal(size=3), rng.uniform(0.0, 2.0, 3) * rng.integers(0, 2, 3)
+
+
+def test_bounds_on_gaps_are_affine_ones_on_both_sides():
+    game, rng = velocity_game(3, 3.0, [0.5, 1.0, 2.0]), np.random.default_rng(0)
+    game = game.tightened(0.1)
+    found = affine_bounds(game)
+    assert found.A.shape == (6, 3)
+    for _ in range(20):
+        y = 3.0 + rng.normal(size=3)
+        gaps = np.diff(y, prepend=3.0)
+        both = np.column_stack([gaps, -gaps]).ravel() - np.repeat([0.5, 1.0, 2.0], 2)
+        np.testing.assert_allclose(np.sort(found.A @ y - found.b), np.sort(both), atol=1e-12)
+    np.testing.assert_allclose(found.share.sum(axis=0), 1.0)
+    assert found.share[0, 0] == 1.0
+    assert found.share[0, 2] == 0.5
+
+
+def test_constraints_that_are_not_affine_are_refused():
+    with pytest.raises(InvalidInput, match="constraint 1 is neither affine nor a bound on both"):
+        affine_bounds(RandomGame(0, curved=True).game)
+
+
+def partial_reference(made, law, y, estimates, l, z, *, held):  # noqa: E741
+    """u, then rates; or all of it a period of H later, the estimates left out."""
+    bounds, graph = law.bounds, law.graph
+    rows, n, c = estimates.copy(), len(y), law.coupling
+    np.fill_diagonal(rows, y)
+    L = graph.laplacian
+    F = np.array([made.F(rows[i])[i] for i in range(n)])
+    u = -law.gain * (F + np.einsum("ri,ir->i", bounds.A, l)) - c * np.diag(L @ rows)
+    drive = law.dual_gain * (bounds.A.T * y[:, None] - bounds.share * bounds.b - L @ z - L @ l)
+    agree = law.dual_gain * L @ l
+    if held:
+        return u, np.maximum(l + H * drive, 0.0), z + H * agree
+    away = -c * (L @ rows)
+    np.fill_diagonal(away, 0.0)
+    return u, away, projected(drive, l), agree
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_partial_primal_dual_play_is_its_formula(held):
+    for seed, graph in ((0, ring(4)), (1, line(4))):
+        made, rng = RandomGame(seed, agents=4), np.random.default_rng(seed)
+        law = PrimalDualPartial(graph, affine_bounds(made.game), 1.7, 2.1, 0.6)
+        y, estimates, z = rng.normal(size=4), rng.normal(size=(4, 4)), rng.normal(size=(4, 3))
+        l = rng.uniform(0.0, 2.0, (4, 3)) * rng.integers(0, 2, (4, 3))  # noqa: E741
+        memory = np.concatenate([estimates.ravel(), l.ravel(), z.ravel(), np.zeros(12)])
+        u, moved = ask(made.game, law, y, memory, held=held)
+        first, *expected = partial_reference(made, law, y, estimates, l, z, held=held)
+        np.testing.assert_allclose(u, first, rtol=1e-13, atol=1e-12)
+        begin = 16 if held else 0
+        expected = np.concatenate([np.ravel(each) for each in expected])
+        np.testing.assert_allclose(moved[begin:40], expected, rtol=1e-13, atol=1e-12)
+        assert not np.any(moved[40:])
+
+
+def test_a_partial_rate_depends_on_what_the_agent_has():
+    """All that is neither its own nor a neighbour's becomes NaN, and not a bit changes."""
+    made, rng = RandomGame(0, agents=5), np.random.default_rng(0)
+    law = PrimalDualPartial(line(5), affine_bounds(made.game))
+    y, parts = rng.normal(size=5), [rng.normal(size=(5, size)) for size in (5, 3, 3)]
+
+    def rates(y, parts):
+        memory = np.concatenate([*(part.ravel() for part in parts), np.zeros(15)])
+        u, out = ask(made.game, law, y, memory)
+        return u, out[25:40].reshape(5, 3), out[40:55].reshape(5, 3)
+
+    known = rates(y, parts)
+    for i in range(5):
+        far = np.abs(np.arange(5) - i) > 1
+        hidden = [np.where(far[:, None], np.nan, part) for part in parts]
+        other = rates(np.where(np.arange(5) == i, y, np.nan), hidden)
+        for mine, again in zip(known[1:], other[1:], strict=True):
+            assert np.array_equal(mine[i], again[i])
+    # of actions: what neighbours take y_i to be, and its own row
+    for i in (1, 3):
+        far = np.abs(np.arange(5) - i) > 1
+        hidden = [np.where(far[:, None], np.nan, part) for part in parts]
+        u, *_ = rates(np.where(np.arange(5) == i, y, np.nan), hidden)
+        assert u[i] == known[0][i]
+
+
+@pytest.mark.parametrize("mode", ["continuous", "sampled"])
+def test_partial_primal_dual_play_ends_at_the_variational_equilibrium(mode):
+    for seed in range(3):
+        made = RandomGame(seed)
+        found = variational_equilibrium(made.game, np.zeros(3))
+        law = PrimalDualPartial(line(3), affine_bounds(made.game), 1.0, 5.0, 1.0)
+        y, memory = at_the_end(made, law, duration=600.0, mode=mode)
+        np.testing.assert_allclose(y, found.action, rtol=0, atol=1e-6)
+        for multipliers in memory[9:18].reshape(3, 3):
+            assert kkt_residual(made, y, multipliers) < 1e-5
+
+
+def test_partial_primal_dual_play_gets_there_with_lost_and_late_messages():
+    made = RandomGame(1)
+    law = PrimalDualPartial(line(3), affine_bounds(made.game), 1.0, 5.0, 1.0)
+    faults = (MessageLoss(probability=0.3), MessageDelay(periods=2))
+    y, _ = at_the_end(made, law, duration=600.0, mode="sampled", faults=faults, seed=3)
+    found = variational_equilibrium(made.game, np.zeros(3))
+    np.testing.assert_allclose(y, found.action, rtol=0, atol=1e-5)
+
+
+def test_late_messages_bring_multipliers_of_before():
+    made = RandomGame(1)
+    law = PrimalDualPartial(line(3), affine_bounds(made.game), 1.0, 5.0, 1.0)
+    system = System(
+        "s", made.game, integrators(3), law, 0.1, np.zeros((3, 1)), on_exit="continue",
+        mode="sampled", faults=(MessageDelay(periods=2),),
+    )  # fmt: skip
+    rows = system.closed_loop(clock(H, 1.0)).advance(50, 1)
+    y, held = rows.state[:, :, 0], rows.memory[:, 9:27].reshape(50, 2, 3, 3)
+    l, z = held[:, 0], held[:, 1]  # noqa: E741
+    bounds, heard = law.bounds, np.abs(law.graph.laplacian) * (1 - np.eye(3))
+    links = heard.sum(axis=1)[:, None]
+    assert np.max(l[-1]) > 0.01
+    for k in range(2, 49):
+        of_l, of_z = (links * x[k] - heard @ x[k - 2] for x in (l, z))
+        drive = bounds.A.T * y[k][:, None] - bounds.share * bounds.b - of_z - of_l
+        np.testing.assert_allclose(l[k + 1], np.maximum(l[k] + H * drive, 0.0), atol=1e-13)
+        np.testing.assert_allclose(z[k + 1], z[k] + H * of_l, atol=1e-13)
 
 
 @GAMES

@@ -32,6 +32,7 @@ from gne_mj.interface.program_rivals import cbf_filter, discrete_cbf_filter, saf
 from gne_mj.interface.rivals import (
     feedback_seeking,
     l1_penalty,
+    primal_dual_partial,
     primal_dual_play,
     quadratic_penalty,
     recursive_safe_flow,
@@ -67,6 +68,7 @@ __all__ = [
     "pi_cascades",
     "planar_robots",
     "plot",
+    "primal_dual_partial",
     "primal_dual_play",
     "push",
     "quadratic_penalty",

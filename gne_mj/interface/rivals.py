@@ -8,10 +8,12 @@ from __future__ import annotations
 from gne_mj.arguments import answering
 from gne_mj.controllers.feedback_seeking import FeedbackSeekingController
 from gne_mj.controllers.l1_penalty import L1PenaltyController
+from gne_mj.controllers.primal_dual_partial import PrimalDualPartialController
 from gne_mj.controllers.primal_dual_play import PrimalDualController
 from gne_mj.controllers.quadratic_penalty import QuadraticPenaltyController
 from gne_mj.controllers.recursive_safe_flow import RecursiveSafeFlowController
 from gne_mj.controllers.table import LawTable
+from gne_mj.interface.laws import Network
 from gne_mj.interface.tables import made
 
 
@@ -29,6 +31,29 @@ def primal_dual_play(
         mode: when the law is evaluated.
     """
     return made(PrimalDualController, information="primal-dual", **locals())
+
+
+@answering
+def primal_dual_partial(
+    graph: Network = "ring",
+    *,
+    gain: float = 1.0,
+    coupling: float = 1.0,
+    dual_gain: float = 1.0,
+    mode: str = "continuous",
+) -> LawTable:
+    """The same under partial information: neighbours exchange estimates and multipliers.
+
+    Constraints must be affine, or bounds on both sides of something affine.
+
+    Args:
+        graph: over which agents communicate.
+        gain: k.
+        coupling: c of the estimates.
+        dual_gain: kappa.
+        mode: when the law is evaluated.
+    """
+    return made(PrimalDualPartialController, information="primal-dual-partial", **locals())
 
 
 @answering

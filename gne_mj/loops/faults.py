@@ -13,7 +13,7 @@ import numpy as np
 
 from gne_mj import game_functions as games
 from gne_mj.controllers import kept_estimates
-from gne_mj.controllers.settings import LINKS
+from gne_mj.controllers.settings import BESIDES, LINKS
 from gne_mj.loops.faultless import begins as begins
 from gne_mj.loops.faultless import elapse as elapse
 from gne_mj.loops.feedback import FAULT_COLUMNS, FAULT_KINDS, Fault
@@ -219,14 +219,27 @@ def send(problem, time, memory, sent, monitor):
 
 
 @kernel
+def receive(problem, j, sent, heard):
+    """Copy agent j's rows of all that was sent: its estimates, and what is sent with them."""
+    m, agents = len(problem.data.owner), len(problem.data.offsets) - 1
+    size = int(problem.settings[BESIDES])
+    copy(sent[j * m : (j + 1) * m], heard)
+    for block in range(2):
+        at = agents * m + (block * agents + j) * size
+        for r in range(size):
+            heard[m + block * size + r] = sent[at + r]
+
+
+@kernel
 def exchange(problem, clock, step, memory, work, monitor):
     """Send all rows; over each link comes what was sent some periods ago, or nothing."""
     data, graph, kept, faults = problem.data, problem.graph, problem.kept, problem.faults
     agents, m, time = len(data.offsets) - 1, len(work.y), step * clock.h
     count, links = count_of(clock, step), int(problem.settings[LINKS])
     slots, all_kept = int(faults.numbers.message_delay) + 1, len(kept.pointer) == 0
-    size = agents * m if all_kept else kept_estimates.room(kept)
-    ring = links + (len(graph.neighbour) * m if all_kept else kept.came[len(kept.came) - 1])
+    message = m + 2 * int(problem.settings[BESIDES])
+    size = agents * message if all_kept else kept_estimates.room(kept)
+    ring = links + (len(graph.neighbour) * message if all_kept else kept.came[len(kept.came) - 1])
     if all_kept:
         for r in range(m):
             memory[data.owner[r] * m + r] = work.measurement[r]
@@ -246,8 +259,8 @@ def exchange(problem, clock, step, memory, work, monitor):
         if comes(faults, time, count, link) and count >= delay:
             sent = ring + ((count - delay) % slots) * size
             if all_kept:
-                sent += graph.neighbour[link] * m
-                copy(memory[sent : sent + m], memory[links + link * m : links + (link + 1) * m])
+                heard = links + link * message
+                receive(problem, graph.neighbour[link], memory[sent:], memory[heard:])
             else:
                 kept_estimates.receive(kept, link, memory[sent : sent + size], memory[links:])
 

@@ -308,6 +308,8 @@ def _check_triggers(system: SystemData) -> None:
         raise InvalidInput(key, "event", expected)
     if system.law.kept is not None:
         raise InvalidInput(key, "event", "agents must keep all estimates: estimates = 'all'")
+    if system.law.sent_besides:
+        raise InvalidInput(key, "event", "triggers are of estimates, and this law sends more")
 
 
 def _messages(system: SystemData) -> int:
@@ -316,4 +318,5 @@ def _messages(system: SystemData) -> int:
     assert law.graph is not None
     if law.kept is not None:
         return law.kept.heard_size + slots * law.kept.size
-    return (2 * len(law.graph.edges) + slots * law.graph.agents) * system.game.actions
+    message = system.game.actions + 2 * law.sent_besides
+    return (2 * len(law.graph.edges) + slots * law.graph.agents) * message

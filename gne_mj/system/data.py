@@ -223,7 +223,7 @@ class SystemData:
             assert self.law.graph is not None
             delay, kept = message_delay(self.faults), self.law.kept
             parts.append(
-                links_memory(self.law.graph, m, memory, delay)
+                links_memory(self.law.graph, m, memory, delay, self.law.sent_besides)
                 if kept is None
                 else kept.heard(memory, delay)
             )
