@@ -47,7 +47,9 @@ def bounds(system: SystemData, index: int, time: Array) -> dict[str, Array]:
 
 def bounds_move(game: Game, index: int) -> bool:
     """Whether bounds of one of the game's quantities change in time."""
-    return motion_of(game) is not None and _moves(game, index)[1]
+    if motion_of(game) is None:
+        return game.quantities[index].moves
+    return _moves(game, index)[1]
 
 
 @lru_cache

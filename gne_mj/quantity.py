@@ -29,6 +29,7 @@ class Quantity:
             for entries that are none. They are drawn where the agents are.
         outline: corners of the part of the plane that the values say the use of, in order round it,
             in the action's unit, shape (K, 2).
+        moves: of results, whether the bounds are those of the first sample, and change.
 
     Raises:
         InvalidInput: an ``each`` that is none, or pairs or corners of another shape.
@@ -44,6 +45,7 @@ class Quantity:
     lower_bound: ArrayLike | None = None
     between: ArrayLike | None = None
     outline: ArrayLike | None = None
+    moves: bool = False
 
     def __post_init__(self) -> None:
         if self.each not in ("", "agent", "constraint"):

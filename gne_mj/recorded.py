@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from gne_mj.controllers import Law
+from gne_mj.controllers.keepers import Keepers
+from gne_mj.controllers.kept import Kept
 from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Fault
@@ -48,6 +50,7 @@ def structure_of(system: SystemData) -> str:
             "graph_changes": graph is not None and graph.changes,
             "separation": None if apart is None else [apart.distance, apart.reach, apart.turn],
             "estimates": [part.name for part in system.law.memory_parts if part.rows],
+            "kept_estimates": [part.name for part in system.law.memory_parts if part.kept],
         },
         default=int,
     )
@@ -99,7 +102,7 @@ def recorded_system(
         name=name,
         game=game,
         agents=agents,
-        law=_RecordedLaw(data, known, count),
+        law=_RecordedLaw(data, known),
         rho=attributes["rho"],
         state=data["state"].to_numpy()[0],
         mode=attributes["mode"],
@@ -122,20 +125,38 @@ class _ChangedGraph(Graph):
 class _RecordedLaw(Law):
     """What is known of a law."""
 
-    def __init__(self, data: "xarray.Dataset", known: dict[str, Any], agents: int) -> None:
-        edges, names = known["graph"], known["estimates"]
+    def __init__(self, data: "xarray.Dataset", known: dict[str, Any]) -> None:
+        edges, agents = known["graph"], len(known["sizes"])
         if edges is not None:
             pairs = tuple((i - 1, j - 1) for i, j in edges) if edges != _ALL else None
             # of results of versions before graphs could change nothing says so
             kind = _ChangedGraph if known.get("graph_changes") else Graph
             self.graph = kind(agents, complete(agents).edges if pairs is None else pairs)
-        parts = [MemoryPart(name, data[name].attrs["long_name"], rows=True) for name in names]
+        # results of older versions do not say which estimates were kept
+        kept = known.get("kept_estimates", [])
+        if kept:
+            assert self.graph is not None
+            self.kept = _kept(data, self.graph, known["sizes"])
+        parts = [
+            MemoryPart(
+                name, data[name].attrs["long_name"], rows=name not in kept, kept=name in kept
+            )
+            for name in (*known["estimates"], *kept)
+        ]
         vars(self).update(information=data.attrs["information"], memory_parts=tuple(parts))
 
     @property
     def kernels(self) -> ModuleType:
         """None that could be called."""
         return sys.modules[__name__]
+
+
+def _kept(data: "xarray.Dataset", graph: Graph, sizes: Sequence[int]) -> Kept:
+    """Who kept which estimates."""
+    by, of = data["by_agent"].to_numpy() - 1, data["of_agent"].to_numpy() - 1
+    keepers = tuple(np.array([j, *np.unique(by[of == j])]) for j in range(graph.agents))
+    smallest = np.zeros(graph.agents, dtype=bool)  # which nobody asks of results
+    return Kept(graph, np.concatenate([[0], np.cumsum(sizes)]), Keepers(keepers, smallest))
 
 
 def _structure(data: "xarray.Dataset") -> dict[str, Any]:
@@ -148,10 +169,16 @@ def _structure(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def _quantity(data: "xarray.Dataset", name: str) -> Quantity:
-    """A quantity with its bounds, of values that are recorded and not found anew."""
+    """A quantity with its bounds, of values that are recorded and not found anew.
+
+    Of bounds that move it has those of the first sample.
+    """
     variable = data[name]
-    bounds = {key: data[f"{name}_{key}"].to_numpy() for key in ("bound", "lower_bound")
-              if f"{name}_{key}" in data and "time" not in data[f"{name}_{key}"].dims}  # fmt: skip
+    given = {key: data[f"{name}_{key}"] for key in ("bound", "lower_bound")
+             if f"{name}_{key}" in data}  # fmt: skip
+    moves = any("time" in bound.dims for bound in given.values())
+    bounds = {key: bound.to_numpy()[0] if moves else bound.to_numpy()
+              for key, bound in given.items()}  # fmt: skip
     about = {"long_name": name, "units": "", "symbol": "", **variable.attrs}
     return Quantity(
         name=name,
@@ -160,6 +187,7 @@ def _quantity(data: "xarray.Dataset", name: str) -> Quantity:
         values=lambda y: np.full((len(y), *variable.shape[1:]), np.nan),
         each=str(variable.dims[1]) if variable.ndim > 1 else "",
         symbol=about["symbol"],
+        moves=moves,
         **bounds,
         **{key: json.loads(about[key]) for key in ("between", "outline") if key in about},
     )

@@ -16,6 +16,7 @@ from gne_mj import moving_values
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers.law import MemoryPart
 from gne_mj.errors import InvalidInput
+from gne_mj.faults import triggered
 from gne_mj.game_model import Game
 from gne_mj.loops.base import Samples
 from gne_mj.motion import motion_of
@@ -172,6 +173,7 @@ def _moving_bound(name: str, index: int, quantity: Quantity) -> Variable:
         _dimensions(quantity),
         lambda rows: moving_values.bounds(rows.system, index, rows.time)[name],
         unit=quantity.unit,
+        page="bound",
     )
 
 
@@ -262,7 +264,7 @@ def _estimates(part: MemoryPart, at: int) -> Variable:
 def _kept(part: MemoryPart, entries: NDArray[np.int64]) -> Variable:
     return Variable(
         part.name, ("time", "kept"), lambda rows: rows.samples.memory[:, entries],
-        unit=_action_unit, long_name=part.long_name,
+        unit=_action_unit, long_name=part.long_name, page="estimates",
     )  # fmt: skip
 
 
@@ -297,6 +299,12 @@ def _nearest_distance(rows: Rows) -> Array:
 
 def _network_changes(system: SystemData) -> bool:
     return system.law.graph is not None and system.law.graph.changes
+
+
+def _messages(rows: Rows) -> Array:
+    memory, game = rows.samples.memory, rows.system.game
+    end = memory.shape[1] - (game.actions if rows.system.observer > 0.0 else 0)
+    return memory[:, end - game.agents : end]
 
 
 def _linked(rows: Rows) -> Array:
@@ -355,6 +363,11 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
     Variable(
         "linked", ("time", "edge"), _linked, there=_network_changes,
         long_name="whether the two agents hear each other", page="behind", batch=False,
+    ),
+    Variable(
+        "messages", ("time", "agent"), _messages,
+        there=lambda system: triggered(system.faults), unit="",
+        long_name="messages of each agent that came over links so far", figure=True, page="line",
     ),
     Variable(
         "load", ("time", AXIS),

@@ -60,8 +60,8 @@ class Variable:
         instant: whether state and memory say it, so that a live page has it at any moment; of
             others it has what was recorded last.
         figure: whether figures of a trajectory draw it.
-        page: where the page has it: a "line" of a plot; "estimates", drawn over agents; "behind"
-            it, for places of bodies and margins; nowhere.
+        page: where the page has it: a "line" of a plot; the "bound" of one, that moves;
+            "estimates", drawn over agents; "behind" it, for places of bodies and margins; nowhere.
         batch: whether batches that record rows have it in them.
         runs: figures that batches keep of it.
         panel: of a figure of runs, its panel in a batch's figure.
@@ -79,7 +79,7 @@ class Variable:
     bounds: Callable[[SystemData], Mapping[str, Array]] = lambda system: {}
     instant: bool = True
     figure: bool = False
-    page: Literal["", "line", "estimates", "behind"] = ""
+    page: Literal["", "line", "bound", "estimates", "behind"] = ""
     batch: bool = True
     runs: tuple["Variable", ...] = ()
     panel: Panel | None = None

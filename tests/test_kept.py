@@ -285,5 +285,6 @@ def test_it_is_shown_and_shown_again(run, tmp_path):
     for trajectory in (run, again):
         meta, found = unpack(replay_pack(trajectory))
         assert "robots/action" in found
-        assert "robots/estimate" not in found
-        assert not meta["systems"][0]["estimates"]
+        values = trajectory["robots"]["estimate"].values
+        np.testing.assert_allclose(found["robots/estimate"], values, atol=1e-3)
+        assert meta["systems"][0]["kept"] == {"by": [2, 3, 4, 5], "action": [0, 1, 2, 3]}

@@ -349,3 +349,45 @@ def test_scripts_cannot_end_the_page_they_are_in():
     trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})
     text = html_page(trajectory, "</script><script>alert(1)")
     assert text.count("<script") == text.count("</script>")
+
+
+def of_integrators(**more):
+    """A system's tables: three integrators in the velocity game, all inputs held."""
+    return {
+        "game": {"type": "velocity-synchronization", **more.pop("game", {})},
+        "agents": {"type": "integrator", "count": 3},
+        "controller": {"mode": "sampled", **more},
+    }
+
+
+def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
+    bound = {"type": "ramp", "from": 3.0, "to": 2.0, "rate": 1.0}
+    partial = {"information": "partial", "graph": "line"}
+    trajectory = gne_mj.run(load_scenario({
+        "simulation": {"duration": 0.4, "timestep": 0.01},
+        "systems": {
+            "moving": of_integrators(game={"gap_bound": [3.5, bound, 3.5]}),
+            "kept": of_integrators(estimates="needed", **partial),
+            "events": of_integrators(communication={"type": "event", "threshold": 0.01}, **partial),
+        },
+    }))  # fmt: skip
+    meta, found = unpack(replay_pack(trajectory))
+    moving, kept, events = meta["systems"]
+    gap = next(each for each in moving["quantities"] if each["name"] == "gap")
+    assert gap["moving_bounds"] == {"bound": "gap_bound", "lower_bound": "gap_lower_bound"}
+    assert gap["bound"] is None
+    bounds = np.array([[3.5, 3.0 - time, 3.5] for time in found["time"]])
+    assert np.allclose(found["moving/quantity/gap_bound"], bounds, atol=1e-6)
+    gaps = trajectory["moving"]["gap"].to_numpy()
+    assert np.allclose(found["moving/share"], np.abs(gaps) / bounds, atol=1e-6)
+    # each follower needs its predecessor's velocity, and no other
+    assert kept["kept"] == {"by": [2, 3], "action": [0, 1]}
+    assert found["kept/estimate"].shape == (len(found["time"]), 2)
+    assert meta["systems"][2]["kept"] is None
+    assert events["triggered"] is True
+    assert events["message_period"] is None
+    (messages,) = (each for each in events["quantities"] if each["name"] == "messages")
+    assert messages["labels"] == ["1", "2", "3"]
+    counted = found["events/quantity/messages"]
+    assert np.all(np.diff(counted, axis=0) >= 0.0)
+    assert np.sum(counted[-1]) == trajectory.reports["events"]["messages"]["sent"] > 0

@@ -6,7 +6,8 @@ last bit however it is cut into pieces. See :mod:`gne_mj.faults` for what users 
 Where sensors are late, ``work.history`` holds the flat states at the last control instants and
 behind them the inputs of those periods, as rings. Where messages can be lost or late, the law's
 memory has what came last over every link, and behind it a ring of the rows that were sent. Where
-agents send by triggers, that ring has one place: what each sent last.
+agents send by triggers, that ring has one place, what each sent last, and behind it is how many
+messages of each came over links.
 """
 
 import numpy as np
@@ -196,11 +197,11 @@ def send(problem, time, memory, sent, monitor):
     """Put rows into the place of those sent last, at ``sent``, of agents whose triggers fire.
 
     A trigger fires where |row - row sent last|^2 > sigma (sum over the agent's links of
-    |row - row heard last|^2) + (threshold exp(-decay time))^2. The monitor counts messages over
-    links.
+    |row - row heard last|^2) + (threshold exp(-decay time))^2. Messages over links are
+    counted, those of each agent behind the rows.
     """
     graph, faults, m = problem.graph, problem.faults, len(problem.data.owner)
-    links = int(problem.settings[LINKS])
+    links, counts = int(problem.settings[LINKS]), sent + (len(problem.data.offsets) - 1) * m
     monitor.message_instants += 1.0
     for f in range(faults.pointer[TRIGGER], faults.pointer[TRIGGER + 1]):
         trigger = fault(faults, f)
@@ -215,6 +216,7 @@ def send(problem, time, memory, sent, monitor):
         allowed = trigger.amount * np.exp(-trigger.period * time)
         if moved > trigger.form * apart + allowed * allowed:
             copy(row, last)
+            memory[counts + i] += graph.pointer[i + 1] - graph.pointer[i]
             monitor.messages += graph.pointer[i + 1] - graph.pointer[i]
 
 

@@ -18,7 +18,7 @@ from gne_mj.equilibrium import (
 )
 from gne_mj.equilibrium_path import EquilibriumPath
 from gne_mj.errors import SolverError
-from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages
+from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages, triggered
 from gne_mj.game_model import Game
 from gne_mj.graph import GraphData
 from gne_mj.loops import (
@@ -215,8 +215,8 @@ class SystemData:
     def with_links(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
         """A law's memory with what a loop keeps behind it.
 
-        Where messages can fail, what was heard over each link; with an observer, what agents take
-        their loads to be.
+        Where messages can fail, what was heard over each link; where agents send by triggers, how
+        many messages of each came over links; with an observer, what agents take their loads to be.
         """
         parts, m = [memory], self.game.actions
         if strikes_messages(self.faults):
@@ -227,6 +227,8 @@ class SystemData:
                 if kept is None
                 else kept.heard(memory, delay)
             )
+        if triggered(self.faults):
+            parts.append(np.zeros(self.game.agents))
         if self.observer > 0.0:
             parts.append(np.zeros(m) if self.load is None else self.load)
         return np.concatenate(parts) if len(parts) > 1 else memory

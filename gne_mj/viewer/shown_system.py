@@ -1,6 +1,7 @@
 """What a page shows of one system: words about it once, arrays of numbers from what is recorded."""
 
 import json
+import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any
@@ -57,13 +58,18 @@ class ShownSystem:
                 "owner": (game.agent_of_action + 1).tolist(),
                 "axis": list(game.axis_of_action) if max(game.sizes) > 1 else [""] * game.actions,
             },
-            "quantities": [_about(system, line) for line in self._shown("line")[1:]],
+            "quantities": [
+                _about(system, line, [bound.name for bound in self._shown("bound")])
+                for line in self._shown("line")[1:]
+            ],
             "plan": None if self.fleet is None else plan_of(system),
             "edges": self._edges,
             "edges_are": "measurements" if system.law.graph is None else "messages",
             "links": self._links,
             "message_period": self._message_period,
+            "triggered": triggered(system.faults),
             "estimates": bool(self._shown("estimates")),
+            "kept": self._kept,
             "anchors": [],
             "height": 0.0,
             "tints": [],
@@ -89,7 +95,7 @@ class ShownSystem:
         """
         name, game = self.system.name, self.system.game
         found: Arrays = {}
-        for variable in self._shown("line"):
+        for variable in (*self._shown("line"), *self._shown("bound")):
             if variable.name in values:
                 rows = values[variable.name]
                 found[line_key(name, variable.name)] = rows.reshape(len(rows), -1)
@@ -124,6 +130,17 @@ class ShownSystem:
         held = system.law.graph is not None and mode_of(system).held
         periodic = held and not self._network_changes and not triggered(system.faults)
         return self.clock.control_period if periodic else None
+
+    @property
+    def _kept(self) -> dict[str, list[int]] | None:
+        """Who keeps an estimate, from 1, and of which action, from 0; None of all estimates."""
+        kept = self.system.law.kept
+        if kept is None:
+            return None
+        return {
+            "by": (kept.holder[kept.estimated] + 1).tolist(),
+            "action": kept.action[kept.estimated].tolist(),
+        }
 
     @cached_property
     def _edges(self) -> list[list[int]]:
@@ -178,8 +195,9 @@ def _radii(system: SystemData) -> list[float | None]:
     """Of discs around the agents, of which no two meet while least distances are kept, in m."""
     game, apart = system.game, system.separation
     found = np.full(game.agents, np.inf if apart is None else 0.5 * apart.distance)
-    for quantity in game.quantities:
-        bounds = quantity.bounds(game.entries(quantity)) if quantity.pairs else {}
+    for index, quantity in enumerate(game.quantities):
+        still = quantity.pairs and not bounds_move(game, index)
+        bounds = quantity.bounds(game.entries(quantity)) if still else {}
         least = bounds.get(f"{quantity.name}_lower_bound", np.zeros(0))
         for pair, distance in zip(quantity.pairs, least.reshape(-1), strict=False):
             if pair[0] >= 0 and distance > 0.0:
@@ -191,13 +209,17 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
     """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
 
     A quantity's bounds count for the agent or for the owners of the constraint that it is of, and
-    for all agents if it is one number. Bounds that move are left out.
+    for all agents if it is one number. Those that move are of each sample.
     """
     found = np.full((len(values["action"]), game.agents), np.nan)
     for index, quantity in enumerate(game.quantities):
+        ways = _range(game, quantity)
         if bounds_move(game, index):
-            continue
-        middle, up, down = _range(game, quantity)
+            names = quantity.bounds(game.entries(quantity))
+            if not all(name in values for name in names):  # as of an older trajectory
+                continue
+            ways = _ways(quantity, values, ways[0].shape[1:])
+        middle, up, down = ways
         away = values[quantity.name].reshape(len(found), -1) - middle
         used = np.fmax(away / up, away / down)
         if quantity.each != "constraint":
@@ -211,15 +233,23 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
 
 @lru_cache
 def _range(game: Game, quantity: Quantity) -> tuple[NDArray[np.float64], ...]:
-    """From where it is how far up, and down, to a quantity's bounds, each for its entries (n,).
+    """:func:`_ways` of bounds that stand still, each for the quantity's entries (n,)."""
+    entries = game.entries(quantity)
+    return _ways(quantity, quantity.bounds(entries), (math.prod(entries),))
+
+
+def _ways(
+    quantity: Quantity, bounds: Values, entries: tuple[int, ...]
+) -> tuple[NDArray[np.float64], ...]:
+    """From where it is how far up, and down, to a quantity's bounds, (n,) or (T, n).
 
     From the middle of two bounds, or from 0 to the one that there is; nan where none says anything.
     """
-    entries = game.entries(quantity)
-    bounds = quantity.bounds(entries)
-    nothing = np.full(entries, np.nan).reshape(-1)
-    high = bounds.get(f"{quantity.name}_bound", nothing).reshape(-1)
-    low = bounds.get(f"{quantity.name}_lower_bound", nothing).reshape(-1)
+    nothing = np.full(entries, np.nan)
+    high, low = (
+        np.reshape(bounds.get(f"{quantity.name}_{key}", nothing), (-1, *entries))
+        for key in ("bound", "lower_bound")
+    )
     middle = np.where(np.isnan(high + low), 0.0, 0.5 * (high + low))
     up, down = high - middle, low - middle
     return middle, np.where(up > 0, up, np.nan), np.where(down < 0, down, np.nan)
@@ -235,8 +265,8 @@ def is_line(system: str, key: str) -> bool:
     return key == line_key(system, "action") or key.startswith(line_key(system, ""))
 
 
-def _about(system: SystemData, line: Variable) -> dict[str, Any]:
-    """What JSON tells the page of a line but the action."""
+def _about(system: SystemData, line: Variable, moving: list[str]) -> dict[str, Any]:
+    """What JSON tells the page of a line but the action; ``moving`` are bounds that are lines."""
     game, attributes, bounds = system.game, line.attributes(system), line.bounds(system)
     labels = {
         "agent": [str(i + 1) for i in range(game.agents)],
@@ -255,9 +285,13 @@ def _about(system: SystemData, line: Variable) -> dict[str, Any]:
     }
     pairs = json.loads(attributes.get("between", "[]"))
     about["between"] = [[i + 1, j + 1] if i >= 0 else None for i, j in pairs]
+    about["moving_bounds"] = {}
     for key in ("bound", "lower_bound"):
-        given = bounds.get(f"{line.name}_{key}")
+        name = f"{line.name}_{key}"
+        given = bounds.get(name)
         about[key] = None
+        if name in moving:
+            about["moving_bounds"][key] = name
         if given is not None:
             about[key] = [float(b) if np.isfinite(b) else None for b in given.reshape(-1)]
     return about

@@ -61,7 +61,8 @@ export class Bars {
 
   boundedNumbers() {
     return this.system.quantities.filter(
-      ({ bound, labels }) => labels.length === 1 && typeof bound?.[0] === "number",
+      ({ bound, labels, moving_bounds: moving }) =>
+        labels.length === 1 && (typeof bound?.[0] === "number" || moving.bound !== undefined),
     );
   }
 
@@ -154,6 +155,8 @@ export class Bars {
    * @param {Record<string, Numbers | undefined>} own arrays of the system
    */
   updateGauge(gauge, own) {
+    const { bound } = gauge.quantity.moving_bounds;
+    if (bound) gauge.limit = own[`quantity/${bound}`]?.[0] ?? NaN;
     gauge.value = own[`quantity/${gauge.quantity.name}`]?.[0] ?? NaN;
     gauge.share = gauge.value / gauge.limit;
     setHeight(gauge.bar, TALL * (Number.isFinite(gauge.share) ? gauge.share : 0));

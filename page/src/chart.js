@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import { colour } from "./theme.js";
 import { number, withUnit } from "./words.js";
 /** @import { Plot } from "./plot.js" */
-/** @import { Bound, Spec } from "./specs.js" */
+/** @import { MovingBound, Spec } from "./specs.js" */
 /** @import { Intervention } from "./types.d.ts" */
 
 export const MOST_CHIPS = 14; // lines, up to which each has a chip with its value
@@ -103,29 +103,32 @@ const seriesOf = (plot, label, k) => {
  * @param {number | null} low
  * @param {number | null} high
  */
-const valuesOf = ({ look, spec }, u, low, high) => {
+const valuesOf = (plot, u, low, high) => {
+  const { look } = plot;
   if (look.values) return look.values;
-  if (!look.log) return rangeY(spec.bounds, u.height, low, high);
+  if (!look.log) return rangeY(plot, u.height, low, high);
   if (low === null || high === null || !(low > 0)) return [1e-3, 1];
   return [low / 1.5, high * 1.5];
 };
 
 /**
  * @returns {[number, number]}
- * @param {Bound[]} bounds
+ * @param {Plot} plot
  * @param {number} height of the plot, px
  * @param {number | null} low
  * @param {number | null} high
  */
-const rangeY = (bounds, height, low, high) => {
-  for (const { value } of bounds) {
+const rangeY = ({ spec, movingBounds }, height, low, high) => {
+  const { bounds } = spec;
+  const moving = movingBounds.flatMap(({ values }) => values.filter((each) => each !== null));
+  for (const value of [...bounds.map((bound) => bound.value), ...moving]) {
     low = low === null ? value : Math.min(low, value);
     high = high === null ? value : Math.max(high, value);
   }
   if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
   const size = high - low || Math.abs(high) || 1;
   // room for a bound's label above its line
-  const room = bounds.length ? 18 / Math.max(height - 36, 40) : 0.08;
+  const room = bounds.length || moving.length ? 18 / Math.max(height - 36, 40) : 0.08;
   return [low - 0.07 * size, high + room * size * 1.2];
 };
 
@@ -141,7 +144,9 @@ const drawMarks = (u, plot) => {
   context.clip();
   drawInterventions(u, plot.plots.source.interventions);
   drawApproach(u, plot);
-  if (!plot.look.log) drawBounds(u, plot.spec);
+  if (plot.look.log) return context.restore();
+  drawBounds(u, plot.spec);
+  drawMovingBounds(u, plot.movingBounds);
   context.restore();
 };
 
@@ -189,18 +194,27 @@ const drawApproach = (u, { spec, plots }) => {
 };
 
 /**
- * @param {uPlot} u
- * @param {Spec} spec
+ * How bounds and their labels are drawn.
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} ratio
  */
-const drawBounds = (u, { bounds, unit }) => {
-  const { ctx: context, bbox } = u;
-  const ratio = uPlot.pxRatio;
+const asBounds = (context, ratio) => {
   context.strokeStyle = context.fillStyle = colour("limit");
   context.lineWidth = 1.5 * ratio;
   context.font = `${12 * ratio}px system-ui, sans-serif`;
   context.textBaseline = "bottom";
   context.textAlign = "right";
   context.setLineDash([6 * ratio, 4 * ratio]);
+};
+
+/**
+ * @param {uPlot} u
+ * @param {Spec} spec
+ */
+const drawBounds = (u, { bounds, unit }) => {
+  const { ctx: context, bbox } = u;
+  const ratio = uPlot.pxRatio;
+  asBounds(context, ratio);
   let last = Infinity;
   for (const { value, note } of bounds) {
     const y = u.valToPos(value, "y", true);
@@ -212,5 +226,34 @@ const drawBounds = (u, { bounds, unit }) => {
     last = y;
     const text = `bound ${withUnit(value, unit)}${note}`;
     context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+  }
+};
+
+/**
+ * Lines over time; each has its label where it ends.
+ * @param {uPlot} u
+ * @param {MovingBound[]} bounds
+ */
+const drawMovingBounds = (u, bounds) => {
+  const { ctx: context, bbox } = u;
+  const ratio = uPlot.pxRatio;
+  asBounds(context, ratio);
+  const time = u.data[0];
+  for (const { values, note } of bounds) {
+    context.beginPath();
+    /** @type {[number, number] | null} */
+    let last = null;
+    values.forEach((value, i) => {
+      if (value === null) return;
+      const [x, y] = [u.valToPos(time[i], "x", true), u.valToPos(value, "y", true)];
+      if (values[i - 1] === null || !last) context.moveTo(x, y);
+      else context.lineTo(x, y);
+      last = [x, y];
+    });
+    context.stroke();
+    if (!last) continue;
+    const [x, y] = /** @type {[number, number]} */ (last);
+    const right = Math.min(x, bbox.left + bbox.width - 4 * ratio);
+    context.fillText(`bound${note}`, right, y - 2 * ratio);
   }
 };

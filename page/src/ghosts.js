@@ -8,6 +8,23 @@ import { matrixIn } from "./viewer.js";
 
 const EDGES = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5));
 const SECOND = 1;
+/**
+ * What an agent takes all m actions to be; not a number where it keeps no estimate.
+ * @param {System} system
+ * @param {number} holder from 0
+ * @param {Numbers} estimate all of the system's
+ * @param {number} m
+ * @returns {Numbers}
+ */
+const estimatesOf = ({ kept }, holder, estimate, m) => {
+  if (!kept) return estimate.subarray(holder * m, (holder + 1) * m);
+  const row = new Float64Array(m).fill(NaN);
+  kept.by.forEach((agent, e) => {
+    if (agent === holder + 1) row[kept.action[e]] = estimate[e];
+  });
+  return row;
+};
+
 /** @type {Record<string, number>} */
 const DIRECTIONS = { "": 0, x: 0, y: 1, z: 2 };
 
@@ -44,8 +61,7 @@ export class Ghosts {
     const { estimate, action } = (system && instant.systems[system.name]) ?? {};
     this.group.visible = Boolean(system && shown && estimate && action);
     if (!system || !shown || !estimate || !action) return;
-    const m = action.length;
-    const row = estimate.subarray(shown.agent * m, (shown.agent + 1) * m);
+    const row = estimatesOf(system, shown.agent, estimate, action.length);
     if (system.drawn_as === "bars") this.outlines(system, shown.agent, row);
     else this.shadows(system, shown.agent, row, action);
   }
@@ -62,6 +78,7 @@ export class Ghosts {
       const [outline] = this.copiesOf(k, () => [this.outline()]);
       const [x, y] = bars.spot(k);
       outline.position.set(...bars.point(x, y, 0));
+      outline.visible = Number.isFinite(row[k]); // others are not estimated
       const height = bars.scale * bars.heightOf(row[k]);
       outline.scale.set(0.5 * bars.scale, 0.5 * bars.scale, height || 1e-4);
     });

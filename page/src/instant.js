@@ -7,7 +7,9 @@
  */
 export const partsOf = (system) => [
   "action",
-  ...system.quantities.map((quantity) => `quantity/${quantity.name}`),
+  ...system.quantities.flatMap(({ name, moving_bounds: moving }) =>
+    [name, ...Object.values(moving)].map((each) => `quantity/${each}`),
+  ),
   "share",
   "margin",
   "estimate",

@@ -69,7 +69,8 @@ export class Links {
    */
   flow(systems, now) {
     if (!this.pulsing) return;
-    for (const system of systems) if (system.message_period === null) this.flowIn(system, now);
+    for (const system of systems)
+      if (system.message_period === null && !system.triggered) this.flowIn(system, now);
   }
 
   /**

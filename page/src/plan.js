@@ -79,7 +79,7 @@ export class Plan {
    */
   addDistances(quantity) {
     return quantity.between.flatMap((pair, entry) =>
-      pair && typeof quantity.bound?.[entry] === "number"
+      pair && (typeof quantity.bound?.[entry] === "number" || quantity.moving_bounds.bound)
         ? [{ quantity, entry, pair, strip: this.add(STRIP, 0.9) }]
         : [],
     );
@@ -140,7 +140,10 @@ export class Plan {
    */
   placeDistance({ quantity, entry, pair: [a, b], strip }, own, layout) {
     const value = own[`quantity/${quantity.name}`]?.[entry] ?? NaN;
-    const share = used(value, quantity.bound?.[entry], quantity.lower_bound?.[entry]);
+    const { bound, lower_bound: lower } = quantity.moving_bounds;
+    const high = bound ? own[`quantity/${bound}`]?.[entry] : quantity.bound?.[entry];
+    const low = lower ? own[`quantity/${lower}`]?.[entry] : quantity.lower_bound?.[entry];
+    const share = used(value, high, low);
     strip.material.color.setRGB(...ramp(share));
     const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
     this.stretch(strip, ends[0], ends[1], WIDTH, layout.floor + 2 * STEP);

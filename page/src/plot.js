@@ -5,12 +5,13 @@ import { MOST_CHIPS, optionsOf } from "./chart.js";
 import { line } from "./colours.js";
 import { element, press } from "./dom.js";
 import { Reading } from "./reading.js";
+import { movingBoundsOf } from "./specs.js";
 import { colour } from "./theme.js";
 import { exitLine, TimeLine } from "./timeline.js";
 import { Hands, scaled } from "./window.js";
 import { decimals, fixed } from "./words.js";
 /** @import { Plots } from "./plots.js" */
-/** @import { Spec } from "./specs.js" */
+/** @import { MovingBound, Spec } from "./specs.js" */
 /** @import { Agent } from "./types.d.ts" */
 
 /**
@@ -35,6 +36,8 @@ export class Plot {
     this.focused = null; // the line that is pointed at
     /** @type {uPlot | null} */
     this.uplot = null; // from when there is a size
+    /** @type {MovingBound[]} */
+    this.movingBounds = [];
     this.mouseInside = false;
     this.chips = element("div", { class: "plot-chips" });
     const shown = spec.columns.length;
@@ -207,13 +210,14 @@ export class Plot {
 
   /** @returns {uPlot.AlignedData} */
   data() {
-    const { time } = this.plots.source.store;
-    if (!this.look.log) return [time, ...this.columns()];
+    const { store } = this.plots.source;
+    this.movingBounds = movingBoundsOf(this.spec, store);
+    if (!this.look.log) return [store.time, ...this.columns()];
     const sign = this.turned ? -1 : 1;
     const drawn = this.columns().map((column) =>
       column.map((value) => (value !== null && sign * value > 0 ? sign * value : null)),
     );
-    return [time, ...drawn];
+    return [store.time, ...drawn];
   }
 
   /** @param {(position: number) => number} move of where an edge is, px, to where it was */

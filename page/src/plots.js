@@ -201,7 +201,7 @@ export class Plots {
   }
 
   describe() {
-    return this.plots.map(({ spec, uplot, look }) => ({
+    return this.plots.map(({ spec, uplot, look, movingBounds }) => ({
       system: spec.system.name,
       name: spec.name,
       axis: spec.axis,
@@ -209,6 +209,7 @@ export class Plots {
       series: [...spec.labels],
       total: spec.total,
       bounds: spec.bounds.map(({ value }) => value),
+      moving: movingBounds.length,
       width: uplot?.width ?? 0,
       samples: uplot?.data[0].length ?? 0,
       time: uplot && [uplot.scales.x.min, uplot.scales.x.max],

@@ -1,10 +1,12 @@
 // What there is to plot of a system.
-/** @import { Quantity, System } from "./types.d.ts" */
+/** @import { Quantity, Store, System } from "./types.d.ts" */
 
 const MOST_LINES = 40;
 
 /**
  * @typedef {{value: number, note: string}} Bound, and whose it is
+ *
+ * @typedef {{values: (number | null)[], note: string}} MovingBound the same at each sample
  *
  * @typedef {object} Spec
  * @property {System} system
@@ -21,6 +23,7 @@ const MOST_LINES = 40;
  * @property {(number | null)[]} agents from 0, of the columns that are an agent's own
  * @property {string} noun before a label
  * @property {Bound[]} bounds
+ * @property {string[]} moving arrays of bounds that change in time, with the same columns
  */
 
 /**
@@ -61,6 +64,7 @@ const actionsOf = (/** @type {System} */ system) => {
       agents: columns.map((k) => action.owner[k] - 1),
       noun: agent,
       bounds: [],
+      moving: [],
     };
   });
 };
@@ -85,6 +89,7 @@ const quantityOf = (system, quantity) => {
     agents: quantity.labels.map((_, k) => (ofAgents ? k : null)),
     noun: ofAgents ? system.agent_name : "",
     bounds: boundsOf(quantity),
+    moving: Object.values(quantity.moving_bounds).map((each) => `${system.name}/quantity/${each}`),
   };
 };
 
@@ -103,11 +108,41 @@ const boundsOf = ({ bound, lower_bound, labels }) => {
       found.set(value, [...(found.get(value) ?? []), shorts[k]]);
     });
   return [...found]
-    .map(([value, whose]) => {
-      const note = `: ${whose.join(", ")}`;
-      return { value, note: whose.length < labels.length && note.length < 20 ? note : "" };
-    })
+    .map(([value, whose]) => ({ value, note: noteOf(whose, labels.length) }))
     .sort((a, b) => a.value - b.value);
+};
+
+/**
+ * Each different bound over time, with the entries that have it.
+ * @param {Spec} spec
+ * @param {Store} store
+ * @returns {MovingBound[]}
+ */
+export const movingBoundsOf = ({ moving, columns, shorts }, store) => {
+  /** @type {Map<string, {values: (number | null)[], whose: string[]}>} */
+  const found = new Map();
+  for (const array of moving)
+    columns.forEach((column, k) => {
+      const values = store.column(array, column);
+      if (values.every((value) => value === null)) return;
+      const key = values.join();
+      const known = found.get(key) ?? { values, whose: [] };
+      found.set(key, { values, whose: [...known.whose, shorts[k]] });
+    });
+  return [...found.values()].map(({ values, whose }) => ({
+    values,
+    note: noteOf(whose, columns.length),
+  }));
+};
+
+/**
+ * Whose a bound is, where it is not everyone's and can be told in a few words.
+ * @param {string[]} whose
+ * @param {number} of
+ */
+const noteOf = (whose, of) => {
+  const note = `: ${whose.join(", ")}`;
+  return whose.length < of && note.length < 20 ? note : "";
 };
 
 /**

@@ -70,6 +70,7 @@ export class Toolbar {
     if (words.has("measurements")) parts.push("dashed lines: measured directly");
     if (linked.some((system) => system.links.length && system.message_period !== null))
       parts.push("✕ lost");
+    if (linked.some((system) => system.triggered)) parts.push("sent by triggers: see the plot");
     const planned = this.systems.filter(({ plan }) => plan);
     if (planned.length) parts.push("rings: outputs, where robots head");
     if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
@@ -145,10 +146,11 @@ export class Toolbar {
   ghostNote({ system: name, agent }) {
     const system = /** @type {System} */ (this.systems.find((each) => each.name === name));
     const who = nameOf(system, agent);
+    const others = system.kept ? "those that it estimates" : "the others";
     if (system.drawn_as === "bars")
-      return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
+      return `Outlines: ${system.action.name}s of ${others} as ${who} takes them to be.`;
     const wrong = `(estimate − actual ${system.action.name})`;
-    return `Pale copies: the others as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
+    return `Pale copies: ${others} as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
   }
 
   // ---- legend

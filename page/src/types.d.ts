@@ -19,6 +19,7 @@ export interface Quantity {
   labels: string[];
   bound: (number | null)[] | null;
   lower_bound: (number | null)[] | null;
+  moving_bounds: { bound?: string; lower_bound?: string }; // arrays of those that change in time
   between: ([number, number] | null)[]; // agents, from 1, of each entry that is a distance
 }
 
@@ -43,8 +44,10 @@ export interface System {
   edges: [number, number][]; // agents from 1
   edges_are: "measurements" | "messages";
   links: [number, number][]; // [hearer, sender], from 1
-  message_period: number | null; // s; null if messages flow all the time
+  message_period: number | null; // s; null if messages flow all the time, or are sent by triggers
+  triggered: boolean;
   estimates: boolean;
+  kept: { by: number[]; action: number[] } | null; // whose estimates, from 1; null: all are kept
   anchors: number[]; // the item at which each robot is
   height: number; // m
   plan: Plan | null;

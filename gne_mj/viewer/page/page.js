@@ -272,7 +272,9 @@
   // src/instant.js
   var partsOf = (system) => [
     "action",
-    ...system.quantities.map((quantity) => `quantity/${quantity.name}`),
+    ...system.quantities.flatMap(
+      ({ name, moving_bounds: moving }) => [name, ...Object.values(moving)].map((each) => `quantity/${each}`)
+    ),
     "share",
     "margin",
     "estimate",
@@ -713,7 +715,8 @@
      */
     flow(systems, now) {
       if (!this.pulsing) return;
-      for (const system of systems) if (system.message_period === null) this.flowIn(system, now);
+      for (const system of systems)
+        if (system.message_period === null && !system.triggered) this.flowIn(system, now);
     }
     /**
      * @param {System} system
@@ -5824,20 +5827,23 @@
       spanGaps: false
     };
   };
-  var valuesOf = ({ look, spec }, u, low, high) => {
+  var valuesOf = (plot, u, low, high) => {
+    const { look } = plot;
     if (look.values) return look.values;
-    if (!look.log) return rangeY(spec.bounds, u.height, low, high);
+    if (!look.log) return rangeY(plot, u.height, low, high);
     if (low === null || high === null || !(low > 0)) return [1e-3, 1];
     return [low / 1.5, high * 1.5];
   };
-  var rangeY = (bounds, height, low, high) => {
-    for (const { value } of bounds) {
+  var rangeY = ({ spec, movingBounds }, height, low, high) => {
+    const { bounds } = spec;
+    const moving = movingBounds.flatMap(({ values }) => values.filter((each) => each !== null));
+    for (const value of [...bounds.map((bound) => bound.value), ...moving]) {
       low = low === null ? value : Math.min(low, value);
       high = high === null ? value : Math.max(high, value);
     }
     if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
     const size = high - low || Math.abs(high) || 1;
-    const room = bounds.length ? 18 / Math.max(height - 36, 40) : 0.08;
+    const room = bounds.length || moving.length ? 18 / Math.max(height - 36, 40) : 0.08;
     return [low - 0.07 * size, high + room * size * 1.2];
   };
   var drawMarks = (u, plot) => {
@@ -5848,7 +5854,9 @@
     context.clip();
     drawInterventions(u, plot.plots.source.interventions);
     drawApproach(u, plot);
-    if (!plot.look.log) drawBounds(u, plot.spec);
+    if (plot.look.log) return context.restore();
+    drawBounds(u, plot.spec);
+    drawMovingBounds(u, plot.movingBounds);
     context.restore();
   };
   var drawInterventions = (u, interventions) => {
@@ -5883,15 +5891,18 @@
     context.textAlign = leftward ? "right" : "left";
     context.fillText("closest approach", x + (leftward ? -8 : 8) * ratio, bbox.top);
   };
-  var drawBounds = (u, { bounds, unit }) => {
-    const { ctx: context, bbox } = u;
-    const ratio = uPlot.pxRatio;
+  var asBounds = (context, ratio) => {
     context.strokeStyle = context.fillStyle = colour("limit");
     context.lineWidth = 1.5 * ratio;
     context.font = `${12 * ratio}px system-ui, sans-serif`;
     context.textBaseline = "bottom";
     context.textAlign = "right";
     context.setLineDash([6 * ratio, 4 * ratio]);
+  };
+  var drawBounds = (u, { bounds, unit }) => {
+    const { ctx: context, bbox } = u;
+    const ratio = uPlot.pxRatio;
+    asBounds(context, ratio);
     let last = Infinity;
     for (const { value, note } of bounds) {
       const y = u.valToPos(value, "y", true);
@@ -5903,6 +5914,31 @@
       last = y;
       const text = `bound ${withUnit(value, unit)}${note}`;
       context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+    }
+  };
+  var drawMovingBounds = (u, bounds) => {
+    const { ctx: context, bbox } = u;
+    const ratio = uPlot.pxRatio;
+    asBounds(context, ratio);
+    const time = u.data[0];
+    for (const { values, note } of bounds) {
+      context.beginPath();
+      let last = null;
+      values.forEach((value, i) => {
+        if (value === null) return;
+        const [x2, y2] = [u.valToPos(time[i], "x", true), u.valToPos(value, "y", true)];
+        if (values[i - 1] === null || !last) context.moveTo(x2, y2);
+        else context.lineTo(x2, y2);
+        last = [x2, y2];
+      });
+      context.stroke();
+      if (!last) continue;
+      const [x, y] = (
+        /** @type {[number, number]} */
+        last
+      );
+      const right = Math.min(x, bbox.left + bbox.width - 4 * ratio);
+      context.fillText(`bound${note}`, right, y - 2 * ratio);
     }
   };
 
@@ -6081,6 +6117,108 @@
     }
   };
 
+  // src/specs.js
+  var MOST_LINES = 40;
+  var shortOf = (labels) => {
+    if (labels.length < 2) return labels;
+    const [first] = labels;
+    let n = 0;
+    while (n < first.length && labels.every((each) => each[n] === first[n])) n++;
+    const common = first.slice(0, n).lastIndexOf(" ") + 1;
+    return labels.map(
+      (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_2, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
+    );
+  };
+  var actionsOf = (system) => {
+    const { action, agent_name: agent } = system;
+    return [...new Set(action.axis)].map((axis) => {
+      const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
+      return {
+        system,
+        name: "action",
+        axis,
+        array: `${system.name}/action`,
+        unit: action.unit,
+        columns,
+        title: axis ? `${action.name}, ${axis}` : action.name,
+        symbol: "",
+        labels: columns.map((k) => String(action.owner[k])),
+        agents: columns.map((k) => action.owner[k] - 1),
+        noun: agent,
+        bounds: [],
+        moving: []
+      };
+    });
+  };
+  var quantityOf = (system, quantity) => {
+    const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
+    return {
+      system,
+      name: quantity.name,
+      axis: "",
+      array: `${system.name}/quantity/${quantity.name}`,
+      unit: quantity.unit,
+      columns: [...quantity.labels.keys()],
+      title: quantity.long_name,
+      symbol: quantity.symbol,
+      labels: quantity.labels.map((each) => each || quantity.long_name),
+      agents: quantity.labels.map((_2, k) => ofAgents ? k : null),
+      noun: ofAgents ? system.agent_name : "",
+      bounds: boundsOf(quantity),
+      moving: Object.values(quantity.moving_bounds).map((each) => `${system.name}/quantity/${each}`)
+    };
+  };
+  var boundsOf = ({ bound, lower_bound, labels }) => {
+    const found = /* @__PURE__ */ new Map();
+    const shorts = shortOf(labels);
+    for (const values of [bound, lower_bound])
+      (values ?? []).forEach((value, k) => {
+        if (value === null || !Number.isFinite(value)) return;
+        found.set(value, [...found.get(value) ?? [], shorts[k]]);
+      });
+    return [...found].map(([value, whose]) => ({ value, note: noteOf(whose, labels.length) })).sort((a, b) => a.value - b.value);
+  };
+  var movingBoundsOf = ({ moving, columns, shorts }, store) => {
+    const found = /* @__PURE__ */ new Map();
+    for (const array of moving)
+      columns.forEach((column, k) => {
+        const values = store.column(array, column);
+        if (values.every((value) => value === null)) return;
+        const key = values.join();
+        const known = found.get(key) ?? { values, whose: [] };
+        found.set(key, { values, whose: [...known.whose, shorts[k]] });
+      });
+    return [...found.values()].map(({ values, whose }) => ({
+      values,
+      note: noteOf(whose, columns.length)
+    }));
+  };
+  var noteOf = (whose, of) => {
+    const note = `: ${whose.join(", ")}`;
+    return whose.length < of && note.length < 20 ? note : "";
+  };
+  var evenly = (n, most) => {
+    if (n <= most) return [...Array(n).keys()];
+    return [...Array(most).keys()].map((k) => Math.round(k * (n - 1) / (most - 1)));
+  };
+  var thinned = (spec) => {
+    const total = spec.columns.length;
+    const chosen = evenly(total, MOST_LINES);
+    const pick = (values) => chosen.map((k) => values[k]);
+    return {
+      ...spec,
+      total,
+      columns: pick(spec.columns),
+      shorts: pick(shortOf(spec.labels)),
+      labels: pick(spec.labels),
+      agents: pick(spec.agents)
+    };
+  };
+  var specsOf = (system) => [
+    ...actionsOf(system),
+    ...system.quantities.map((quantity) => quantityOf(system, quantity))
+  ].map(thinned);
+
   // src/timeline.js
   var TimeLine = class {
     /** @param {HTMLElement} root */
@@ -6122,6 +6260,7 @@
       this.hovered = null;
       this.focused = null;
       this.uplot = null;
+      this.movingBounds = [];
       this.mouseInside = false;
       this.chips = element("div", { class: "plot-chips" });
       const shown = spec.columns.length;
@@ -6280,13 +6419,14 @@
     }
     /** @returns {uPlot.AlignedData} */
     data() {
-      const { time } = this.plots.source.store;
-      if (!this.look.log) return [time, ...this.columns()];
+      const { store } = this.plots.source;
+      this.movingBounds = movingBoundsOf(this.spec, store);
+      if (!this.look.log) return [store.time, ...this.columns()];
       const sign2 = this.turned ? -1 : 1;
       const drawn = this.columns().map(
         (column) => column.map((value) => value !== null && sign2 * value > 0 ? sign2 * value : null)
       );
-      return [time, ...drawn];
+      return [store.time, ...drawn];
     }
     /** @param {(position: number) => number} move of where an edge is, px, to where it was */
     moveValues(move) {
@@ -6374,90 +6514,6 @@
       this.readout.textContent = k === null ? "point at a line for its value" : `${spec.noun} ${spec.labels[k]}: ${this.valueText(k, i)} ${spec.unit}`.trim();
     }
   };
-
-  // src/specs.js
-  var MOST_LINES = 40;
-  var shortOf = (labels) => {
-    if (labels.length < 2) return labels;
-    const [first] = labels;
-    let n = 0;
-    while (n < first.length && labels.every((each) => each[n] === first[n])) n++;
-    const common = first.slice(0, n).lastIndexOf(" ") + 1;
-    return labels.map(
-      (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_2, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
-    );
-  };
-  var actionsOf = (system) => {
-    const { action, agent_name: agent } = system;
-    return [...new Set(action.axis)].map((axis) => {
-      const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
-      return {
-        system,
-        name: "action",
-        axis,
-        array: `${system.name}/action`,
-        unit: action.unit,
-        columns,
-        title: axis ? `${action.name}, ${axis}` : action.name,
-        symbol: "",
-        labels: columns.map((k) => String(action.owner[k])),
-        agents: columns.map((k) => action.owner[k] - 1),
-        noun: agent,
-        bounds: []
-      };
-    });
-  };
-  var quantityOf = (system, quantity) => {
-    const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
-    return {
-      system,
-      name: quantity.name,
-      axis: "",
-      array: `${system.name}/quantity/${quantity.name}`,
-      unit: quantity.unit,
-      columns: [...quantity.labels.keys()],
-      title: quantity.long_name,
-      symbol: quantity.symbol,
-      labels: quantity.labels.map((each) => each || quantity.long_name),
-      agents: quantity.labels.map((_2, k) => ofAgents ? k : null),
-      noun: ofAgents ? system.agent_name : "",
-      bounds: boundsOf(quantity)
-    };
-  };
-  var boundsOf = ({ bound, lower_bound, labels }) => {
-    const found = /* @__PURE__ */ new Map();
-    const shorts = shortOf(labels);
-    for (const values of [bound, lower_bound])
-      (values ?? []).forEach((value, k) => {
-        if (value === null || !Number.isFinite(value)) return;
-        found.set(value, [...found.get(value) ?? [], shorts[k]]);
-      });
-    return [...found].map(([value, whose]) => {
-      const note = `: ${whose.join(", ")}`;
-      return { value, note: whose.length < labels.length && note.length < 20 ? note : "" };
-    }).sort((a, b) => a.value - b.value);
-  };
-  var evenly = (n, most) => {
-    if (n <= most) return [...Array(n).keys()];
-    return [...Array(most).keys()].map((k) => Math.round(k * (n - 1) / (most - 1)));
-  };
-  var thinned = (spec) => {
-    const total = spec.columns.length;
-    const chosen = evenly(total, MOST_LINES);
-    const pick = (values) => chosen.map((k) => values[k]);
-    return {
-      ...spec,
-      total,
-      columns: pick(spec.columns),
-      shorts: pick(shortOf(spec.labels)),
-      labels: pick(spec.labels),
-      agents: pick(spec.agents)
-    };
-  };
-  var specsOf = (system) => [
-    ...actionsOf(system),
-    ...system.quantities.map((quantity) => quantityOf(system, quantity))
-  ].map(thinned);
 
   // src/plots.js
   var AROUND = 0.04;
@@ -6625,7 +6681,7 @@
       for (const plot of this.plots) if (plot !== except) plot.highlight(which);
     }
     describe() {
-      return this.plots.map(({ spec, uplot, look }) => ({
+      return this.plots.map(({ spec, uplot, look, movingBounds }) => ({
         system: spec.system.name,
         name: spec.name,
         axis: spec.axis,
@@ -6633,6 +6689,7 @@
         series: [...spec.labels],
         total: spec.total,
         bounds: spec.bounds.map(({ value }) => value),
+        moving: movingBounds.length,
         width: uplot?.width ?? 0,
         samples: uplot?.data[0].length ?? 0,
         time: uplot && [uplot.scales.x.min, uplot.scales.x.max],
@@ -6691,7 +6748,7 @@
     }
     boundedNumbers() {
       return this.system.quantities.filter(
-        ({ bound, labels }) => labels.length === 1 && typeof bound?.[0] === "number"
+        ({ bound, labels, moving_bounds: moving }) => labels.length === 1 && (typeof bound?.[0] === "number" || moving.bound !== void 0)
       );
     }
     /**
@@ -6776,6 +6833,8 @@
      * @param {Record<string, Numbers | undefined>} own arrays of the system
      */
     updateGauge(gauge, own) {
+      const { bound } = gauge.quantity.moving_bounds;
+      if (bound) gauge.limit = own[`quantity/${bound}`]?.[0] ?? NaN;
       gauge.value = own[`quantity/${gauge.quantity.name}`]?.[0] ?? NaN;
       gauge.share = gauge.value / gauge.limit;
       setHeight(gauge.bar, TALL * (Number.isFinite(gauge.share) ? gauge.share : 0));
@@ -7216,6 +7275,14 @@
   // src/ghosts.js
   var EDGES2 = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5));
   var SECOND = 1;
+  var estimatesOf = ({ kept }, holder, estimate, m) => {
+    if (!kept) return estimate.subarray(holder * m, (holder + 1) * m);
+    const row = new Float64Array(m).fill(NaN);
+    kept.by.forEach((agent, e) => {
+      if (agent === holder + 1) row[kept.action[e]] = estimate[e];
+    });
+    return row;
+  };
   var DIRECTIONS = { "": 0, x: 0, y: 1, z: 2 };
   var Ghosts = class {
     /** @param {Scene} scene */
@@ -7245,8 +7312,7 @@
       const { estimate, action } = (system && instant.systems[system.name]) ?? {};
       this.group.visible = Boolean(system && shown && estimate && action);
       if (!system || !shown || !estimate || !action) return;
-      const m = action.length;
-      const row = estimate.subarray(shown.agent * m, (shown.agent + 1) * m);
+      const row = estimatesOf(system, shown.agent, estimate, action.length);
       if (system.drawn_as === "bars") this.outlines(system, shown.agent, row);
       else this.shadows(system, shown.agent, row, action);
     }
@@ -7262,6 +7328,7 @@
         const [outline] = this.copiesOf(k, () => [this.outline()]);
         const [x, y] = bars2.spot(k);
         outline.position.set(...bars2.point(x, y, 0));
+        outline.visible = Number.isFinite(row[k]);
         const height = bars2.scale * bars2.heightOf(row[k]);
         outline.scale.set(0.5 * bars2.scale, 0.5 * bars2.scale, height || 1e-4);
       });
@@ -7611,7 +7678,7 @@
      */
     addDistances(quantity) {
       return quantity.between.flatMap(
-        (pair, entry) => pair && typeof quantity.bound?.[entry] === "number" ? [{ quantity, entry, pair, strip: this.add(STRIP, 0.9) }] : []
+        (pair, entry) => pair && (typeof quantity.bound?.[entry] === "number" || quantity.moving_bounds.bound) ? [{ quantity, entry, pair, strip: this.add(STRIP, 0.9) }] : []
       );
     }
     /** @param {number} radius */
@@ -7666,7 +7733,10 @@
      */
     placeDistance({ quantity, entry, pair: [a, b], strip }, own, layout) {
       const value = own[`quantity/${quantity.name}`]?.[entry] ?? NaN;
-      const share = used(value, quantity.bound?.[entry], quantity.lower_bound?.[entry]);
+      const { bound, lower_bound: lower } = quantity.moving_bounds;
+      const high = bound ? own[`quantity/${bound}`]?.[entry] : quantity.bound?.[entry];
+      const low = lower ? own[`quantity/${lower}`]?.[entry] : quantity.lower_bound?.[entry];
+      const share = used(value, high, low);
       strip.material.color.setRGB(...ramp(share));
       const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
       this.stretch(strip, ends[0], ends[1], WIDTH3, layout.floor + 2 * STEP2);
@@ -7976,6 +8046,7 @@
       if (words.has("measurements")) parts.push("dashed lines: measured directly");
       if (linked.some((system) => system.links.length && system.message_period !== null))
         parts.push("✕ lost");
+      if (linked.some((system) => system.triggered)) parts.push("sent by triggers: see the plot");
       const planned = this.systems.filter(({ plan }) => plan);
       if (planned.length) parts.push("rings: outputs, where robots head");
       if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
@@ -8044,10 +8115,11 @@
         this.systems.find((each) => each.name === name)
       );
       const who = nameOf(system, agent);
+      const others = system.kept ? "those that it estimates" : "the others";
       if (system.drawn_as === "bars")
-        return `Outlines: the other ${system.action.name}s as ${who} takes them to be.`;
+        return `Outlines: ${system.action.name}s of ${others} as ${who} takes them to be.`;
       const wrong = `(estimate − actual ${system.action.name})`;
-      return `Pale copies: the others as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
+      return `Pale copies: ${others} as ${who} takes them to be, displaced by ${wrong} × 1 s.`;
     }
     // ---- legend
     /**
