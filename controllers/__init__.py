@@ -11,7 +11,9 @@ from gne_mj.controllers.partial_information import PartialInformation
 from gne_mj.controllers.plain_law import PlainLaw
 from gne_mj.controllers.primal_dual_partial import PrimalDualPartial
 from gne_mj.controllers.primal_dual_play import PrimalDual
+from gne_mj.controllers.projected_gradient import ProjectedGradient
 from gne_mj.controllers.quadratic_penalty import QuadraticPenalty
+from gne_mj.controllers.receding_horizon import RecedingHorizon
 from gne_mj.controllers.recursive_safe_flow import RecursiveSafeFlow
 from gne_mj.controllers.safe_monotone_flow import SafeMonotoneFlow
 
@@ -27,7 +29,9 @@ __all__ = [
     "PlainLaw",
     "PrimalDual",
     "PrimalDualPartial",
+    "ProjectedGradient",
     "QuadraticPenalty",
+    "RecedingHorizon",
     "RecursiveSafeFlow",
     "SafeMonotoneFlow",
 ]

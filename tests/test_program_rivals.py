@@ -2,11 +2,17 @@
 
 import numpy as np
 import pytest
-from builders import UNEQUAL, clock, integrators, robots
+from builders import UNEQUAL, clock, integrators, pi_cascades, robots
 from random_games import RandomGame
-from scipy.optimize import minimize
+from scipy.optimize import minimize, root
 
-from gne_mj.controllers import CbfFilter, DiscreteCbfFilter, SafeMonotoneFlow
+from gne_mj.controllers import (
+    CbfFilter,
+    DiscreteCbfFilter,
+    ProjectedGradient,
+    RecedingHorizon,
+    SafeMonotoneFlow,
+)
 from gne_mj.equilibrium import variational_equilibrium
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.ode import OdePlant
@@ -17,26 +23,28 @@ N = 5
 H = 0.02
 
 
-def nearest(goal, g, slope, active=1e-9):
-    """The point nearest to goal with g(x) <= 0: by SLSQP, then Newton's method on what binds."""
+def nearest(goal, g, slope, start=None):
+    """The point nearest to goal with g(x) <= 0: by SLSQP, then what binds as equations."""
     found = minimize(
-        lambda x: 0.5 * np.sum((x - goal) ** 2), goal, jac=lambda x: x - goal, method="SLSQP",
+        lambda x: 0.5 * np.sum((x - goal) ** 2), goal if start is None else start,
+        jac=lambda x: x - goal, method="SLSQP",
         constraints={"type": "ineq", "fun": lambda x: -g(x), "jac": lambda x: -slope(x)},
         options={"maxiter": 500, "ftol": 1e-14},
     ).x  # fmt: skip
-    binding = np.flatnonzero(g(found) > -1e-6)
-    x, n = found, len(goal)
-    multipliers = np.linalg.lstsq(slope(x)[binding].T, goal - x, rcond=None)[0]
-    for _ in range(60):  # of first order in what bends, which is enough
-        rows = slope(x)[binding]
-        system = np.block([[np.eye(n), rows.T], [rows, np.zeros((len(binding),) * 2)]])
-        step = np.linalg.lstsq(
-            system, np.concatenate([goal - x - rows.T @ multipliers, -g(x)[binding]]), rcond=None
-        )[0]
-        x, multipliers = x + step[:n], multipliers + step[n:]
-    assert np.all(multipliers >= -1e-9)
-    assert np.max(g(x)) < 1e-9
-    return x
+    binding, n = np.flatnonzero(g(found) > -1e-6), len(goal)
+    multipliers = np.linalg.lstsq(slope(found)[binding].T, goal - found, rcond=None)[0]
+
+    def equations(z):
+        x, rows = z[:n], slope(z[:n])[binding]
+        return np.concatenate([x - goal + rows.T @ z[n:], g(x)[binding]])
+
+    z = root(equations, np.concatenate([found, multipliers]), tol=1e-14).x
+    rows = slope(z[:n])[binding]  # of what is affine the rest is one step
+    system = np.block([[np.eye(n), rows.T], [rows, np.zeros((len(binding),) * 2)]])
+    z -= np.linalg.lstsq(system, equations(z), rcond=None)[0]
+    assert np.all(z[n:] >= -1e-9)
+    assert np.max(g(z[:n])) < 1e-9
+    return z[:n]
 
 
 def system_of(made, law, agents, y, state=None, **options):
@@ -53,8 +61,9 @@ def draw(seed, curved, agents=None):
     y = rng.normal(size=N)
     while np.max(made.g(y)) > -0.02:
         y *= 0.8
-    state = (agents or integrators(N)).equilibrium(y)
-    state += rng.normal(size=state.shape) * (np.arange(state.shape[1]) != 1)
+    agents = agents or integrators(N)
+    state = agents.equilibrium(y)
+    state += rng.normal(size=state.shape) * (np.arange(state.shape[1]) != agents.kind.OUTPUT)
     return made, y, state
 
 
@@ -150,6 +159,105 @@ def test_integrators_stay_inside_and_end_at_the_variational_equilibrium(law, opt
     assert np.max(made.g(y)) > -1e-5
 
 
+@pytest.mark.parametrize(
+    ("law", "mode", "overshoot"),
+    [
+        (ProjectedGradient(), "continuous", 0.1),  # of a step that meets a bound: 0.02 s
+        (ProjectedGradient(), "sampled", 1e-12),
+        (RecedingHorizon(4), "sampled", 1e-11),
+    ],
+    ids=lambda given: getattr(given, "information", str(given)),
+)
+def test_integrators_on_bounds_end_at_the_variational_equilibrium(law, mode, overshoot):
+    made = RandomGame(3, agents=N, constraints=4, curved=True)
+    y, worst = at_the_end(made, law, H, 20.0, mode=mode, on_exit="continue")
+    found = variational_equilibrium(made.game, np.zeros(N))
+    np.testing.assert_allclose(y, found.action, rtol=0, atol=1e-6)
+    assert -1e-11 < worst < overshoot
+
+
+def test_projected_play_is_a_projection_on_the_cone_and_on_the_set():
+    for seed in range(6):
+        made, inside, _ = draw(seed, curved=True)
+        y = np.random.default_rng(seed).normal(size=N)
+        y += 0.5 * made.A.sum(axis=0)  # some way outside
+        goal, g, J = -1.7 * made.F(y), made.g(y), made.J(y)
+        rows = g >= 0
+        assert np.any(rows)
+        law, agents = ProjectedGradient(1.7, 3.0), integrators(N)
+        loop = system_of(made, law, agents, inside, on_exit="continue").closed_loop(clock(H))
+        loop._workspace.vectors.state[:] = y
+        u = loop.advance(1, 1).input[0]
+        expected = nearest(goal, lambda x: (J @ x + 3.0 * g)[rows], lambda x: J[rows])  # noqa: B023
+        np.testing.assert_allclose(u, expected, rtol=0, atol=1e-12 * (1 + np.max(np.abs(goal))))
+        one = system_of(made, law, agents, inside, mode="sampled")
+        u = one.closed_loop(clock(0.5)).advance(1, 1).input[0]
+        goal = inside - 0.5 * 1.7 * made.F(inside)
+        np.testing.assert_allclose(
+            inside + 0.5 * u, nearest(goal, made.g, made.J, inside), atol=1e-9
+        )
+
+
+def test_a_plan_is_an_open_loop_equilibrium_of_the_linear_plant():
+    """By another method, from responses to pulses at each knot of the plant."""
+    agents, knots, periods, effort = pi_cascades(N), 5, 3, 0.2
+    plant = OdePlant(agents, H)
+
+    def outputs(plan, state):
+        plant.reset(state)
+        rows = []
+        for u in plan:
+            plant.step(u, periods)
+            rows.append(plant.output)
+        return np.array(rows)
+
+    for seed in range(4):
+        made, y, state = draw(seed, seed % 2, agents)
+        law = RecedingHorizon(knots, periods, effort)
+        one = system_of(made, law, agents, y, state, mode="sampled")
+        u = one.closed_loop(clock(H)).advance(1, 1).input[0]
+        zero = outputs(np.zeros((knots, N)), state)
+        pulses = np.eye(knots)[:, :, None] * np.ones(N)
+        rise = np.array([outputs(pulse, state) - zero for pulse in pulses])  # of j by i
+        plan, multipliers = open_loop(made, zero, rise, effort)
+        np.testing.assert_allclose(u, plan[0], rtol=0, atol=1e-8 * (1 + np.max(np.abs(u))))
+        assert np.max(multipliers) > 0.0
+
+
+def open_loop(made, zero, rise, effort):
+    """The plan and its multipliers: from the smoothed complementarity of Fischer and Burmeister,
+    sqrt(l^2 + g^2 + 2 t) - l + g = 0, which tells what binds; then of these alone."""
+    knots, m = zero.shape
+    p, n = len(made.b), knots * m
+
+    def parts(x):
+        U, l = x[:n].reshape(knots, m), x[n:].reshape(knots, p)  # noqa: E741
+        Y = zero + np.einsum("ija,ia->ja", rise, U)
+        slopes = np.array([made.F(y) + made.J(y).T @ each for y, each in zip(Y, l, strict=True)])
+        G = np.einsum("ija,ja->ia", rise, slopes) + effort * U
+        return G.ravel(), l.ravel(), np.array([made.g(y) for y in Y]).ravel()
+
+    def smoothed(x, t):
+        G, l, g = parts(x)  # noqa: E741
+        return np.concatenate([G, np.sqrt(l**2 + g**2 + 2 * t) - l + g])
+
+    x = np.concatenate([np.zeros(n), np.ones(knots * p)])
+    for t in 10.0 ** -np.arange(0, 14, 1.0):
+        x = root(smoothed, x, args=(t,)).x
+    _, l, g = parts(x)  # noqa: E741
+    binding = l > -g
+
+    def exact(x):
+        G, l, g = parts(x)  # noqa: E741
+        return np.concatenate([G, np.where(binding, g, l)])
+
+    x = root(exact, x, tol=1e-13).x
+    _, l, g = parts(x)  # noqa: E741
+    assert np.min(l) > -1e-9
+    assert np.max(g) < 1e-9
+    return x[:n].reshape(knots, m), l
+
+
 def test_where_no_input_will_do_limits_are_kept_and_bounds_are_soft():
     """A spring pulls the robot towards its bound, harder than its motor can hold, or away."""
     made, limit = RandomGame(3, agents=1, constraints=1), 2.0
@@ -162,6 +270,17 @@ def test_where_no_input_will_do_limits_are_kept_and_bounds_are_soft():
             one = system_of(made, law, agents, y, state, mode=mode)
             u = one.closed_loop(clock(H)).advance(1, 1).input[0]
             assert u[0] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", [CbfFilter(), RecedingHorizon(3)], ids=lambda law: law.information)
+def test_in_mujoco_the_laws_find_the_same_state(law):
+    made, y, state = draw(1, True, ROBOTS)
+    mode = "sampled" if law.information == "receding-horizon" else "continuous"
+    first = []
+    for engine in ("ode", "mujoco"):
+        one = system_of(made, law, ROBOTS, y, state, mode=mode, engine=engine, integrator="euler")
+        first.append(one.closed_loop(clock(H)).advance(1, 1).input[0])
+    np.testing.assert_allclose(*first, rtol=0, atol=1e-9)
 
 
 def test_laws_of_periods_are_for_held_modes_and_numbers_are_looked_at():

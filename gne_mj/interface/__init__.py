@@ -28,7 +28,13 @@ from gne_mj.interface.faults import (
     silence,
 )
 from gne_mj.interface.laws import full_information, fully_distributed, own_law, partial_information
-from gne_mj.interface.program_rivals import cbf_filter, discrete_cbf_filter, safe_monotone_flow
+from gne_mj.interface.program_rivals import (
+    cbf_filter,
+    discrete_cbf_filter,
+    projected_gradient,
+    receding_horizon,
+    safe_monotone_flow,
+)
 from gne_mj.interface.rivals import (
     feedback_seeking,
     l1_penalty,
@@ -70,8 +76,10 @@ __all__ = [
     "plot",
     "primal_dual_partial",
     "primal_dual_play",
+    "projected_gradient",
     "push",
     "quadratic_penalty",
+    "receding_horizon",
     "recursive_safe_flow",
     "run",
     "safe_monotone_flow",

@@ -22,8 +22,11 @@ Array = NDArray[np.float64]
 def law_at_start(system: System) -> Array:
     """u (m,) as the law reads at y(0) and its memory at the start, without any limit.
 
-    Faults of sensors are left out. Not a number where the law has no action.
+    Faults of sensors are left out. Not a number where the law has no action, or where that depends
+    on how long a control period is.
     """
+    if system.law.knows_plant and not hasattr(system.law.kernels, "rate"):
+        return np.full(system.game.actions, np.nan)
     game, problem, memory = system.game, problem_at_start(system), system.loop_memory.copy()
     setup = Setup(problem, system.agents.equilibrium(system.start), Steps(1.0, 1, 0, 0))
     problem, _parameter_block = problem_and_parameter_block(setup, system.agents, len(memory))
