@@ -136,7 +136,7 @@ def mjcf_robots(
     count: int,
     file: str | Path | Sequence[str | Path],
     *,
-    output: str | Sequence[str] | Sequence[Sequence[str]],
+    output: Any,
     input: str | Sequence[str] | Sequence[Sequence[str]],
     lookahead: float | None = None,
     local_damping: ArrayLike | None = None,
@@ -148,7 +148,8 @@ def mjcf_robots(
     Args:
         count: N.
         file: an MJCF file, or its text, which begins with ``<``; one for all or one each.
-        output: the joint or velocity sensor that is y_i, likewise; of vectors a list of names.
+        output: the joint or velocity sensor that is y_i, likewise, or a table that says what
+            (docs/robots.md), as ``{"body": "hull", "axes": ["x", "y"]}``; of vectors a list.
         input: the actuator that u_i drives, likewise.
         lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
         local_damping: d in N s/m, then: the force is u - d v.

@@ -54,10 +54,15 @@ class FleetPlant(Plant):
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
 
     def push_unit(self, channel: int) -> str:
-        """What forces at an output's joint are measured in: N, or N m at a hinge."""
-        joint = int(self.output_joints[channel])
-        kind = self.model.jnt_type[self.model.dof_jntid[joint]] if joint >= 0 else None
-        return "N m" if kind == mujoco.mjtJoint.mjJNT_HINGE else "N"
+        """What forces at an output's joint are measured in: N, or N m where it turns."""
+        dof, kinds = int(self.output_joints[channel]), mujoco.mjtJoint
+        if dof < 0:
+            return "N"
+        joint = self.model.dof_jntid[dof]
+        free = self.model.jnt_type[joint] == kinds.mjJNT_FREE
+        turns = free and dof - self.model.jnt_dofadr[joint] >= 3
+        hinge = self.model.jnt_type[joint] in (kinds.mjJNT_HINGE, kinds.mjJNT_BALL)
+        return "N m" if turns or hinge else "N"
 
     @property
     @abstractmethod

@@ -1,6 +1,7 @@
 """Fleets of the user's own robots: any MJCF with a velocity to measure and an actuator to drive."""
 
 import sys
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.errors import InvalidInput, named, nearest
-from gne_mj.native import kernel
+from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
@@ -19,6 +20,7 @@ from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_prediction import (
+    FRAME_FUNCTIONS,
     SENSOR_FUNCTIONS,
     ChannelPlace,
     Prediction,
@@ -27,6 +29,7 @@ from gne_mj.plants.mjcf_prediction import (
     gather,
     refresh,
 )
+from gne_mj.plants.mjcf_reading import Term, array_word, names_in, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
@@ -43,12 +46,10 @@ from gne_mj.records import by_name
 __all__ = ["AGENT", "MjcfPlant", "actuator_of", "add_forces", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
+NEWTON = 20  # steps to a start's positions
 # What to do where they do
 BESIDE = f", {SPACING:g} m beside it: make its file narrower, or its floor a plane, which all share"
 TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
-SENSOR = mujoco.mjtSensor
-VELOCITIES = (SENSOR.mjSENS_JOINTVEL, SENSOR.mjSENS_TENDONVEL, SENSOR.mjSENS_ACTUATORVEL)
-
 AGENT = mjcf_robot
 
 
@@ -99,8 +100,8 @@ class MjcfPlant(FleetPlant):
     ) -> None:
         self.agents, self.timestep, self.integrator = agents, timestep, integrator
         self.kernels = sys.modules[__name__]
-        numbers = self._lookahead(agents)
-        self.passive = passive_callback(offsets(), self.kernels) if len(numbers) else None
+        lookahead = agents.parameters.size
+        self.passive = passive_callback(offsets(), self.kernels) if lookahead else None
         with named(path="agents.path"):
             world, sizes_of_robots, memory_asked = _world(agents)
         with named(world="agents.path"):
@@ -113,6 +114,7 @@ class MjcfPlant(FleetPlant):
             mujoco.mj_fwdPosition(self.model, self.data)
         self._owners = owners_of(self.model, sizes_of_robots)
         share_floors(self.model, self.data, self._owners)
+        self._terms: list[Term] = []  # of all outputs that are no joint's
         flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -123,25 +125,26 @@ class MjcfPlant(FleetPlant):
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
             model.na - memory,
         )  # fmt: skip
+        functions = [step_address(name) for name in self._refreshing] or [0, 0, 0]
         prediction = Prediction(
-            model.nsensordata, self._twin._address, KNOWN_STATE, step_address(),
-            step_address("mj_copyState"),
-            0 if self.measures_every_stage else step_address("mj_forward"),
-            *(step_address(name) for name in SENSOR_FUNCTIONS),
+            self._twin._address, KNOWN_STATE, lookahead, array_word(self.data, "cvel"),
+            array_word(self.data, "subtree_com"), step_address(), step_address("mj_copyState"),
+            *functions,
         )  # fmt: skip
-        sizes = np.array([*self.sizes, *prediction], dtype=np.int64)
-        self.parameter_arrays = [flat, numbers, sizes]
+        readings = [number for term in self._terms for number in term.numbers(self.data)]
+        sizes = np.array([*self.sizes, *prediction, *readings], dtype=np.int64)
+        self.parameter_arrays = [flat, self._numbers(agents), sizes]
         self._parameter_block = ParameterBlock(self.parameter_arrays)
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
         """The table's arrays for agents with numbers of their own besides those in their files."""
         places, _, sizes = self.parameter_arrays
-        return [places, self._lookahead(agents), sizes]
+        return [places, self._numbers(agents), sizes]
 
-    @staticmethod
-    def _lookahead(agents: Agents) -> NDArray[np.float64]:
-        """tau, d and v_0 of each channel; nothing where outputs are velocities."""
-        return np.ascontiguousarray(agents.parameters).ravel()
+    def _numbers(self, agents: Agents) -> NDArray[np.float64]:
+        """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors."""
+        factors = [term.factor for term in self._terms]
+        return np.concatenate([np.ravel(agents.parameters), factors])
 
     def model_fields(
         self, parameters: NDArray[np.float64]
@@ -157,39 +160,52 @@ class MjcfPlant(FleetPlant):
     @property
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
-        return bool(np.all(self.places.output >= 0))
+        return all(term.fresh for term in self._terms)
 
-    def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
+    @property
+    def _refreshing(self) -> tuple[str, ...]:
+        """The functions of MuJoCo's that bring outputs up to date after a step."""
+        if all(term.body >= 0 for term in self._terms):
+            return FRAME_FUNCTIONS if self._terms else ()
+        return SENSOR_FUNCTIONS
+
+    def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int, int]:
         model, prefix = self.model, f"robot_{i // self.agents.dimension + 1}/"
-        joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + robot.output)
-        sensor = _named(model, mujoco.mjtObj.mjOBJ_SENSOR, prefix + robot.output)
-        actuator = _named(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input)
+        actuator = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input))
         if actuator < 0:
-            names = _names(model, "actuator", prefix)
+            names = names_in(model, "actuator", prefix)
             raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
-        kind = _check_sensor(model, robot, sensor) if sensor >= 0 else None
-        own = kind == SENSOR.mjSENS_ACTUATORVEL and model.sensor_objid[sensor] == actuator
+        with named(output="agents.output"):
+            terms = terms_of(model, prefix, robot.output)
+        row, only = int(model.actuator_outadr[actuator]), terms[0]
+        own = len(terms) == 1 and (only.source, only.entry) == ("actuator_velocity", row)
         with named(robot="agents"):
             least = make_force(model, self.data, robot, actuator, own_velocity=own)
         self._check_limit(i, robot, least)
         ctrl = int(model.actuator_ctrladr[actuator])
-        if kind is not None:
-            if kind != SENSOR.mjSENS_JOINTVEL and self.passive is not None:
-                raise InvalidInput(
-                    "agents.output", robot.output, "with a lookahead it must be a joint"
-                )
-            if kind != SENSOR.mjSENS_JOINTVEL:
-                return -1 - int(model.sensor_adr[sensor]), -1, ctrl
-            joint = int(model.sensor_objid[sensor])
-        if joint < 0:
-            names = [*_names(model, "joint", prefix), *_names(model, "sensor", prefix)]
-            raise InvalidInput("agents.output", robot.output, nearest(robot.output, names))
-        if mujoco.mjtJoint(model.jnt_type[joint]) not in (
-            mujoco.mjtJoint.mjJNT_SLIDE,
-            mujoco.mjtJoint.mjJNT_HINGE,
-        ):
-            raise InvalidInput("agents.output", robot.output, "it must be a slide or a hinge joint")
-        return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint]), ctrl
+        if len(terms) == 1 and only.source == "qvel" and only.factor == 1.0:
+            return only.entry, only.place_entry, ctrl, 0
+        self._check_ahead(i, robot, terms)
+        self._terms += terms
+        return -1 - (len(self._terms) - len(terms)), -1, ctrl, len(terms)
+
+    def _check_ahead(self, i: int, robot: RobotFile, terms: list[Term]) -> None:
+        """With a look-ahead outputs must have positions, and but joints a damping of their own."""
+        if self.passive is None:
+            return
+        expected = ""
+        if any(term.place_entry < 0 for term in terms):
+            expected = (
+                "with a lookahead it must have a position, as a joint, a tendon, or a body's linear"
+                " velocity in the world has"
+            )
+        elif self.agents.parameters[i, 1]:
+            expected = (
+                "with a lookahead local_damping acts at joints: name one, or set local_damping to"
+                " 0 and leave the damping to the file"
+            )
+        if expected:
+            raise InvalidInput("agents.output", str(robot.output), expected)
 
     def _check_limit(self, i: int, robot: RobotFile, least: float) -> None:
         """MuJoCo clamps silently; what the law asks for must not be changed unseen."""
@@ -207,16 +223,15 @@ class MjcfPlant(FleetPlant):
             )
 
     def refresh(self) -> None:
-        """Bring sensors of velocities up to date, which are of the last step's start."""
-        if not self.measures_every_stage:
-            with quiet():
-                for name in SENSOR_FUNCTIONS:
-                    getattr(mujoco, name)(self.model, self.data)
+        """Bring up to date what is read besides joints, which is of the last step's start."""
+        with quiet():
+            for name in self._refreshing:
+                getattr(mujoco, name)(self.model, self.data)
 
     @property
     def outputs(self) -> list[str]:
         """See the base class."""
-        return [robot.output for robot in self.agents.robots]
+        return [str(robot.output) for robot in self.agents.robots]
 
     @property
     def output_joints(self) -> NDArray[np.int64]:
@@ -227,29 +242,22 @@ class MjcfPlant(FleetPlant):
     def state(self) -> NDArray[np.float64]:
         """(m, 2), a copy: outputs and positions."""
         self.refresh()
-        at, sensor = self.places.output, self.data.sensordata
-        output = [self.data.qvel[a] if a >= 0 else sensor[-1 - a] for a in at]
-        position = [self.data.qpos[a] if a >= 0 else 0.0 for a in self.places.position]
-        found = np.column_stack([output, position])
-        if self.passive is not None:
-            tau, _, reference = self.agents.parameters.T
-            found[:, 1] -= reference * self.data.time
-            found[:, 0] = found[:, 1] + tau * (found[:, 0] - reference)
+        found = np.empty((self.agents.channels, 2))
+        _gather()(self.data._address, self._parameter_block.address, found.ravel())
         return found
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class; of all joint velocities with these outputs the smallest are taken."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        for at, position in zip(self.places.position, state[:, 1], strict=True):
-            if at >= 0:
+        for dof, at, position in zip(
+            self.places.output, self.places.position, state[:, 1], strict=True
+        ):
+            if at >= 0 and (self.passive is not None or not _floats(self.model, dof)):
                 self.data.qpos[at] = position
-        slopes = np.empty((len(state), self.model.nv))
-        still = self.state[:, 0]
-        for column in range(self.model.nv):
-            self.data.qvel[:] = 0.0
-            self.data.qvel[column] = 1.0
-            slopes[:, column] = self.state[:, 0] - still
+        if self.passive is not None and self._terms:
+            self._move_to(state[:, 1])
+        still, slopes = self.state[:, 0], self._slopes()
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
@@ -260,9 +268,29 @@ class MjcfPlant(FleetPlant):
         if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
             raise InvalidInput(
                 "agents.output",
-                self.agents.robots[int(np.argmax(missed))].output,
+                str(self.agents.robots[int(np.argmax(missed))].output),
                 "in the file's reference pose no joint velocities give it its initial value",
             )
+
+    def _slopes(self) -> NDArray[np.float64]:
+        """(m, nv) how outputs change with joint velocities, all of which are zero at the end."""
+        slopes, still = np.empty((self.agents.channels, self.model.nv)), self.state[:, 0]
+        for column in range(self.model.nv):
+            self.data.qvel[:] = 0.0
+            self.data.qvel[column] = 1.0
+            slopes[:, column] = self.state[:, 0] - still
+        self.data.qvel[:] = 0.0
+        return slopes
+
+    def _move_to(self, positions: NDArray[np.float64]) -> None:
+        """Move to these positions (m,) by Newton's method, each step the smallest that does."""
+        tau = self.agents.parameters[:, :1]
+        for _ in range(NEWTON):
+            missed = positions - self.state[:, 1]
+            if np.max(np.abs(missed)) <= 1e-12 * max(1.0, float(np.max(np.abs(positions)))):
+                return
+            move = np.linalg.lstsq(self._slopes() / tau, missed, rcond=None)[0]
+            mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
@@ -297,32 +325,19 @@ def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
     return world, sizes, memory
 
 
-def _check_sensor(model: mujoco.MjModel, robot: RobotFile, sensor: int) -> Any:
-    """The sensor's type; refused if it tells no velocity, or not the present one."""
-    kind, expected = SENSOR(model.sensor_type[sensor]), ""
-    if kind not in VELOCITIES:
-        expected = "a sensor must be jointvel, tendonvel or actuatorvel"
-    elif model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SENSOR:
-        expected = "the file's flags switch sensors off: name a joint, or leave the flag out"
-    elif (
-        model.sensor_cutoff[sensor]
-        or model.sensor_delay[sensor]
-        or model.sensor_interval[sensor, 0]
-    ):
-        expected = (
-            "the sensor must tell the velocity as it is: leave out its cutoff, delay and interval,"
-            " and declare late sensors as a fault instead"
-        )
-    if expected:
-        raise InvalidInput("agents.output", robot.output, expected)
-    return kind
+def _floats(model: mujoco.MjModel, dof: int) -> bool:
+    """Whether a degree of freedom is of a free joint, which stays where its file put it."""
+    return bool(model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_FREE)
 
 
-def _named(model: mujoco.MjModel, kind: Any, name: str) -> int:
-    return int(mujoco.mj_name2id(model, kind, name))
+@cache
+def _gather() -> Any:
+    """The kernel that fills a flat state: (address of mjData, of the parameter block, state)."""
+    at, source = offsets(), source_key()
 
+    @compiled
+    def read(data, parameter_block, state):
+        _ = source
+        gather(at, data, parameter_block, state)
 
-def _names(model: mujoco.MjModel, kind: str, prefix: str) -> list[str]:
-    count = {"joint": model.njnt, "sensor": model.nsensor, "actuator": model.nu}[kind]
-    names = [getattr(model, kind)(index).name for index in range(count)]
-    return [name.removeprefix(prefix) for name in names if name.startswith(prefix)]
+    return read

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.parameter_block import floats, integers
+from gne_mj.plants.mjcf_reading import READING, position_of, velocity_of
 from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
@@ -26,34 +27,38 @@ from gne_mj.records import in_numbers
 class Prediction(NamedTuple):
     """What such fleets need besides, behind :class:`gne_mj.plants.mujoco.Sizes` in SIZES."""
 
-    nsensordata: int
     twin: int  # address of the second mjData
     known: int  # bits of mjtState that it is given
+    lookahead: int  # numbers of look-ahead in NUMBERS, before the readings' factors
+    twists: int  # words of cvel and subtree_com in mjData
+    centres: int
     # addresses of MuJoCo's functions
     step: int
     copy: int
-    forward: int  # 0 if no sensor needs those that follow
-    position: int
-    velocity: int
-    sensors: int
+    first: int  # those that bring up to date what is read; 0 if nothing needs them
+    second: int
+    third: int
 
 
-# Functions of MuJoCo's that bring sensors of velocities up to date, in their order
+# Functions of MuJoCo's that bring up to date what is read, in their order: frames alone, or all
+FRAME_FUNCTIONS = ("mj_kinematics", "mj_comPos", "mj_comVel")
 SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
 
 
 class ChannelPlace(Numbers):
     """Where a channel's numbers lie: what PLACES has of each."""
 
-    output: int  # the joint's degree of freedom, or (negative) the sensor's entry less one
+    output: int  # the joint's degree of freedom, or (negative) the first of its readings less one
     position: int  # the joint's entry of qpos, or -1
     actuator: int  # entry of ctrl
+    readings: int  # how many; 0 of a joint
 
 
 PLACE = len(names_of(ChannelPlace))
-# Between the places and the sizes: tau, d and v_0 of each channel; nothing where outputs are
-# velocities
-LOOKAHEAD = 1
+# Between the places and the sizes: tau, d and v_0 of each channel, nothing where outputs are
+# velocities; then the readings' factors
+NUMBERS = 1
+READINGS = len(Sizes._fields) + len(Prediction._fields)  # where they begin in SIZES
 prediction_in = in_numbers(Prediction, SIZES, len(Sizes._fields))
 _place_in = numbers_in(ChannelPlace)
 
@@ -69,17 +74,33 @@ def gather(at, data, parameter_block, state):
     """Fill the flat state (m channels of mjcf_robot.STATES) from mjData."""
     sizes = sizes_in(parameter_block)
     qpos, qvel = field(data, at.qpos, sizes.nq), field(data, at.qvel, sizes.nv)
-    sensordata = field(data, at.sensordata, prediction_in(parameter_block).nsensordata)
-    places, numbers = integers(parameter_block, PLACES), floats(parameter_block, LOOKAHEAD)
+    places, numbers = integers(parameter_block, PLACES), floats(parameter_block, NUMBERS)
+    ahead = prediction_in(parameter_block).lookahead > 0
     for r in range(len(places) // PLACE):
         place = place_of(places, r)
         source, position = place.output, place.position
-        state[2 * r] = qvel[source] if source >= 0 else sensordata[-source - 1]
-        state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
-        if len(numbers) > 0:
+        if source >= 0:
+            state[2 * r] = qvel[source]
+            state[2 * r + 1] = qpos[position] if position >= 0 else 0.0
+        else:
+            state[2 * r], state[2 * r + 1] = read(data, parameter_block, place)
+        if ahead:
             tau, reference = numbers[3 * r], numbers[3 * r + 2]
             state[2 * r + 1] -= reference * number(data, at.time)
             state[2 * r] = state[2 * r + 1] + tau * (state[2 * r] - reference)
+
+
+@kernel
+def read(data, parameter_block, place):
+    """Velocity and position of a channel that is no joint's: the sums of its readings."""
+    prediction, numbers = prediction_in(parameter_block), floats(parameter_block, NUMBERS)
+    table = integers(parameter_block, SIZES)[READINGS:]
+    velocity, position, first = 0.0, 0.0, -1 - place.output
+    for k in range(first, first + place.readings):
+        factor, entry = numbers[prediction.lookahead + k], k * READING
+        velocity += factor * velocity_of(data, prediction.twists, prediction.centres, table, entry)
+        position += factor * position_of(data, table, entry)
+    return velocity, position
 
 
 @kernel
@@ -95,20 +116,21 @@ def add_forces(at, data, parameter_block):
     sizes, places = sizes_in(parameter_block), integers(parameter_block, PLACES)
     qvel = field(data, at.qvel, sizes.nv)
     force = field(data, at.qfrc_passive, sizes.nv)
-    numbers = floats(parameter_block, LOOKAHEAD)
-    for r in range(len(numbers) // 3):
+    numbers = floats(parameter_block, NUMBERS)
+    for r in range(prediction_in(parameter_block).lookahead // 3):
         joint = place_of(places, r).output
-        force[joint] -= numbers[3 * r + 1] * (qvel[joint] - numbers[3 * r + 2])
+        if joint >= 0:
+            force[joint] -= numbers[3 * r + 1] * (qvel[joint] - numbers[3 * r + 2])
 
 
 @kernel
 def refresh(model, data, parameter_block):
-    """Bring sensors of velocities up to date, which are of the last step's start."""
+    """Bring up to date what is read besides joints, which is of the last step's start."""
     prediction = prediction_in(parameter_block)
-    if prediction.forward != 0:
-        call(prediction.position, model, data)
-        call(prediction.velocity, model, data)
-        call(prediction.sensors, model, data)
+    if prediction.first != 0:
+        call(prediction.first, model, data)
+        call(prediction.second, model, data)
+        call(prediction.third, model, data)
 
 
 @kernel
@@ -141,7 +163,7 @@ def step_on(context, channels, clock, u, out, trial, scratch):
     at, model, _data, parameter_block = context
     prediction = prediction_in(parameter_block)
     timed_step(at, prediction.step, model, prediction.twin)
-    # sensors are of the last step's start; a whole mj_forward would leave another warm start
+    # a whole mj_forward would leave another warm start
     refresh(model, prediction.twin, parameter_block)
     gather(at, prediction.twin, parameter_block, trial)
     for r in range(len(u)):
@@ -161,8 +183,7 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     set_out(context, channels, state, u, trial)
     for _ in range(clock.period):
         timed_step(at, prediction.step, model, twin)
-    if prediction.forward != 0:  # sensors are of the last step's start
-        call(prediction.forward, model, twin)
+    refresh(model, twin, parameter_block)
     gather(at, twin, parameter_block, trial)
     for r in range(len(u)):
         out[r] = trial[2 * r]

@@ -18,6 +18,7 @@ from gne_mj.native import kernel
 from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.lookahead import LookaheadKeys
+from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import Fills, Sizes, dimension_of
@@ -37,14 +38,14 @@ class RobotFile:
 
     Args:
         path: its MJCF file.
-        output: name of the joint (slide or hinge) or of the velocity sensor (jointvel, tendonvel
-            or actuatorvel) that is the output y_i.
+        output: y_i: the name of a joint (slide or hinge) or of a sensor of one velocity, or a
+            declared one.
         input: name of the actuator whose force u_i is, at the joint or tendon that it drives; at
             an ``actuatorvel`` sensor of its own the force before the gear.
     """
 
     path: Path
-    output: str
+    output: str | Output
     input: str
 
 
@@ -105,9 +106,9 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
     file: Annotated[str | list[str], Fills("path")] = Field(
         description="MJCF file, one for all or one each"
     )
-    output: str | list[str] | list[list[str]] = Field(
-        description="joint or velocity sensor that is y_i; the joint of y = q + tau v; of vectors"
-        " a list of names, for all agents or each"
+    output: str | OutputTable | list[str | OutputTable] | list[list[str | OutputTable]] = Field(
+        description="joint or velocity sensor that is y_i, or of y = q + tau v; or a table that"
+        " says what; of vectors a list of these, for all agents or each"
     )
     input: str | list[str] | list[list[str]] = Field(description="actuator that u_i drives")
 
@@ -123,7 +124,8 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         files = [self.file] * self.count if isinstance(self.file, str) else self.file
         if len(files) != self.count:
             raise InvalidInput("file", self.file, f"it must be one name or a list of {self.count}")
-        names = (np.repeat(files, axes), self._names("output", axes), self._names("input", axes))
+        outputs = channels_of(self.output, self.count, axes)
+        names = (np.repeat(files, axes), outputs, self._names("input", axes))
         robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*names, strict=True))
         kind, numbers = sys.modules[__name__], np.zeros((len(robots), 0))
         if self.positions:

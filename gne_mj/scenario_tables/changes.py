@@ -181,6 +181,11 @@ def validated(tables: dict[str, Any]) -> Scenario:
     return scenario
 
 
+def _is_table(part: Any) -> bool:
+    """Whether a part of a place in pydantic's words is a choice that is a table."""
+    return str(part).startswith(_TABLES) or str(part).endswith("Table")
+
+
 def complaint(error: ValidationError) -> InvalidInput:
     """The first of pydantic's complaints as one sentence."""
     details = error.errors()
@@ -192,14 +197,14 @@ def complaint(error: ValidationError) -> InvalidInput:
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
         detail = max(same[1:], key=lambda d: len(d["loc"]))
     if isinstance(detail["input"], Mapping):  # so it is the tables among the choices that count
-        deeper = [d for d in details if any(str(p).startswith(_TABLES) for p in d["loc"])]
+        deeper = [d for d in details if any(_is_table(part) for part in d["loc"])]
         detail = deeper[0] if deeper else detail
     tags = union_tags() | {"float", "str", "list", "literal", _TABLES}
     where = [
         str(part)
         for depth, part in enumerate(detail["loc"])
         # at this depth stands a system's name, which may be that of a tag
-        if depth == 1 or str(part).split("[")[0] not in tags
+        if depth == 1 or (str(part).split("[")[0] not in tags and not _is_table(part))
     ]
     value = detail["input"]
     context = detail.get("ctx", {})

@@ -340,7 +340,7 @@ class Assembly(SystemData):
             raise InvalidInput(
                 "agents.output",
                 plant.outputs,
-                "a tendon's or actuator's sensor is read once a step: use mode 'sampled', or"
-                " integrator 'euler', or name a joint",
+                "such a sensor is read once a step: use mode 'sampled', or integrator 'euler', or"
+                " name the joint, body or site",
             )
         return plant

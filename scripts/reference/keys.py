@@ -173,10 +173,18 @@ def _table_of(field: FieldInfo) -> type[Table]:
 
 
 def _inner(table: type[Table]) -> Iterator[tuple[str, type[Table]]]:
-    """Tables in a table, such as a region."""
+    """Tables in a table, such as a region; not those that have a name of their own."""
     for key, field in table.model_fields.items():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, Table):
-            yield key, field.annotation
+        for inner in dict.fromkeys(_tables(field.annotation)):
+            if "type" not in inner.model_fields:
+                yield key, inner
+
+
+def _tables(kind: Any) -> Iterator[type[Table]]:
+    if isinstance(kind, type) and issubclass(kind, Table):
+        yield kind
+    for inner in get_args(kind):
+        yield from _tables(inner)
 
 
 if __name__ == "__main__":
