@@ -33,10 +33,10 @@ def served(paper):
 
 
 @contextmanager
-def session(scenario="velocity-sync", changes=None, speed=1.0):
+def session(scenario="velocity-sync", changes=None, speed=1.0, **options):
     """A live session in a thread, as in a terminal."""
     loaded = load_scenario(scenario, {"simulation.duration": 1000.0, **(changes or {})})
-    live, stop = Session(loaded, "live", speed=speed), threading.Event()
+    live, stop = Session(loaded, "live", speed=speed, **options), threading.Event()
 
     def work():
         live.show(live.run(stop))
@@ -279,6 +279,16 @@ def test_live_robots_are_where_the_simulation_has_them(page, recorded):
         until(page, "window.gne.plots[0].samples > 10")
         page.keyboard.press("Space")
         until(page, "window.gne.state().playing")
+        quiet(recorded, *origins(live.server))
+
+
+def test_a_run_begins_with_its_first_browser(page, recorded):
+    with session(begin="viewer") as live:
+        time.sleep(0.1)
+        assert live.simulation.time == 0.0
+        opened(page, live.server.url)
+        until(page, "window.gne.time() > 0.05")
+        assert page.evaluate("window.gne.plots[0].samples") > 1
         quiet(recorded, *origins(live.server))
 
 

@@ -22,7 +22,7 @@ GNE = [
     "-c",
     "import sys; from gne_mj.cli import main; sys.argv[0] = 'gne-mj'; main()",
 ]
-LIVE = [*GNE, "run", "velocity-sync", "--view", "--set", "simulation.duration=1000"]
+LIVE = [*GNE, "run", "velocity-sync", "--view", "--now", "--set", "simulation.duration=1000"]
 
 # A program of the user's own that serves a replay, and then ends in its own way
 OWN = """
@@ -127,7 +127,7 @@ def test_ctrl_c_keeps_what_was_simulated(start, tmp_path):
 
 
 def test_a_page_outlives_its_run_until_ctrl_c(start):
-    short = ["velocity-sync", "--view", "--speed", "max", "--set", "simulation.duration=1"]
+    short = ["velocity-sync", "--view", "--now", "--speed", "max", "--set", "simulation.duration=1"]
     process, url = start([*GNE, "run", *short, "--json"])
     report = ""
     while not report.endswith("\n}\n"):

@@ -192,6 +192,25 @@ def test_sliders_follow_what_the_scenario_does():
         assert session.simulation.systems[0].rho == 0.4
 
 
+@pytest.mark.parametrize(("begin", "ask"), [("viewer", "seen"), ("paused", "play")])
+def test_a_run_waits_for_its_viewer(begin, ask):
+    session = Session(load_scenario("velocity-sync", ODE), "a title", speed=None, begin=begin)
+    page = Page(session)
+    try:
+        session._turn()
+        page.ask(do="connect")
+        other = {"seen": "play", "play": "seen"}[ask]
+        if other == "seen":
+            page.ask(do=other)  # seen, but nobody has said that it may begin
+        session._turn()
+        assert session.simulation.time == 0.0
+        assert not unpack(session._frame())[0]["playing"]
+        page.ask(do=ask)
+        assert len(to_the_end(session)["robots"]["time"]) == 21
+    finally:
+        session.server.close()
+
+
 def test_a_reference_with_two_entries_has_two_sliders():
     scenario = load_scenario("planar-sync")
     keys = [control.key for control in controls_of(scenario)]

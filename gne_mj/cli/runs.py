@@ -15,6 +15,7 @@ from gne_mj.progress import telling
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
+    from gne_mj.viewer.session import Begin
 
 
 @app.command()
@@ -36,6 +37,12 @@ def run(
     view: Annotated[
         bool, typer.Option("--view", help="Show it in a browser while it runs, in real time.")
     ] = False,
+    now: Annotated[
+        bool, typer.Option("--now", help="With --view: begin before a browser is there.")
+    ] = False,
+    paused: Annotated[
+        bool, typer.Option("--paused", help="With --view: begin when a viewer says so.")
+    ] = False,
     speed: Annotated[
         str | None,
         typer.Option("--speed", metavar="X", help="With --view: times real time, or 'max'."),
@@ -47,16 +54,23 @@ def run(
 
     A batch's run that is run alone takes the same steps to the last bit.
 
-    With --view the run is shown on after its end, until Ctrl-C.
+    With --view the run begins when the first browser shows its start, and is shown on after its
+    end, until Ctrl-C.
     """
     from gne_mj.errors import InvalidInput
 
     chosen = source_of(source, folder, index)
+    if now and paused:
+        raise InvalidInput("now", True, "it cannot be with `paused`")
     if view:
+        begin: Begin = "now" if now else "paused" if paused else "viewer"
         title = Path(source).stem if source else f"run {index} of {folder}"
-        trajectory = watch(chosen, set_, Results(out), as_json, title=title, speed=speed, port=port)
+        trajectory = watch(
+            chosen, set_, Results(out), as_json, title=title, speed=speed, port=port, begin=begin
+        )
     else:
-        for key, value in (("speed", speed), ("port", port)):
+        given = (("speed", speed), ("port", port), ("now", now or None), ("paused", paused or None))
+        for key, value in given:
             if value is not None:
                 raise InvalidInput(key, value, "it goes with `view`")
         results = Results(out)

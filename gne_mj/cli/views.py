@@ -21,6 +21,7 @@ from gne_mj.progress import PREPARING, on_terminal, say, telling
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
+    from gne_mj.viewer.session import Begin
 
 REPLAY = "preparing the replay"
 
@@ -85,6 +86,7 @@ def watch(
     title: str,
     speed: str | None,
     port: int | None,
+    begin: "Begin" = "viewer",
 ) -> "Trajectory":
     """Run a scenario on a live page until Ctrl-C; what is kept and told is the first run.
 
@@ -97,6 +99,7 @@ def watch(
         title: of the page.
         speed: as --speed gives it.
         port: as --port gives it.
+        begin: when, see :class:`gne_mj.viewer.Session`.
     """
     from gne_mj.extras import need
     from gne_mj.scenario import load_scenario
@@ -108,9 +111,14 @@ def watch(
             from gne_mj.viewer import Session
 
             scenario = load_scenario(source, settings(changes))
-            session = Session(scenario, _title(title), speed=factor, port=port or 0)
+            session = Session(scenario, _title(title), speed=factor, port=port or 0, begin=begin)
         page.callback(session.server.close)
         page.enter_context(_announced(session.server.url))
+        if begin != "now":
+            say(
+                "it begins when "
+                + ("a viewer says so" if begin == "paused" else "a browser is there")
+            )
         trajectory = session.run(stop)
         with results.written() as folder:
             if folder is not None:

@@ -7,7 +7,7 @@ import time as real_time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from meshcat import Visualizer
@@ -33,6 +33,7 @@ SLOWEST = 0.5  # s between frames, at worst
 HISTORY = 1.0  # s between histories, while frames are far apart
 ENTRIES, LEAST_ROWS = 100_000, 200  # actions in a history, but at least so many samples of them
 PIECE = 0.05  # s of computing between looks at what the page asks for
+Begin = Literal["now", "viewer", "paused"]  # when the first run goes on
 FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
 
 
@@ -46,6 +47,8 @@ class Session:
         title: of the page.
         speed: simulated s per s; None for as fast as possible.
         port: of the page's server; 0 for any that is free.
+        begin: when the first run goes on: "now", when the first "viewer" sees its start, or when
+            one says so ("paused").
 
     Attributes:
         simulation: the present run.
@@ -53,7 +56,13 @@ class Session:
     """
 
     def __init__(
-        self, scenario: Scenario, title: str, *, speed: float | None = 1.0, port: int = 0
+        self,
+        scenario: Scenario,
+        title: str,
+        *,
+        speed: float | None = 1.0,
+        port: int = 0,
+        begin: Begin = "now",
     ) -> None:
         self._tables = scenario.model_dump(mode="json", exclude_none=True)
         self._changes: dict[str, Any] = {}
@@ -66,6 +75,7 @@ class Session:
         self._controls = {control.key: control for control in controls_of(scenario)}
         self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
+        self._waits, self._playing = begin == "viewer", begin == "now"
         shown_systems = [
             ShownSystem(run.system, self.simulation.clock) for run in self.simulation.runs.values()
         ]
@@ -127,7 +137,7 @@ class Session:
         self.simulation, self._scenario = simulation, scenario
         self._messages_from = 0
         self._next = self._ended = None
-        self._playing = True
+        self._playing, self._waits = True, False
         self._pacer.restart(simulation.time)
         self._next_frame = self._frame_time = self._history_due = 0.0
 
@@ -204,12 +214,14 @@ class Session:
             case "connect":
                 self._welcome(browser)
             case "play":
-                self._playing = True
-                self._pacer.restart(self.simulation.time)
+                self._play()
+            case "seen":  # its start, by a browser
+                if self._waits:
+                    self._play()
             case "pause":
-                self._playing = False
+                self._playing = self._waits = False
             case "step":
-                self._playing = False
+                self._playing = self._waits = False
                 self._move(self._step_length())
             case "restart":
                 self._restart()
@@ -224,6 +236,10 @@ class Session:
                 self.server.tell({"kind": "scenario", "text": scenario.toml()}, browser)
             case other:
                 raise InvalidInput("do", other, "the page asks for what this version does not know")
+
+    def _play(self) -> None:
+        self._playing, self._waits = True, False
+        self._pacer.restart(self.simulation.time)
 
     def _step_length(self) -> int:
         """Integration steps in one step of the page: to the next control instant, or sample."""

@@ -44,6 +44,7 @@ export class Live {
     this.interventions = [];
     /** @type {Instant | null} */
     this.pending = null;
+    this.told = false; // whether the simulation knows that it is seen
     this.fetching = false; // a replay
     this.replayed = false; // the run has ended, and its replay is shown
     this.socket = new Socket({
@@ -94,9 +95,20 @@ export class Live {
 
   advance() {} // it does so itself
 
+  /**
+   * A picture was drawn: a run that waits for its viewer begins with the first one that has all.
+   * @param {boolean} whole
+   */
+  saw(whole) {
+    if (this.told || !whole || !this.connected) return;
+    this.told = true;
+    this.send({ do: "seen" });
+  }
+
   // ---- what it tells
 
   opened() {
+    this.told = false;
     this.meta = this.pending = null;
     this.connected = true;
     this.listener.opened();

@@ -293,6 +293,7 @@ export class Page {
     if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
     this.wasMoving = this.overlay.moving;
     this.drawn = true;
+    this.live?.saw(this.scene.complete);
   }
 
   /**

@@ -52,7 +52,7 @@ COMMANDS = {
     "view --html": ("view", "run", "--html", "out"),
     "plot": ("plot", "run", "--out", "out"),
     "view": ("view", "run"),
-    "run --view": ("run", "velocity-sync", "--view", "--out", "out"),
+    "run --view": ("run", "velocity-sync", "--view", "--now", "--out", "out"),
 }  # fmt: skip
 PAGES = ("view", "run --view")  # which end only if they are asked to
 

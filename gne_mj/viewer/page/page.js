@@ -513,6 +513,7 @@
       this.exits = {};
       this.interventions = [];
       this.pending = null;
+      this.told = false;
       this.fetching = false;
       this.replayed = false;
       this.socket = new Socket({
@@ -556,8 +557,18 @@
     advance() {
     }
     // it does so itself
+    /**
+     * A picture was drawn: a run that waits for its viewer begins with the first one that has all.
+     * @param {boolean} whole
+     */
+    saw(whole) {
+      if (this.told || !whole || !this.connected) return;
+      this.told = true;
+      this.send({ do: "seen" });
+    }
     // ---- what it tells
     opened() {
+      this.told = false;
       this.meta = this.pending = null;
       this.connected = true;
       this.listener.opened();
@@ -8786,6 +8797,7 @@
       if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
       this.wasMoving = this.overlay.moving;
       this.drawn = true;
+      this.live?.saw(this.scene.complete);
     }
     /**
      * What need not be fresh at every picture.
