@@ -117,8 +117,7 @@ def test_epsilon_says_what_was_tried():
     none = {"given": 0.05, "star": None, "no_star": None, "search": None}
     assert words._epsilon(none) == "0.05 s given (--search-epsilon tries)"
     assert words._epsilon(none | {"no_star": "y* was not found"}) == (
-        "0.05 s given; some epsilon* is small enough, and none is computed: y* was not found"
-        " (--search-epsilon tries)"
+        "0.05 s given; no epsilon* is computed: y* was not found (--search-epsilon tries)"
     )
     star = {
         "star": 0.0025, "label": "certified, sufficient", "fast_weight": 3.0,

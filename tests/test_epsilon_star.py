@@ -9,9 +9,11 @@ import scipy.linalg
 from builders import clock, distributed, integrators, osnr_system, pi_cascades, robot_system
 from scipy.integrate import solve_ivp
 
+import reference
+import reference_games
 from gne_mj.changing_graph import switching
 from gne_mj.controllers import FullyDistributed
-from gne_mj.games import cournot_game, ten_channels
+from gne_mj.games import cournot_game, ten_channels, velocity_game
 from gne_mj.graph import NAMED, complete, ring
 from gne_mj.simulation import Simulation
 from gne_mj.system import System
@@ -266,6 +268,59 @@ def test_the_shipped_game_is_certified_within_two_orders_of_what_trials_find():
     assert star.falls_below > star.epsilon
 
 
+def velocities(epsilon, away):
+    """Integrators in the velocity game, so far from y* = 3 in each direction of a few."""
+    start = 3.0 + away * np.array([[1.0], [-1.0], [0.5]])
+    law = FullyDistributed(ring(3), epsilon)
+    return System("agents", velocity_game(3, 3.0, [2.0, 3.0, 2.5]), integrators(3), law, RHO, start)
+
+
+def test_bounds_on_gaps_are_taken_as_affine_ones():
+    system = velocities(1e-3, 0.3)
+    loop = linear_loop(system)
+    ones = np.eye(3) - np.eye(3, k=-1)
+    gaps, delta = ones @ system.start - [3.0, 0.0, 0.0], np.array([2.0, 3.0, 2.5])
+    signs = np.sign(loop.slopes[:3] @ [0.3, 0.2, 0.1]) * np.sign(ones @ [0.3, 0.2, 0.1])
+    found = signs[:, None] * loop.slopes[:3]
+    assert np.allclose(found, ones, atol=1e-12)
+    assert np.allclose(loop.slopes[3:], -loop.slopes[:3], atol=1e-12)
+    assert np.allclose(loop.slack, np.tile(delta, 2), atol=1e-12)  # no gap at y*
+    assert np.allclose(loop.start_slack[:3], delta - signs * gaps, atol=1e-12)
+    assert np.allclose(loop.start_slack[3:], delta + signs * gaps, atol=1e-12)
+
+
+def test_the_velocity_games_epsilon_against_scipy():
+    star = EpsilonBound(velocities(1e-3, 0.3)).star
+    system, graph = velocities(star.epsilon, 0.3), ring(3).laplacian
+    assert Theorem(system).lyapunov
+    game = reference_games.VelocityGame(3.0, [2.0, 3.0, 2.5])
+
+    def rate(_, x):
+        y, z, estimates = x[:3], x[3:6], x[6:].reshape(3, 3)
+        return np.concatenate(
+            [part.ravel() for part in reference.fully_distributed(
+                game, RHO, graph, 1.0, star.epsilon, y, z, estimates)]
+        )  # fmt: skip
+
+    start = np.concatenate([system.start, system.start, np.tile(system.start, 3)])
+    found = solve_ivp(rate, (0.0, 4.0), start, "BDF", rtol=1e-8, atol=1e-11)
+    assert found.success
+    y, off = found.y[:3], found.y[6:].reshape(3, 3, -1) - found.y[:3]
+    off[np.arange(3), np.arange(3)] = found.y[3:6] - y
+    w = 0.5 * np.sum((y - 3.0) ** 2, axis=0) + 0.5 * 3.0 * np.sum(off**2, axis=(0, 1))
+    assert w[0] == pytest.approx(star.held.level, rel=1e-6)
+    assert np.all(np.diff(w) < 1e-9)
+    gaps = np.abs(np.diff(y, axis=0, prepend=3.0))
+    floor = np.minimum(star.held.floor[:3], star.held.floor[3:])
+    assert np.all(np.array([[2.0], [3.0], [2.5]]) - gaps > floor[:, None])
+
+
+def test_a_far_start_has_no_set_and_says_so_at_once():
+    bound = EpsilonBound(velocities(1e-3, 1.4))
+    assert bound.star is None
+    assert set(bound._tried) == {1e-3, 1e-12}
+
+
 def test_a_certified_epsilon_is_told_and_w_is_claimed():
     system = channels()
     found = certify(system, clock(0.002, 1.0))
@@ -309,7 +364,10 @@ def test_what_speaks_against_a_bound():
     robots = robot_system(
         np.tile([0.0, 3.0, 3.0, 0.0], (5, 1)), law=FullyDistributed(complete(5), 0.01)
     )
-    assert why_not(robots) == "flexible robots are not linear with a known quadratic V"
+    why = "flexible robots are not linear with a known quadratic V that decays in all states"
+    assert why_not(robots) == why
+    told = certify(robots, clock(0.002, 1.0))
+    assert "the theorem does not apply: [asmp:OSSPassive]" in told.epsilon["no_star"]
     assert why_not(channels()) is None
     law = FullyDistributed(switching([ring(10), complete(10)], 1.0), EPSILON, K)
     assert why_not(replace(channels(), law=law, integrator="rk4")) == "the graph changes"

@@ -65,6 +65,8 @@ class EpsilonBound:
         if self.why_not is not None:
             return None
         found, high = self.at(epsilon), epsilon
+        if found is None and self.at(_LEAST) is None:  # smaller ones are easier
+            return None
         while found is None:
             high, epsilon = epsilon, epsilon / _DOWN
             if epsilon < _LEAST:
@@ -105,7 +107,7 @@ class EpsilonBound:
         found["kept"] = {
             "level": held.level,
             "floor": held.floor.tolist(),
-            "constraint": game.constraint_names[tightest],
+            "constraint": game.constraint_names[tightest % game.constraints_count],
             "estimates_error": float(max(np.max(held.behind), np.max(held.ahead))),
             "falls_below": star.falls_below,
         }

@@ -217,9 +217,12 @@ def _triggers(theorem: Theorem, clock: Clock) -> dict[str, Any] | None:
 
 
 def _star(theorem: Theorem) -> dict[str, Any]:
-    """What is certain of small epsilon; None of a theorem that does not apply."""
-    if theorem.epsilon_bound is None or theorem.obstacles:
-        return dict.fromkeys(("star", "label", "fast_weight", "no_star", "kept"))
+    """What is certain of small epsilon; of a theorem that does not apply only why nothing is."""
+    nothing = dict.fromkeys(("star", "label", "fast_weight", "no_star", "kept"))
+    if theorem.epsilon_bound is None:
+        return nothing
+    if theorem.obstacles:
+        return nothing | {"no_star": f"the theorem does not apply: {theorem.obstacles[0]}"}
     return theorem.epsilon_bound.report()
 
 

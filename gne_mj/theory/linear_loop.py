@@ -28,7 +28,8 @@ class LinearLoop:
         dissipation: D (m, s, s), V' = -e'De + e_y'u.
         drift: f (m, s).
         output: which state is the action.
-        slopes: A (p, m), the gradients of the constraints.
+        slopes: A (p, m), the gradients of the constraints; of bounds on gaps of one entry those of
+            2 p affine ones, delta - gap >= 0 of all, then delta + gap >= 0, with the same barrier.
         slack: of the constraints at y*, tightening subtracted, (p,), and ``start_slack`` at y(0).
         start: W of the start with weight omega on V_fast, as a pair (V, V_fast).
         offset: how far estimates (N, m) are from the actions at the start, z on own entries.
@@ -87,9 +88,9 @@ def why_not(system: System) -> str | None:
     """Why no bound of epsilon is computed; None if one can be."""
     kind, game = system.agents.kind, system.game
     if not getattr(kind, "LINEAR", False):
-        return f"{kind.NAME}s are not linear with a known quadratic V"
-    if game.constraint_class != "affine":
-        return "the constraints are not affine"
+        return f"{kind.NAME}s are not linear with a known quadratic V that decays in all states"
+    if game.constraint_class != "affine" and game.affine_constraints is None:
+        return "neither are the constraints affine, nor bounds on gaps of one entry"
     if not game.affine and not (game.row_scaled and game.jacobian_bounds is not None):
         return "F is neither affine, nor are its rows known to change in length only"
     if system.law.graph is not None and system.law.graph.changes:
@@ -117,8 +118,25 @@ def linear_loop(system: System) -> LinearLoop:
     offset = law.barrier_profiles(game.agent_of_action, system.memory) - system.start
     return LinearLoop(
         game, law.graph, law.gain, system.rho, known, *balance, slopes[:, kind.OUTPUT],
-        kind.OUTPUT, game.constraint_jacobian(known), -game.constraints(known) - game.margins,
-        -game.constraints(system.start) - game.margins,
+        kind.OUTPUT, *_affine(game, known, system.start),
         (float(np.sum(agents.storage(system.state, rest))), 0.5 * float(np.sum(offset**2))),
         offset,
     )  # fmt: skip
+
+
+def _affine(game: Game, known: Array, start: Array) -> tuple[Array, Array, Array]:
+    """Slopes A, and the slacks at y* and at the start, of affine constraints with the barrier."""
+    if game.affine_constraints is None:
+        slacks = (-game.constraints(y) - game.margins for y in (known, start))
+        return (game.constraint_jacobian(known), *slacks)
+    # of gap^2 - delta^2 the gradient is 2 gap a, and a'w follows from how it changes along w
+    way = 1.0 + np.random.default_rng(0).random(len(known))
+    change = game.constraint_jacobian(known + way) - game.constraint_jacobian(known)
+    slope = change / np.sqrt(2.0 * (change @ way))[:, None]
+    assert game.gap_bounds is not None
+    bound = np.sqrt(game.gap_bounds**2 - game.margins)
+    size = np.sum(slope**2, axis=1)
+    gaps = (np.sum(game.constraint_jacobian(y) * slope, axis=1) / (2.0 * size)
+            for y in (known, start))  # fmt: skip
+    slacks = (np.concatenate([bound - gap, bound + gap]) for gap in gaps)
+    return (np.concatenate([slope, -slope]), *slacks)

@@ -194,7 +194,7 @@ def _epsilon(epsilon: dict[str, Any]) -> str:
             f" {min(epsilon['kept']['floor']):.4g} ({epsilon['kept']['constraint']})"
         )
     elif epsilon["no_star"] is not None:
-        text += f"; some epsilon* is small enough, and none is computed: {epsilon['no_star']}"
+        text += f"; no epsilon* is computed: {epsilon['no_star']}"
     search = epsilon["search"]
     if search is None:
         return text + " (--search-epsilon tries)"
