@@ -268,9 +268,9 @@ def test_the_shipped_game_is_certified_within_two_orders_of_what_trials_find():
     assert star.falls_below > star.epsilon
 
 
-def velocities(epsilon, away):
-    """Integrators in the velocity game, so far from y* = 3 in each direction of a few."""
-    start = 3.0 + away * np.array([[1.0], [-1.0], [0.5]])
+def velocities(epsilon, away, way=(1.0, -1.0, 0.5)):
+    """Integrators in the velocity game, so far from y* = 3 some way."""
+    start = 3.0 + away * np.array(way)[:, None]
     law = FullyDistributed(ring(3), epsilon)
     return System("agents", velocity_game(3, 3.0, [2.0, 3.0, 2.5]), integrators(3), law, RHO, start)
 
@@ -316,7 +316,7 @@ def test_the_velocity_games_epsilon_against_scipy():
 
 
 def test_a_far_start_has_no_set_and_says_so_at_once():
-    bound = EpsilonBound(velocities(1e-3, 1.4))
+    bound = EpsilonBound(velocities(1e-3, 1.9, (1.0, 2.0, 3.0)))
     assert bound.star is None
     assert set(bound._tried) == {1e-3, 1e-12}
 

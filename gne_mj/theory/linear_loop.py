@@ -127,8 +127,8 @@ def linear_loop(system: System) -> LinearLoop:
 def _affine(game: Game, known: Array, start: Array) -> tuple[Array, Array, Array]:
     """Slopes A, and the slacks at y* and at the start, of affine constraints with the barrier."""
     if game.affine_constraints is None:
-        slacks = (-game.constraints(y) - game.margins for y in (known, start))
-        return (game.constraint_jacobian(known), *slacks)
+        rest, begin = (-game.constraints(y) - game.margins for y in (known, start))
+        return game.constraint_jacobian(known), rest, begin
     # of gap^2 - delta^2 the gradient is 2 gap a, and a'w follows from how it changes along w
     way = 1.0 + np.random.default_rng(0).random(len(known))
     change = game.constraint_jacobian(known + way) - game.constraint_jacobian(known)
@@ -138,5 +138,5 @@ def _affine(game: Game, known: Array, start: Array) -> tuple[Array, Array, Array
     size = np.sum(slope**2, axis=1)
     gaps = (np.sum(game.constraint_jacobian(y) * slope, axis=1) / (2.0 * size)
             for y in (known, start))  # fmt: skip
-    slacks = (np.concatenate([bound - gap, bound + gap]) for gap in gaps)
-    return (np.concatenate([slope, -slope]), *slacks)
+    rest, begin = (np.concatenate([bound - gap, bound + gap]) for gap in gaps)
+    return np.concatenate([slope, -slope]), rest, begin
