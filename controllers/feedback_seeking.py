@@ -134,7 +134,7 @@ class FeedbackSeekingController(LawTable):
 
     information: Literal["feedback-seeking"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (1.0, 3.0), "seeking": (0.1, 0.3, 1.0), "dual_gain": (0.03, 0.1, 0.3, 1.0)}
+        {"gain": (1.0, 3.0, 10.0), "seeking": (0.3, 1.0), "dual_gain": (0.1, 0.3, 1.0, 3.0)}
     )
     mode: Annotated[str, MODES] = Field("sampled", description="only 'sampled': once a period")
     gain: float = Field(2.0, gt=0, description="k of each agent's own loop")

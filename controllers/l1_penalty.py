@@ -92,7 +92,7 @@ class L1PenaltyController(LawTable):
 
     information: Literal["l1-penalty"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0), "strength": (1.0, 3.0, 10.0, 30.0), "width": (0.01, 0.1)}
+        {"gain": (0.5, 1.0, 2.0, 4.0), "strength": (3.0, 10.0, 30.0), "width": (0.01, 0.1)}
     )
     gain: float = Field(1.0, gt=0, description="k of the input")
     strength: float = Field(10.0, gt=0, description="s of the penalty")

@@ -208,7 +208,7 @@ class PrimalDualPartialController(NetworkTable):
 
     information: Literal["primal-dual-partial"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.3, 1.0), "coupling": (1.0, 3.0, 10.0), "dual_gain": (0.1, 0.3, 1.0, 3.0)}
+        {"gain": (0.3, 1.0), "coupling": (1.0, 5.0, 25.0), "dual_gain": (0.1, 0.5, 2.0, 10.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of the Lagrangian's gradient")
     coupling: float = Field(1.0, gt=0, description="c of the estimates")

@@ -135,7 +135,7 @@ class PrimalDualController(LawTable):
 
     information: Literal["primal-dual"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0, 4.0), "dual_gain": (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0, 8.0), "dual_gain": (0.1, 1.0, 5.0, 25.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of the input")
     dual_gain: float = Field(1.0, gt=0, description="kappa of the multipliers' rates")

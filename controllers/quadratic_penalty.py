@@ -91,7 +91,7 @@ class QuadraticPenaltyController(LawTable):
 
     information: Literal["quadratic-penalty"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0, 4.0), "strength": (1.0, 3.0, 10.0, 30.0, 100.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0, 8.0), "strength": (1.0, 10.0, 100.0, 1000.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of the input")
     strength: float = Field(10.0, gt=0, description="s of the penalty")

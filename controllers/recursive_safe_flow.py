@@ -190,7 +190,7 @@ class RecursiveSafeFlowController(LawTable):
 
     information: Literal["recursive-safe-flow"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0), "alpha": (0.5, 1.0, 3.0), "time_constant": (0.1, 1.0, 10.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0), "alpha": (1.0, 5.0), "time_constant": (0.1, 1.0, 10.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of the pseudo-gradient")
     alpha: Annotated[float, Unit("1/s")] = Field(
