@@ -22,7 +22,7 @@ from gne_mj.plain import call_out, callable_address
 Array = NDArray[np.float64]
 
 # Entries of the settings behind the laws' numbers: addresses of the two functions
-_ACTION, _RATE = COUNT, COUNT + 1
+ACTION, _RATE = COUNT, COUNT + 1
 
 
 class PlainLaw(Law):
@@ -84,6 +84,24 @@ class PlainLaw(Law):
         self._kept.extend(kept)
         return np.concatenate([super().settings(rho), addresses])
 
+    def asked(self, rho: float, y: Array) -> Array:
+        """What its own function asks for at y (m,) without a memory.
+
+        Raises:
+            UserCodeError: it raises, or does not return m numbers.
+        """
+        try:
+            value = _numbers(self._action, self._game, rho, y.copy(), np.zeros(0))
+        except (KeyboardInterrupt, UserCodeError):
+            raise
+        except BaseException as error:
+            raise UserCodeError(self._action, error) from error
+        if value.shape != y.shape:
+            raise UserCodeError(
+                self._action, f"it must return {len(y)} numbers, not shape {value.shape}"
+            )
+        return value
+
     def initial_memory(
         self, y: Array, estimate: ArrayLike | None = None, filtered: ArrayLike | None = None
     ) -> Array:
@@ -130,7 +148,7 @@ def _numbers(function: Callable[..., ArrayLike], *arguments: Any) -> Array:
 @kernel
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) by the law's own function; not a number if that raised."""
-    address = np.int64(problem.settings[_ACTION])
+    address = np.int64(problem.settings[ACTION])
     failed = call_out(address, 0, 0, 0, 0.0, y, memory, u)
     u[0] += failed  # zero, or not a number
     return -1

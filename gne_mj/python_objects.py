@@ -69,6 +69,7 @@ class LawFunctions:
 
     functions: Mapping[str, Callable[..., Any]]
     acts_outside: bool = False
+    filtered: bool = False
 
 
 @GAMES.register
@@ -115,5 +116,5 @@ class PythonLaw(NetworkTable):
         name = getattr(functions["action"], "__name__", "law")
         return plain_law(
             game, self.network(game.agents), functions, self.parameters, ("object", name),
-            acts_outside=made.acts_outside,
+            acts_outside=made.acts_outside, filtered=made.filtered,
         )  # fmt: skip

@@ -7,7 +7,8 @@ functions of :class:`gne_mj.controllers.plain_law.PlainLaw`: ``action(game, rho,
 for a law with a memory ``rate(game, rho, y, memory)`` and ``initial_memory(y)``; or those of one
 agent, ``action(agent)`` and so on (:mod:`gne_mj.controllers.local_law`). All of them take the
 scenario's parameters too, by name. ``ACTS_OUTSIDE = True`` in the file says that these functions
-have an action outside the set as well. An agent type's file has constants and kernels as
+have an action outside the set as well; ``FILTERED = True`` puts them under the barrier
+(:mod:`gne_mj.controllers.filtered`). An agent type's file has constants and kernels as
 :mod:`gne_mj.plants.agent_type` lists them.
 """
 
@@ -28,6 +29,7 @@ from pydantic import Field
 from gne_mj import game_model
 from gne_mj.bounds import read_file
 from gne_mj.controllers import Law, PlainLaw
+from gne_mj.controllers.filtered import FilteredLaw
 from gne_mj.controllers.local_law import is_local, joined
 from gne_mj.controllers.plain_law import PlainLawOutside
 from gne_mj.controllers.table import NetworkTable
@@ -103,6 +105,7 @@ def load_law(path: str | Path, game: Game, graph: Graph, parameters: Mapping[str
         return plain_law(
             game, graph, functions, parameters, ("path", Path(path).name),
             acts_outside=bool(getattr(module, "ACTS_OUTSIDE", False)),
+            filtered=bool(getattr(module, "FILTERED", False)),
         )  # fmt: skip
 
 
@@ -114,6 +117,7 @@ def plain_law(
     named_by: tuple[str, str],
     *,
     acts_outside: bool = False,
+    filtered: bool = False,
 ) -> PlainLaw:
     """The law of plain functions: ``action`` and, with a memory, ``rate`` and ``initial_memory``.
 
@@ -124,6 +128,7 @@ def plain_law(
         parameters: which all of them take by name, besides their own arguments.
         named_by: what messages call where they are from, and its name there.
         acts_outside: whether they have an action outside the set.
+        filtered: whether the barrier is added to what they ask for.
 
     Raises:
         InvalidInput: one takes other arguments, or ``rate`` is without ``initial_memory``.
@@ -136,7 +141,12 @@ def plain_law(
         made[each] = partial(function, **parameters)
     if local:
         made = joined(made, game, graph)
+    if filtered and "initial_memory" in made:
+        raise InvalidInput(
+            named_by[0], named_by[1], "under the barrier a policy has no memory of its own"
+        )
     kind = PlainLawOutside if acts_outside else PlainLaw
+    kind = FilteredLaw if filtered else kind
     return kind(game, memory=made.pop("initial_memory", None), **made)
 
 

@@ -1,6 +1,9 @@
 """Gymnasium's and PettingZoo's environments, and the barrier as a filter of any policy."""
 
+import json
+import runpy
 from functools import cache
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -224,6 +227,28 @@ def test_what_acts_solves_the_barriers_equation():
     assert nearest < 0.1, "the barrier had something to do"
 
 
+def test_a_policy_is_a_law_under_the_same_barrier():
+    """A run in mode implicit is the guarded environment's episode."""
+
+    def policy(y):
+        return 15.0 * np.sin(2.0 * y + np.arange(len(y)))
+
+    scenario = gne_mj.load_scenario("velocity-sync", STRONG | {"recording.period": 0.02})
+    law = gne_mj.own_law(lambda game, rho, y, memory: policy(y), mode="implicit", filtered=True)
+    run = gne_mj.run(scenario, law=law)
+    assert run.status == "completed"
+    environment = guarded(load_environment("velocity-sync", STRONG))
+    timestep, given, seen = environment.reset(), [], []
+    while not timestep.last():
+        y = timestep.observation["all/output"]
+        timestep = environment.step(policy(y))
+        seen.append(y), given.append(environment.physics.given)
+    robots = run["robots"].isel(time=slice(0, -1))
+    np.testing.assert_allclose(robots["action"], seen, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(robots["input"], given, rtol=0, atol=1e-4)
+    assert "certified at control instants" in str(gne_mj.certify(run))
+
+
 def test_every_kind_is_kept_inside_by_the_same_input():
     def made(load, **more):
         return guarded(load("velocity-sync", STRONG, **more), pull=20.0)
@@ -298,3 +323,25 @@ def test_what_cannot_be_is_refused_in_one_sentence():
         parallel.step({name: np.zeros(1 if name != "agent_2" else 3) for name in parallel.agents})
     assert gne_mj.environment.guarded is guarded
     assert environment_of(system, clock(0.01, 1.0)).setting.guard is None
+
+
+def test_the_recipe_trains_a_policy_that_is_a_law(monkeypatch, tmp_path, capsys):
+    folder = Path(__file__).parents[1] / "examples" / "learning"
+    monkeypatch.syspath_prepend(folder)
+    train = runpy.run_path(str(folder / "train.py"))
+    out = tmp_path / "policy.json"
+    arguments = ["--generations=2", "--starts=1", "--episodes=4", f"--out={out}"]
+    monkeypatch.setattr("sys.argv", ["train.py", *arguments])
+    train["main"]()
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("without it: inside ")
+    assert lines[1].startswith("under the barrier: inside 4 of 4")
+    numbers = np.array(json.loads(out.read_text()))
+    y, policy = np.array([FIVE, FIVE + 0.5]), train["force"]
+    assert_array_equal(policy(numbers, y)[1], policy(numbers, y[1]))
+    assert_array_equal(policy(np.stack([numbers, 2 * numbers]), y)[0], policy(numbers, y[0]))
+    for file, mode in (("policy.py", "sampled"), ("policy_filtered.py", "implicit")):
+        law = {"information": "custom", "file": str(folder / file), "mode": mode}
+        changes = SHORT | {f"systems.robots.controller.{key}": each for key, each in law.items()}
+        run = gne_mj.run(gne_mj.load_scenario("velocity-sync", changes))
+        assert run.status == "completed"

@@ -1,6 +1,5 @@
 """Many fleets of one system, stepped natively on threads, each as it would be alone."""
 
-import copy
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -69,7 +68,7 @@ class Fleets:
 
     Attributes:
         rows: what native code works on, see :class:`gne_mj.environment.stepping.Rows`.
-        plants: one for each fleet, for whoever reads or draws it.
+        plants: that of each fleet; several may share one, whose mjData is then any of theirs.
     """
 
     def __init__(
@@ -86,14 +85,15 @@ class Fleets:
         cuts = np.linspace(0, count, len(plants) + 1).round().astype(int).tolist()
         self._parts = list(pairwise(cuts))
         self.plants = [
-            plant if number == 0 else _beside(plant)
+            plant
             for plant, (low, high) in zip(plants, self._parts, strict=True)
-            for number in range(high - low)
+            for _ in range(high - low)
         ]
         owned = [ParameterBlock(plant.parameter_arrays) for plant in plants]
         keepers = [None if barrier is None else barrier.parameter_block(plant) for plant in plants]
         self._kept_alive = barrier, owned, keepers
-        self._tools = [_tools(*each) for each in zip(plants, keepers, strict=True)]
+        shared = np.diff(cuts) > 1
+        self._tools = [_tools(*each) for each in zip(plants, keepers, shared, strict=True)]
         self._marks = np.repeat([each.address for each in owned], np.diff(cuts))
         self.rows = _rows(self.plants, game)
         keeper = keepers[0]
@@ -107,20 +107,30 @@ class Fleets:
         """How many fleets there are."""
         return len(self.plants)
 
+    def time(self, row: int) -> float:
+        """Since a fleet's start, in s."""
+        return float(self.rows.now[row, 0])
+
+    def joints(self, rows: slice) -> NDArray[np.float64]:
+        """(E, nq + nv + na) of MuJoCo's state: positions, velocities, activations."""
+        model = self.plants[0].model
+        return self.rows.now[rows, 1 : 1 + model.nq + model.nv + model.na]
+
     @cached_property
     def _pool(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(len(self._parts))
 
     def place(self, row: int, state: ArrayLike) -> None:
         """Let a fleet start anew at time 0 from (m, states), nothing acting; :meth:`look` next."""
-        self.plants[row].reset(state)
-        rows = self.rows
+        rows, plant = self.rows, self.plants[row]
+        plant.reset(state)
         self._memory[row] = 0.0
         rows.pull[row] = rows.given[row] = 0.0
         rows.step[row] = rows.limited[row] = 0
         rows.found[row], self.exits[row] = INSIDE, None
         header = PLANT_MARK, float(self._marks[row])
-        self.plants[row].data.userdata[:USERDATA_HEADER] = header
+        plant.data.userdata[:USERDATA_HEADER] = header
+        mujoco.mj_getState(plant.model, plant.data, rows.now[row], STATE)
 
     def look(self) -> None:
         """Bring all rows that move up to date without stepping."""
@@ -129,7 +139,8 @@ class Fleets:
     def restore(self, row: int) -> None:
         """Back to the start of a fleet's last step; the exit that it led to stays noted."""
         left, plant, rows = self.exits[row], self.plants[row], self.rows
-        mujoco.mj_setState(plant.model, plant.data, rows.before[row], STATE)
+        rows.now[row] = rows.before[row]
+        mujoco.mj_setState(plant.model, plant.data, rows.now[row], STATE)
         moves, found = rows.moves.copy(), rows.found[row]
         rows.moves[:] = np.arange(self.count) == row
         rows.found[row] = INSIDE
@@ -161,7 +172,7 @@ class Fleets:
                 self.exits[row] = self._exit(row)
 
     def _exit(self, row: int) -> Exit:
-        time, found = float(self.plants[row].data.time), int(self.rows.found[row])
+        time, found = self.time(row), int(self.rows.found[row])
         if found in (DIVERGED, NO_INPUT):
             return Exit(time, "", np.nan, stuck=found == NO_INPUT)
         return Exit(time, self.game.constraint_names[found], float(self.rows.g[row, found]))
@@ -172,17 +183,11 @@ class Fleets:
             self._pool.shutdown()
 
 
-def _beside(plant: FleetPlant) -> FleetPlant:
-    """The same fleet with the same model, and data of its own."""
-    other = copy.copy(plant)
-    other.data = mujoco.MjData(plant.model)
-    return other
-
-
-def _tools(plant: FleetPlant, keeper: ParameterBlock | None) -> Tools:
+def _tools(plant: FleetPlant, keeper: ParameterBlock | None, shared: bool) -> Tools:
     kind = plant.agents.kind
     return Tools(
-        step_address(), step_address("mj_getState"), STATE, plant.model._address,
+        step_address(), step_address("mj_getState"), step_address("mj_setState"), STATE,
+        plant.model._address, plant.data._address, int(shared),
         0 if keeper is None else keeper.address, len(kind.STATES), kind.OUTPUT,
     )  # fmt: skip
 
@@ -197,7 +202,6 @@ def _rows(plants: Sequence[FleetPlant], game: Game) -> Rows:
         return np.zeros((count, width))
 
     return Rows(
-        data=np.array([plant.data._address for plant in plants]),
         workspace=whole(),
         moves=whole() + 1,
         step=whole(),
@@ -208,5 +212,6 @@ def _rows(plants: Sequence[FleetPlant], game: Game) -> Rows:
         state=real(m * first.agents.states),
         y=real(m),
         g=real(game.constraints_count),
+        now=real(mujoco.mj_stateSize(first.model, STATE)),
         before=real(mujoco.mj_stateSize(first.model, STATE)),
     )

@@ -224,8 +224,9 @@ def _check(system: System) -> None:
         raise InvalidInput(
             "system.faults", f"{len(system.faults)} faults", "an environment has none: remove them"
         )
-    if system.separation is not None:
-        raise InvalidInput("system.separation", "given", "an environment has none: remove it")
+    for key in ("separation", "membership"):
+        if getattr(system, key) is not None:
+            raise InvalidInput(f"system.{key}", "given", "an environment has none: remove it")
 
 
 def _episode(clock: Clock) -> int:

@@ -116,9 +116,7 @@ class View:
         found = fleets.rows
         parts = [found.state[rows], found.y[rows], found.g[rows]]
         if self._joint_entries is not None:
-            datas = [plant.data for plant in fleets.plants[rows]]
-            whole = [np.concatenate([d.qpos, d.qvel, d.act]) for d in datas]
-            parts.append(np.array(whole)[:, self._joint_entries])
+            parts.append(fleets.joints(rows)[:, self._joint_entries])
         if self._told.structure == "full":
             derived = [values for _, values in self._derived(found.y[rows])]
             parts += [values.reshape(len(values), -1) for values in derived]

@@ -52,9 +52,9 @@ def line(system: System, fleets: Fleets, row: int) -> str:
     g = fleets.rows.g[row]
     share = used(system, g)
     worst = int(np.argmax(share))
-    time = float(fleets.plants[row].data.time)
     y = " ".join(f"{value:.3f}" for value in fleets.rows.y[row])
-    return f"{time:.3f} s: y = {y}; {system.game.constraint_names[worst]} {share[worst]:.0%} used"
+    name = system.game.constraint_names[worst]
+    return f"{fleets.time(row):.3f} s: y = {y}; {name} {share[worst]:.0%} used"
 
 
 def drawn(mode: str | None, system: System, fleets: Fleets, row: int) -> Picture | str | None:

@@ -122,6 +122,7 @@ def own_law(
     graph: Network = "ring",
     mode: str = "continuous",
     acts_outside: bool = False,
+    filtered: bool = False,
     **parameters: Any,
 ) -> LawTable:
     """A law of plain Python functions, for a first try; nothing is claimed of it.
@@ -143,16 +144,19 @@ def own_law(
         initial_memory: ``initial_memory(y, **parameters)``, or ``initial_memory(agent,
             **parameters)``, returns the memory at the start.
         graph: over which agents hear each other.
-        mode: "continuous"; a law without a memory also "sampled".
+        mode: "continuous"; a law without a memory also "sampled", a filtered one "implicit" too.
         acts_outside: whether the functions have an action where constraints are violated, so that
             runs may go on there (``simulation.on_exit``).
+        filtered: whether the barrier is added to what ``action`` asks for, as a safety filter of a
+            policy; in mode "implicit" it keeps the set at control instants (docs/learning.md).
         **parameters: numbers and lists, which can be changed and swept as
             ``controller.parameters.NAME``.
     """
     given = {"action": action, "rate": rate, "initial_memory": initial_memory}
     functions = {name: function for name, function in given.items() if function is not None}
-    kept = LawFunctions(functions, acts_outside)
-    also = ("acts outside",) if acts_outside else ()
+    kept = LawFunctions(functions, acts_outside, filtered)
+    flags = {"acts outside": acts_outside, "filtered": filtered}
+    also = tuple(word for word, said in flags.items() if said)
     name = keep(kept, getattr(action, "__name__", "law"), functions, *also)
     return made(PythonLaw, information="python", object=name, graph=graph, mode=mode,
                 parameters=parameters)  # fmt: skip

@@ -17,7 +17,7 @@ import history
 GROUPS = {
     "startup": "startup", "batch": "batch", "fleet": "fleet", "positions": "positions",
     "growth": "growth", "solver": "solver", "twin": "twin", "view": "view", "mjx": "peer_mjx",
-    "diffrax": "peer_diffrax", "cbfpy": "peer_cbfpy",
+    "learning": "learning", "diffrax": "peer_diffrax", "cbfpy": "peer_cbfpy",
 }  # fmt: skip
 DOCS = Path(__file__).parents[2] / "docs"
 
