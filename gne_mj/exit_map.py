@@ -128,6 +128,9 @@ def exit_map(
     Raises:
         InvalidInput: agents keep apart.
     """
+    if system.membership is not None:
+        expected = "maps know no agents that leave or join: leave it out"
+        raise InvalidInput("system.membership", "given", expected)
     if system.separation is not None:
         raise InvalidInput(
             "system.separation",

@@ -7,11 +7,12 @@ present are in stay; others are gone, but those that are named to go on with the
 that are away.
 
 The kernels here put a profile (m',) of those present into one of all (m,) and call the game's own
-functions. Parameters q = [addresses of these (6), m, length of the game's own, N', m', p', agents
-(N'), actions (m'), constraints (p'), a profile (m), a row (m), the game's own]; the profile and the
-row are written, so that one game is for one thread at a time.
+functions. Parameters q = [addresses of these (6), m, length of the game's own, N', m', p', address
+of a profile and a row (m each), agents (N'), actions (m'), constraints (p'), the game's own].
+Profile and row are written, so that such a game is for one thread at a time.
 """
 
+import ctypes
 import sys
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
@@ -23,15 +24,15 @@ from numpy.typing import NDArray
 from gne_mj.equality import Equality
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Box, Game
-from gne_mj.native import address_in, call_integer, call_number, kernel
-from gne_mj.parameter_block import floats_at
+from gne_mj.native import address_in, call_integer, call_number, kernel, kernel_as
+from gne_mj.parameter_block import exact, floats_at
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MOST_ACTIONS = 255  # of the whole game: every evaluation copies a profile
 COST, GRADIENT, ROW, CONSTRAINT, SLOPE, CURVATURE, LENGTH, OWN, AGENTS, ACTIONS, COUNT = range(11)
-HEADER = 11
+SCRATCH, HEADER = 11, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +73,11 @@ def game_among(game: Game, there: NDArray[np.bool_], away: Array, keeps: Collect
         raise InvalidInput(
             "membership", f"agents {(agents + 1).tolist()} are left", f"{what} must be left"
         )
+    written = np.concatenate([away, np.zeros(game.actions)])
     found = Game(
         name=game.name,
         kernels=sys.modules[__name__],
-        parameters=_parameters(game, (agents, actions, constraints), away),
+        parameters=_parameters(game, (agents, actions, constraints), written),
         sizes=tuple(game.sizes[i] for i in agents),
         in_cost=_lists([game.in_cost[i] for i in agents.tolist()], agents),
         in_constraint=_lists([game.in_constraint[k] for k in constraints.tolist()], agents),
@@ -87,7 +89,7 @@ def game_among(game: Game, there: NDArray[np.bool_], away: Array, keeps: Collect
         equalities=_equalities(game, (actions, constraints), away),
         **_declared(game, (agents, actions, constraints), away, kept),
     )
-    object.__setattr__(found, "whole", game)  # whose functions native code knows by address
+    object.__setattr__(found, "known_by_address", (game, written))
     return Among(found, agents, actions, constraints)
 
 
@@ -125,10 +127,10 @@ def _equalities(game: Game, which: tuple[Indices, Indices], away: Array) -> tupl
     )
 
 
-def _parameters(game: Game, which: tuple[Indices, Indices, Indices], away: Array) -> Array:
+def _parameters(game: Game, which: tuple[Indices, Indices, Indices], written: Array) -> Array:
     own, m = game.data.parameters, game.actions
-    head = [*game.data.functions[:LENGTH], m, len(own), *map(len, which)]
-    parts = [head, *which, away, np.zeros(m), own]
+    address = exact(written.ctypes.data)
+    parts = [[*game.data.functions[:LENGTH], m, len(own), *map(len, which), address], *which, own]
     return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts])
 
 
@@ -139,9 +141,13 @@ def _declared(
     kept: NDArray[np.bool_],
 ) -> dict[str, Any]:
     """What is known of the game that is known of it among these agents too."""
-    _, actions, constraints = which
+    agents, actions, constraints = which
+    # a gap to somebody who is away adds a number to its square
+    members = [game.in_constraint[k] for k in constraints.tolist()]
+    held = game.gap_bounds is not None and any(set(row) - set(agents.tolist()) for row in members)
+    gaps = None if game.gap_bounds is None or held else game.gap_bounds[constraints]
     block = np.ix_(actions, actions)
-    bounded = _within(game, which[0], away, kept)
+    bounded = _within(game, agents, away, kept)
 
     def jacobian_bounds(box: Box) -> Box:
         assert game.jacobian_bounds is not None
@@ -156,7 +162,7 @@ def _declared(
             key: getattr(game, key)
             for key in (
                 "action_name", "action_unit", "affine", "row_scaled", "agent_name", "axes",
-                "constraint_class", "smooth", "tested",
+                "smooth", "tested",
             )
         },
         "box": None if box is None or not bounded else (box[0][actions], box[1][actions]),
@@ -164,8 +170,11 @@ def _declared(
         "feasible_jacobian_bounds": None
         if feasible is None or not bounded
         else (feasible[0][block], feasible[1][block]),
-        "gap_bounds": None if game.gap_bounds is None else game.gap_bounds[constraints],
-        "affine_constraints": None if game.affine_constraints is None else 2 * len(constraints),
+        "gap_bounds": gaps,
+        "affine_constraints": None
+        if game.affine_constraints is None or gaps is None
+        else 2 * len(constraints),
+        "constraint_class": game.constraint_class or ("quadratic" if held else None),
     }  # fmt: skip
 
 
@@ -179,22 +188,40 @@ def _within(game: Game, agents: Indices, away: Array, kept: NDArray[np.bool_]) -
 
 
 @kernel
+def _write(address, k, value):
+    floats_at(address, k + 1)[k] = value
+
+
+@kernel
+def _read(address, k):
+    return floats_at(address, k + 1)[k]
+
+
+def _write_in_python(address: int, k: int, value: float) -> None:
+    ctypes.c_double.from_address(address + 8 * k).value = value
+
+
+def _read_in_python(address: int, k: int) -> float:
+    return ctypes.c_double.from_address(address + 8 * k).value
+
+
+write, read = kernel_as(_write, _write_in_python), kernel_as(_read, _read_in_python)
+
+
+@kernel
 def put(q, y):
     """Put the present agents' actions into the profile; the address of that."""
-    first = HEADER + int(q[AGENTS])
-    at = first + int(q[ACTIONS]) + int(q[COUNT])
-    address = address_in(q) + 8 * at
-    profile = floats_at(address, int(q[LENGTH]))
+    profile = int(q[SCRATCH])
     for r in range(len(y)):
-        profile[int(q[first + r])] = y[r]
-    return address
+        write(profile, action(q, r), y[r])
+    return profile
 
 
 @kernel
 def own(q):
     """The address of the game's own parameters."""
     lists = int(q[AGENTS]) + int(q[ACTIONS]) + int(q[COUNT])
-    return address_in(q) + 8 * (HEADER + lists + 2 * int(q[LENGTH]))
+    return address_in(q) + 8 * (HEADER + lists)
 
 
 @kernel
@@ -234,14 +261,13 @@ def cost_gradient(q, i, a, y):
 def add_cost_hessian(q, i, a, y, scale, out):
     """The present agents' entries of the whole game's row."""
     m, profile = int(q[LENGTH]), put(q, y)
-    address = profile + 8 * m
-    row = floats_at(address, m)
+    row = profile + 8 * m
     for r in range(m):
-        row[r] = 0.0
-    given = (own(q), int(q[OWN]), agent(q, i), action(q, a), profile, m, scale, address)
+        write(row, r, 0.0)
+    given = (own(q), int(q[OWN]), agent(q, i), action(q, a), profile, m, scale, row)
     call_integer(int(q[ROW]), given)
     for b in range(len(y)):
-        out[b] += row[action(q, b)]
+        out[b] += read(row, action(q, b))
 
 
 @kernel

@@ -307,6 +307,11 @@ def _messages(rows: Rows) -> Array:
     return memory[:, end - game.agents : end]
 
 
+def _there(rows: Rows) -> Array:
+    first = np.searchsorted(rows.system.game.agent_of_action, np.arange(rows.system.game.agents))
+    return np.isfinite(rows.y[:, first])
+
+
 def _linked(rows: Rows) -> Array:
     system = rows.system
     assert isinstance(system.law.graph, ChangingGraph)
@@ -368,6 +373,10 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         "messages", ("time", "agent"), _messages,
         there=lambda system: triggered(system.faults), unit="",
         long_name="messages of each agent that came over links so far", figure=True, page="line",
+    ),
+    Variable(
+        "there", ("time", "agent"), _there, there=lambda system: system.membership is not None,
+        long_name="whether the agent is there", page="behind", batch=False,
     ),
     Variable(
         "load", ("time", AXIS),

@@ -1,6 +1,7 @@
 """What a run in which agents leave and join is judged by: the games that were played in it."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 from gne_mj import kept_apart
 from gne_mj.membership import There
 from gne_mj.system import System
-from gne_mj.system.membership import groups
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,7 +24,6 @@ class ThosePresent:
     Attributes:
         system: those there at the end, by themselves.
         others: those of other times.
-        all_known: whether every set of agents that was ever there is among these.
         agents, actions, constraints: of those there at the end, in the whole system.
         time: sample times (samples,) since they were.
         action: their y there, (samples, m').
@@ -33,7 +32,6 @@ class ThosePresent:
 
     system: System
     others: tuple[System, ...]
-    all_known: bool
     whole: System
     agents: Indices
     actions: Indices
@@ -89,19 +87,20 @@ def those_present(
     game = system.game
     if membership is None:
         every = [np.arange(n) for n in (game.agents, game.actions, game.constraints_count)]
-        return ThosePresent(system, (), True, system, every[0], every[1], every[2], time, action)
-    seen: dict[bytes, System] = {}
-    for there, rows in groups(system, action):
-        seen[there.tobytes()] = system.among(there, action[np.argmax(rows)]).system
-        if rows[-1]:
-            last, since = there, len(rows) - np.argmin(rows[::-1]) if not np.all(rows) else 0
-    ever = [membership["at_start"], *(each["there"] for each in membership["changes"])]
-    known = all(_mask(system, agents).tobytes() in seen for agents in ever)
+        return ThosePresent(system, (), system, every[0], every[1], every[2], time, action)
+    ever = [membership["at_start"]]
+    for change, later in pairwise([*membership["changes"], None]):
+        if later is None or later["time"] > change["time"]:
+            ever.append(change["there"])
+    masks = {mask.tobytes(): mask for mask in (_mask(system, agents) for agents in ever)}
+    last = _mask(system, ever[-1])
     present = system.among(last, action[-1])
-    among, others = present.among, [each for key, each in seen.items() if key != last.tobytes()]
+    others = (system.among(mask).system for key, mask in masks.items() if key != last.tobytes())
+    same = np.all(np.isfinite(action) == last[game.agent_of_action], axis=1)
+    since, among = 0 if np.all(same) else len(same) - int(np.argmin(same[::-1])), present.among
     return ThosePresent(
-        present.system, tuple(others), known, system, among.agents, among.actions,
-        among.constraints, time[since:], action[since:][:, among.actions], membership,
+        present.system, tuple(others), system, among.agents, among.actions, among.constraints,
+        time[since:], action[since:][:, among.actions], membership,
     )  # fmt: skip
 
 

@@ -356,7 +356,8 @@ def make_plan(
     Raises:
         InvalidInput: names the key, the value and what would be right.
     """
-    scenario = load_scenario(source, changes).without_interventions("runs of a batch")
+    what = "runs of a batch"
+    scenario = load_scenario(source, changes).without_interventions(what).without_membership(what)
     name = scenario.name_of(system)
     one = scenario.model_copy(update={"systems": {name: scenario.systems[name]}})
     tables = json.loads(one.model_dump_json(exclude_none=True))

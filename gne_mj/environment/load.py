@@ -59,7 +59,9 @@ def of_scenario(
 ) -> Environment:
     """What ``make`` makes of a scenario's system and clock, with its keys in messages."""
     with named(source="scenario"):
-        loaded = load_scenario(scenario, changes).without_interventions("environments")
+        what = "environments"
+        loaded = load_scenario(scenario, changes).without_interventions(what)
+        loaded = loaded.without_membership(what)
     name = loaded.name_of(system)
     built = loaded.systems[name].build(name, loaded.simulation)
     with loaded.naming(name):

@@ -6,7 +6,7 @@ not compared across it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, get_args, get_type_hints
 
 import numpy as np
@@ -216,7 +216,8 @@ class MembershipLoop(LoopInPieces):
             there = self._part.there
             self._note(step, able, comes, refused)
             if refused is not None and comes and change.retry > 0.0:
-                again = _Due(step + round(change.retry / self._h), change, again=True)
+                others = replace(change, leaves=())
+                again = _Due(step + round(change.retry / self._h), others, again=True)
                 self._due = sorted([*self._due, again], key=lambda due: due.step)
 
     def _turn(self, there: There, state: Array, memory: Array, step: int) -> Refusal | None:
@@ -244,7 +245,7 @@ class MembershipLoop(LoopInPieces):
         note: dict[str, Any] = {
             "time": step * self._h,
             "what": "joined" if comes else "left",
-            "agents": [i + 1 for i in agents],
+            "agents": [int(i) + 1 for i in agents],
             "done": refused is None,
             "there": _numbers(self._part.there),
             "constraint": None,

@@ -174,6 +174,21 @@ class Scenario(Table):
             )
         return self
 
+    def without_membership(self, what: str) -> "Scenario":
+        """This one, where agents that leave and join are refused.
+
+        Raises:
+            InvalidInput: some do, and ``what`` (in words, in plural) know none.
+        """
+        for name, table in self.systems.items():
+            if table.membership is not None:
+                raise InvalidInput(
+                    f"systems.{name}.membership",
+                    "given",
+                    f"{what} know no agents that leave or join: leave it out",
+                )
+        return self
+
 
 def _kind(table: Table) -> str:
     """Which of the tables that may stand there it is."""

@@ -92,12 +92,22 @@ class Assembly(SystemData):
         loop.kept_alive = self
         return loop
 
-    def among(self, there: There, y: NDArray[np.float64]) -> Present:
-        """Those that are there by themselves, at rest at outputs y (m,); made once."""
+    def among(self, there: There, y: NDArray[np.float64] | None = None) -> Present:
+        """Those that are there by themselves; made once, in a run or here.
+
+        Args:
+            there: (N,) who is.
+            y: (m,) outputs at which they rest then; those of the start if left out.
+        """
         key = there.tobytes()
         if key not in self._present:
-            self._present[key] = present_of(self, there, self.agents.equilibrium(y))
+            state = self.agents.equilibrium(self.start if y is None else y)
+            self.keep_among(there, present_of(self, there, state))
         return self._present[key]
+
+    def keep_among(self, there: There, present: Present) -> None:
+        """Let this be what :meth:`among` knows of these, unless it does already."""
+        self._present.setdefault(there.tobytes(), present)
 
     @cached_property
     def _present(self) -> dict[bytes, Present]:

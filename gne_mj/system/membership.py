@@ -159,6 +159,7 @@ class Company:
     def part(self, there: There, state: Array, memory: Array, step: int) -> Part:
         """The loop of those that are there."""
         found = present_of(self._system, there, state, memory)
+        self._system.keep_among(there, found)
         loop = found.system.closed_loop(self._clock)
         loop.start_at(step)
         among = found.among

@@ -44,7 +44,9 @@ def costs(system: System, slopes: Slopes) -> Assumption:
             label, FAILS, "phi is not strictly convex: some actions are in no constraint's reach"
         )
     status = UNKNOWN if UNKNOWN in (own.status, constraints.status) else MET
-    if status == MET and (ASSUMED in (own.status, constraints.status) or game.box is None):
+    if status == MET and (
+        ASSUMED in (own.status, constraints.status) or (game.box is None and not strong)
+    ):
         status = ASSUMED
     why = f"{own.why}; {constraints.why}"
     if not strict:
@@ -59,7 +61,9 @@ def costs(system: System, slopes: Slopes) -> Assumption:
             "; in substance: no squared gap is strictly convex, but phi is, which is what the"
             " proofs use"
         )
-    if game.box is None:
+    if game.box is None and strong:
+        why += "; F is strongly monotone everywhere, so that y* is there without a compact set"
+    elif game.box is None:
         why += "; that the feasible set is compact is taken on trust"
     return Assumption(label, status, why)
 

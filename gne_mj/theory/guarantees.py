@@ -1,6 +1,6 @@
 """What the paper's theorems guarantee for one system, and what they do not."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from gne_mj.controllers.kept import Kept
 from gne_mj.errors import part_of
 from gne_mj.game_model import Box
 from gne_mj.graph import Graph
+from gne_mj.membership import There
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.system.steps import largest_step
 from gne_mj.theory import verdict
@@ -21,7 +22,7 @@ from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
 from gne_mj.theory.positions import positions_of
 from gne_mj.theory.separation import kept_apart
-from gne_mj.theory.theorem import HELD, Theorem
+from gne_mj.theory.theorem import HELD, NOT_CERTIFIED, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
 
 CONVENTION = "mu of (y-y')'(F(y)-F(y')) >= mu |y-y'|^2, where the paper's definition has mu/2"
@@ -53,6 +54,7 @@ class Guarantees:
     positions: dict[str, Any] | None
     separation: dict[str, Any] | None
     moving: dict[str, Any] | None
+    membership: list[dict[str, Any]] | None
     lyapunov_claimed: bool
     guaranteed: list[str]
     measured: list[str]
@@ -81,9 +83,74 @@ class Guarantees:
 def certify(system: System, clock: Clock) -> Guarantees:
     """Examine a system that is to run on a clock.
 
+    Where agents leave and join every set of them that is there at some time, if all are admitted,
+    is examined by itself, and what is told besides is of those at the start.
+
     Raises:
         InvalidInput: so many actions that matrices of so many rows and columns fill the memory.
     """
+    if system.membership is None:
+        return _certify(system, clock)
+    found: dict[bytes, Guarantees] = {}
+    intervals = []
+    for time, there in system.membership.intervals(system.game.agents):
+        if there.tobytes() not in found:
+            among = system.among(there, system.start).system
+            found[there.tobytes()] = _certify(among, clock)
+        intervals.append((time, there, found[there.tobytes()]))
+    return _of_intervals(system, intervals)
+
+
+def _of_intervals(system: System, intervals: list[tuple[float, There, Guarantees]]) -> Guarantees:
+    """All sets of agents together: from when each is there, and what is told of it by itself."""
+    _, _, first = intervals[0]
+    names = [", ".join(str(i + 1) for i in np.flatnonzero(there)) for _, there, _ in intervals]
+    each = {name: g for name, (_, _, g) in zip(names, intervals, strict=True)}
+    same = {g.status for g in each.values()}
+    last = intervals[-1][2]
+    covered = all(g.guaranteed != [verdict.NOTHING] for g in each.values())
+    guaranteed = _told_of_sets(
+        {name: [s for s in g.guaranteed if s != verdict.NOTHING] for name, g in each.items()}
+    )
+    if len(same) == 1 and covered:
+        guaranteed = [
+            f"in every interval between changes the same of those who are there ({len(each)} sets"
+            " of agents), also where somebody is not admitted as long as that set is one of these",
+            *(f"of those there at the end: {sentence}" for sentence in last.guaranteed),
+        ]
+    return replace(
+        first,
+        system=_system(system),
+        status=first.status if len(same) == 1 else NOT_CERTIFIED,
+        membership=[
+            {
+                "from": time,
+                "agents": [int(i) + 1 for i in np.flatnonzero(there)],
+                "status": g.status,
+                "lyapunov_claimed": g.lyapunov_claimed,
+                "lambda_2": None if g.graph is None else g.graph["lambda_2"],
+                "not_certified": g.not_certified,
+            }
+            for time, there, g in intervals
+        ],
+        lyapunov_claimed=all(g.lyapunov_claimed for g in each.values()),
+        guaranteed=guaranteed or [verdict.NOTHING],
+        not_certified=_told_of_sets({name: g.not_certified for name, g in each.items()}),
+    )
+
+
+def _told_of_sets(sentences: dict[str, list[str]]) -> list[str]:
+    """Sentences of sets of agents, those of all of them once."""
+    of_all = [s for s in next(iter(sentences.values())) if all(s in o for o in sentences.values())]
+    return of_all + [
+        f"while agents {name} are there: {sentence}"
+        for name, own in sentences.items()
+        for sentence in own
+        if sentence not in of_all
+    ]
+
+
+def _certify(system: System, clock: Clock) -> Guarantees:
     check_count("agents.count", system.game.actions, MOST_EXAMINED, "the actions of all")
     theorem = Theorem(system)
     held = ZeroOrderHold(system, clock) if mode_of(system).promises else None
@@ -116,6 +183,7 @@ def certify(system: System, clock: Clock) -> Guarantees:
         positions=None if positions is None else positions.report(),
         separation=None if apart is None else apart.report(),
         moving=None if motion is None else motion.report(),
+        membership=None,
         lyapunov_claimed=theorem.lyapunov,
         guaranteed=verdict.together(
             verdict.guaranteed(theorem, held),

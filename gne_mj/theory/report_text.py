@@ -73,6 +73,10 @@ def _rows(g: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "separation", _separation(g["separation"])
     if g["moving"] is not None:
         yield "moving", _moving(g["moving"])
+    for part in g["membership"] or []:
+        agents = ", ".join(map(str, part["agents"]))
+        graph = "" if part["lambda_2"] is None else f", lambda_2 = {part['lambda_2']:.4g}"
+        yield f"from {part['from']:g} s", f"agents {agents}: {part['status']}{graph}"
     for n, sentence in enumerate(g["guaranteed"]):
         yield "guaranteed" if n == 0 else "", sentence
     for n, sentence in enumerate(g["measured"]):

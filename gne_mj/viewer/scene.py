@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.viewer.mirror import POSITION, QUATERNION
 from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
 
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
@@ -56,7 +57,7 @@ class Scene:
             if shown_system.fleet is not None:
                 mirror = shown_system.fleet.mirror
                 rows = shown_system.fleet.qpos(values[shown_system.system.name])
-                found.append(np.stack([mirror.poses(row) for row in rows]))
+                found.append(np.stack([_hidden(mirror.poses(row)) for row in rows]))
         if not found:
             samples = len(next(iter(values.values()))["action"])
             return np.zeros((samples, 0, 8))
@@ -68,3 +69,15 @@ class Scene:
         for shown_system in self.shown_systems:
             found |= shown_system.arrays(values[shown_system.system.name])
         return found
+
+
+def _hidden(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses (K, 8) of which those that are not numbers, of agents that are away, are hidden, in the
+    place of one that is there."""
+    gone = ~np.all(np.isfinite(poses), axis=1)
+    if np.any(gone):
+        there = poses[~gone, :3]
+        poses[gone] = 0.0
+        poses[gone, QUATERNION.start] = 1.0
+        poses[gone, POSITION] = there[0] if len(there) else 0.0
+    return poses

@@ -99,11 +99,13 @@ class ShownSystem:
             if variable.name in values:
                 rows = values[variable.name]
                 found[line_key(name, variable.name)] = rows.reshape(len(rows), -1)
-        margin = -np.max(values["constraint"], axis=1)
+        margin = -np.fmax.reduce(values["constraint"], axis=1)  # of constraints that there are
         found[f"{name}/margin"] = margin.astype(np.float32)
         found[f"{name}/share"] = shares(game, values).astype(np.float32)
         if self._network_changes and "linked" in values:
             found[f"{name}/linked"] = values["linked"].astype(np.float32)
+        if "there" in values:  # where agents leave and join
+            found[f"{name}/there"] = values["there"].astype(np.float32)
         for variable in self._shown("estimates"):
             found[f"{name}/{variable.name}"] = values[variable.name].astype(np.float32)
         return found

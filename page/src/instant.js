@@ -14,7 +14,15 @@ export const partsOf = (system) => [
   "margin",
   "estimate",
   "linked",
+  "there",
 ];
+
+/**
+ * Whether an agent, from 0, is there: some leave and join.
+ * @param {Instant["systems"][string] | undefined} own arrays of its system
+ * @param {number} agent
+ */
+export const isThere = (own, agent) => !own?.there || own.there[agent] > 0.5;
 
 /**
  * NaN is a gap in a line.

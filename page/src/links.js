@@ -1,4 +1,5 @@
 // Who hears whom: links between agents, and messages on their way along them.
+import { isThere } from "./instant.js";
 import { colour, reducedMotion } from "./theme.js";
 /** @import { Scene } from "./scene.js" */
 /** @import { Instant, Numbers, System } from "./types.d.ts" */
@@ -39,6 +40,8 @@ export class Links {
     this.heads = new Map(); // where links of each agent begin
     /** @type {Map<string, Numbers | undefined>} */
     this.linked = new Map(); // of graphs that change: which of a system's edges there are now
+    /** @type {Map<string, Instant["systems"][string]>} */
+    this.arrays = new Map(); // of each system now
   }
 
   /** Another scene. */
@@ -57,6 +60,7 @@ export class Links {
     if (!this.pulsing || !counts || document.hidden) return;
     const every = Math.max(1, Math.ceil(system.links.length / MANY));
     for (let link = 0; link < system.links.length; link += every) {
+      if (!this.among(system, system.links[link])) continue;
       const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
       if (passed + lost > 0) this.pulse(system, link, lost > 0, now, REST);
     }
@@ -82,11 +86,22 @@ export class Links {
     const linked = this.linked.get(system.name);
     for (let link = 0; link < system.links.length; link += every) {
       if (linked && !(linked[link >> 1] > 0.5)) continue; // an edge's two links follow each other
+      if (!this.among(system, system.links[link])) continue;
       const key = `${system.name}/${link}`;
       // each begins at a moment of its own
       if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - ((link * 617) % FLOW));
       this.pulse(system, link, false, now, FLOW);
     }
+  }
+
+  /**
+   * Whether both agents, from 1, are there.
+   * @param {System} system
+   * @param {[number, number]} pair
+   */
+  among(system, [a, b]) {
+    const own = this.arrays.get(system.name);
+    return isThere(own, a - 1) && isThere(own, b - 1);
   }
 
   get pulsing() {
@@ -158,6 +173,7 @@ export class Links {
     for (const system of systems) {
       const linked = instant.systems[system.name].linked;
       this.linked.set(system.name, linked);
+      this.arrays.set(system.name, instant.systems[system.name]);
       this.edges(system, (edge) => !linked || linked[edge] > 0.5);
     }
     this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
@@ -177,7 +193,7 @@ export class Links {
     context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
     context.beginPath();
     for (const [edge, [a, b]] of system.edges.entries()) {
-      if (!there(edge)) continue;
+      if (!there(edge) || !this.among(system, [a, b])) continue;
       const curve = this.curve(system, a - 1, b - 1);
       if (!curve) continue;
       const [from, bend, to] = curve;

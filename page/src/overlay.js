@@ -1,5 +1,6 @@
 // Drawn flat over the 3-D pane: labels, links, messages on their way, distances on the ground.
 import { line } from "./colours.js";
+import { isThere } from "./instant.js";
 import { Links } from "./links.js";
 import { colour } from "./theme.js";
 import { decimals, fixed, number } from "./words.js";
@@ -125,9 +126,10 @@ export class Overlay {
     const first = (/** @type {number} */ agent) =>
       this.isHighlighted(system, agent) || share(agent) > 1;
     const order = this.orders.get(system.name) ?? [];
+    const away = (/** @type {number} */ agent) => !isThere(instant.systems[system.name], agent);
     const urgent = order.filter(first);
     for (const agent of [...urgent, ...order.filter((each) => !first(each))])
-      this.label(system, agent, share(agent));
+      if (!away(agent)) this.label(system, agent, share(agent));
   }
 
   /**

@@ -1,6 +1,7 @@
 // On the ground under robots whose positions are decided: the region where they must stay, bounded
 // distances between them, discs that must not meet, and where they are heading (their outputs).
 import { ramp } from "./colours.js";
+import { isThere } from "./instant.js";
 import { THREE } from "./meshcat.js";
 import { colour } from "./theme.js";
 /** @import { Layout } from "./layout.js" */
@@ -128,6 +129,8 @@ export class Plan {
     for (const distance of this.distances) this.placeDistance(distance, own, layout);
     for (let agent = 0; agent < this.system.agents; agent++) {
       const [px, py] = layout.agentAt(this.system, agent);
+      for (const mesh of [this.discs[agent], this.leads[agent], this.marks[agent]])
+        if (mesh) mesh.visible = isThere(own, agent);
       this.discs[agent]?.position.set(px, py, level + STEP);
       this.placeOutput(agent, [px, py], own.action, instant.time, level);
     }
@@ -140,6 +143,7 @@ export class Plan {
    */
   placeDistance({ quantity, entry, pair: [a, b], strip }, own, layout) {
     const value = own[`quantity/${quantity.name}`]?.[entry] ?? NaN;
+    strip.visible = isThere(own, a - 1) && isThere(own, b - 1);
     const { bound, lower_bound: lower } = quantity.moving_bounds;
     const high = bound ? own[`quantity/${bound}`]?.[entry] : quantity.bound?.[entry];
     const low = lower ? own[`quantity/${lower}`]?.[entry] : quantity.lower_bound?.[entry];

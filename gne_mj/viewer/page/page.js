@@ -278,8 +278,10 @@
     "share",
     "margin",
     "estimate",
-    "linked"
+    "linked",
+    "there"
   ];
+  var isThere = (own, agent) => !own?.there || own.there[agent] > 0.5;
   var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
   var instantOfFrame = (pack, systems) => {
     const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
@@ -699,6 +701,7 @@
       this.lastPulse = /* @__PURE__ */ new Map();
       this.heads = /* @__PURE__ */ new Map();
       this.linked = /* @__PURE__ */ new Map();
+      this.arrays = /* @__PURE__ */ new Map();
     }
     /** Another scene. */
     begin() {
@@ -715,6 +718,7 @@
       if (!this.pulsing || !counts || document.hidden) return;
       const every = Math.max(1, Math.ceil(system.links.length / MANY));
       for (let link = 0; link < system.links.length; link += every) {
+        if (!this.among(system, system.links[link])) continue;
         const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
         if (passed + lost > 0) this.pulse(system, link, lost > 0, now, REST);
       }
@@ -738,10 +742,20 @@
       const linked = this.linked.get(system.name);
       for (let link = 0; link < system.links.length; link += every) {
         if (linked && !(linked[link >> 1] > 0.5)) continue;
+        if (!this.among(system, system.links[link])) continue;
         const key = `${system.name}/${link}`;
         if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - link * 617 % FLOW);
         this.pulse(system, link, false, now, FLOW);
       }
+    }
+    /**
+     * Whether both agents, from 1, are there.
+     * @param {System} system
+     * @param {[number, number]} pair
+     */
+    among(system, [a, b]) {
+      const own = this.arrays.get(system.name);
+      return isThere(own, a - 1) && isThere(own, b - 1);
     }
     get pulsing() {
       return this.shown && !reducedMotion();
@@ -807,6 +821,7 @@
       for (const system of systems) {
         const linked = instant.systems[system.name].linked;
         this.linked.set(system.name, linked);
+        this.arrays.set(system.name, instant.systems[system.name]);
         this.edges(system, (edge) => !linked || linked[edge] > 0.5);
       }
       this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
@@ -825,7 +840,7 @@
       context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
       context.beginPath();
       for (const [edge, [a, b]] of system.edges.entries()) {
-        if (!there(edge)) continue;
+        if (!there(edge) || !this.among(system, [a, b])) continue;
         const curve = this.curve(system, a - 1, b - 1);
         if (!curve) continue;
         const [from, bend, to] = curve;
@@ -963,9 +978,10 @@
       const share = (agent) => shares ? shares[agent] : NaN;
       const first = (agent) => this.isHighlighted(system, agent) || share(agent) > 1;
       const order = this.orders.get(system.name) ?? [];
+      const away = (agent) => !isThere(instant.systems[system.name], agent);
       const urgent = order.filter(first);
       for (const agent of [...urgent, ...order.filter((each) => !first(each))])
-        this.label(system, agent, share(agent));
+        if (!away(agent)) this.label(system, agent, share(agent));
     }
     /**
      * @param {System} system
@@ -7733,6 +7749,8 @@
       for (const distance of this.distances) this.placeDistance(distance, own, layout);
       for (let agent = 0; agent < this.system.agents; agent++) {
         const [px, py] = layout.agentAt(this.system, agent);
+        for (const mesh2 of [this.discs[agent], this.leads[agent], this.marks[agent]])
+          if (mesh2) mesh2.visible = isThere(own, agent);
         this.discs[agent]?.position.set(px, py, level + STEP2);
         this.placeOutput(agent, [px, py], own.action, instant.time, level);
       }
@@ -7744,6 +7762,7 @@
      */
     placeDistance({ quantity, entry, pair: [a, b], strip }, own, layout) {
       const value = own[`quantity/${quantity.name}`]?.[entry] ?? NaN;
+      strip.visible = isThere(own, a - 1) && isThere(own, b - 1);
       const { bound, lower_bound: lower } = quantity.moving_bounds;
       const high = bound ? own[`quantity/${bound}`]?.[entry] : quantity.bound?.[entry];
       const low = lower ? own[`quantity/${lower}`]?.[entry] : quantity.lower_bound?.[entry];
