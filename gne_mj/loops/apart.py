@@ -102,8 +102,8 @@ def in_order(problem, near, solver):
         problem.data, problem.graph, problem.settings, problem.limit, problem.equilibrium,
         problem.propagator, problem.schedule,
         Order(position, band, order.start, order.column, order.within), problem.faults,
-        problem.size, problem.separation, problem.ahead, problem.kept, problem.motion,
-        problem.functions, problem.parameter_block,
+        problem.size, problem.separation, problem.ahead, problem.kept, problem.model,
+        problem.motion, problem.functions, problem.parameter_block,
     )  # fmt: skip
 
 
