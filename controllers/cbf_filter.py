@@ -93,9 +93,9 @@ def action(game, problem, y, weights, memory, work, u):
         values[k] = bound
     for a in range(m):
         program.lower[a], program.upper[a] = -limit[a] - goal[a], limit[a] - goal[a]
-    give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
+    left = give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
     released(room)
-    return -1
+    return left
 
 
 @LAWS.register

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from gne_mj import game_functions as games
@@ -26,7 +25,7 @@ from gne_mj.controllers.held_program import nearest
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.programs import OWN, ProgramLaw, gradient_play
+from gne_mj.controllers.programs import OWN, ProgramLaw, gradient_play, told
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
@@ -73,10 +72,9 @@ def action(game, problem, y, weights, memory, work, u):
     games.values(data, data.all_constraints, y, bound)
     for k in range(len(bound)):  # of g + t, t the barrier's margin
         bound[k] = (1.0 - problem.settings[OWN]) * (bound[k] + data.tightening[k])
-    if nearest(problem, work, y, 0.0, goal, bound, u) <= 0:
-        u[0] = np.nan
+    left = told(nearest(problem, work, y, 0.0, goal, bound, u), u)
     released(room)
-    return -1
+    return left
 
 
 @LAWS.register

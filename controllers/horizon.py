@@ -22,6 +22,7 @@ from gne_mj.controllers.plant_model import outputs_at_knots
 from gne_mj.controllers.programs import linearised, solver_in
 from gne_mj.native import copy, kernel, released, reserved
 from gne_mj.quadratic_program import (
+    RELAXED,
     UNBOUNDED,
     VARIATIONAL,
     clear,
@@ -32,6 +33,7 @@ from gne_mj.quadratic_program import (
 from gne_mj.records import in_array
 
 PRICE = 1e4  # of a slack, in the costs' unit over the constraints'
+SLACK = 1e-9  # of a bound that is kept, in the constraints' unit
 MOST = 40  # programs for one plan
 AGREES = 1e-9  # plans whose inputs differ by less, beside their size, are the same
 
@@ -154,7 +156,8 @@ def write(problem, effort, plan, program):
 
 @kernel
 def first_input(problem, work, y, shape, effort, u):
-    """Fill u (m,) with the first input of the equilibrium plan; how the last program ended.
+    """Fill u (m,) with the first input of the equilibrium plan; how the last program ended, RELAXED
+    where a knot has a slack.
 
     Args:
         problem, work: of the run.
@@ -192,5 +195,8 @@ def first_input(problem, work, y, shape, effort, u):
         if moved <= AGREES * size:
             break
     copy(plan.u[0], u)
+    for j in range(knots):
+        if ended > 0 and program.x[knots * m + j] > SLACK:
+            ended = RELAXED
     released(room)
     return ended

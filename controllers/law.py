@@ -7,7 +7,8 @@ and ``now`` (:mod:`gne_mj.controllers.settings`). Laws that know the plant ask i
 
 =====================================================  =======================================
 ``action(game, problem, y, weights, memory, work, u)``  fills u; -1, or agent * p + constraint of
-                                                        the first estimate that is not inside
+                                                        the first estimate that is not inside, or
+                                                        RELAXED where bounds had to be soft
 ``rate(problem, y, memory, out)``                       fills the memory's rate
 ``propagate(problem, y, memory, scratch)``              the memory over a control period, y held
 ``storage(problem, memory)``                            the memory's part of the Lyapunov function

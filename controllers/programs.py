@@ -16,7 +16,9 @@ from gne_mj import game_functions as games
 from gne_mj import quadratic_program
 from gne_mj.controllers.law import Law, check_positive
 from gne_mj.controllers.settings import COUNT, GAIN
+from gne_mj.controllers.settings import RELAXED as BOUNDS_SOFT
 from gne_mj.native import kernel
+from gne_mj.quadratic_program import RELAXED
 
 # Entries of the settings behind the laws' numbers: DAQP's address, and the law's own
 SOLVER, OWN = COUNT, COUNT + 1
@@ -83,6 +85,16 @@ def solver_in(problem):
 
 @kernel
 def give(program, ended, goal, u):
-    """Fill u (m,) with goal + x, x the solution; not a number where there is none."""
+    """Fill u (m,) with goal + x, x the solution; not a number where there is none. What an action
+    returns."""
     for a in range(len(u)):
         u[a] = goal[a] + program.x[a] if ended > 0 else np.nan
+    return told(ended, u)
+
+
+@kernel
+def told(ended, u):
+    """What an action returns whose last program ended so; not a number where it has no solution."""
+    if ended <= 0:
+        u[0] = np.nan
+    return BOUNDS_SOFT if ended == RELAXED else -1

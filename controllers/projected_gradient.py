@@ -28,7 +28,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from gne_mj.controllers.held_program import nearest
@@ -44,6 +43,7 @@ from gne_mj.controllers.programs import (
     gradient_play,
     linearised,
     solver_in,
+    told,
 )
 from gne_mj.controllers.propagation import Propagator
 from gne_mj.controllers.table import LawTable
@@ -105,17 +105,17 @@ def action(game, problem, y, weights, memory, work, u):
     if period > 0.0:
         for k in range(p):
             bound[k] = 0.0
-        if nearest(problem, work, y, period, goal, bound, u) <= 0:
-            u[0] = np.nan
+        left = told(nearest(problem, work, y, period, goal, bound, u), u)
     else:
-        along(problem, y, goal, u)
+        left = along(problem, y, goal, u)
     released(room)
-    return -1
+    return left
 
 
 @kernel
 def along(problem, y, goal, u):
-    """Fill u (m,) with the direction nearest to goal (m,) that leads not outside."""
+    """Fill u (m,) with the direction nearest to goal (m,) that leads not outside; what an
+    action returns."""
     m, p, recovery = len(u), len(problem.data.tightening), problem.settings[OWN]
     room = reserved(program_length(m, p, 0, 0))
     program = program_in(room, 0, m, p, 0, 0)
@@ -128,8 +128,9 @@ def along(problem, y, goal, u):
             for a in range(m):
                 bound -= program.matrix[k, a] * goal[a]
         program.upper[k] = bound
-    give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
+    left = give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
     released(room)
+    return left
 
 
 @LAWS.register

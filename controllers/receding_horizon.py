@@ -18,14 +18,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from gne_mj.controllers.horizon import first_input
 from gne_mj.controllers.law import Law, check_positive
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.programs import OWN, ProgramLaw
+from gne_mj.controllers.programs import OWN, ProgramLaw, told
 from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
@@ -72,9 +71,7 @@ def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,); not a number where there is no plan."""
     numbers = problem.settings
     shape = int(numbers[OWN]), int(numbers[OWN + 1])
-    if first_input(problem, work, y, shape, numbers[OWN + 2], u) <= 0:
-        u[0] = np.nan
-    return -1
+    return told(first_input(problem, work, y, shape, numbers[OWN + 2], u), u)
 
 
 @LAWS.register

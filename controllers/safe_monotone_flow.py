@@ -78,9 +78,9 @@ def action(game, problem, y, weights, memory, work, u):
         for a in range(m):
             bound -= program.matrix[k, a] * goal[a]
         program.upper[k] = bound
-    give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
+    left = give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
     released(room)
-    return -1
+    return left
 
 
 @LAWS.register

@@ -19,6 +19,8 @@ COUNT = 12
 # It has no action there; it has one, but the run ends; it has one, and the run goes on
 NO_ACTION, ENDS, GOES_ON = 0.0, 1.0, 2.0
 
+RELAXED = -2  # what an action returns that cannot keep the bounds which the law is to keep
+
 
 class Now(Numbers):
     """What holds at an instant: a loop's ``work.now``."""

@@ -257,6 +257,10 @@ JUDGED = (
         long_name="when it was outside last",
     ),
     Variable(
+        "relaxed", ("run",), lambda runs: runs.monitors.relaxed.copy(),
+        long_name="evaluations of a law that had to make bounds soft",
+    ),
+    Variable(
         "settling_time", ("run",), lambda runs: run_metrics.settling_time(runs.time, runs.distance),
         unit="s", long_name="until max |y - y*| stays within 2% of its start",
         panel=Panel("settling time", log=False, worst="max"),

@@ -82,6 +82,7 @@ def report(game: Game, monitor: Any, goes_on: bool) -> dict[str, Any]:
         "exits": int(found["exits"]),
         "constraint": game.constraint_names[index] if was else None,
         "time": float(when[index]) if was else None,
+        "relaxed": int(monitor.relaxed),
         "at_end": bool(was and found["until"] >= monitor.time),
     }
 

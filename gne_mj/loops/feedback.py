@@ -7,7 +7,7 @@ import numpy as np
 from gne_mj import game_functions as games
 from gne_mj.controllers.kept import EVERYTHING, KeptData
 from gne_mj.controllers.propagation import Propagator, scratch_length
-from gne_mj.controllers.settings import OUTSIDE, RHO, Now
+from gne_mj.controllers.settings import OUTSIDE, RELAXED, RHO, Now
 from gne_mj.game_model import GameData
 from gne_mj.graph import GraphData
 from gne_mj.loops import division, functions
@@ -201,6 +201,8 @@ def explicit_law(problem, time, stage, y, memory, work, monitor):
         code = watch.ESTIMATE_LEFT if np.isfinite(value) else watch.DIVERGED
         watch.leave(monitor, code, time, agent, constraint, value, stage)
         return False
+    if left == RELAXED:
+        monitor.relaxed += 1.0
     return usable(time, stage, work, monitor)
 
 

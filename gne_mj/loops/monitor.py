@@ -32,6 +32,7 @@ class MonitorNumbers(Numbers):
     saturated_time: float  # when that was first
     saturated_action: float
     saturated_command: float
+    relaxed: float  # evaluations of a law whose bounds were soft, nothing keeping them all
     exit_between: float  # 1: the exit was not at a control instant
     # Runs that go on outside the set, see gne_mj.loops.outside
     exits: float  # how often it went outside
