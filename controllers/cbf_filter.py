@@ -104,7 +104,7 @@ class CbfFilterController(LawTable):
 
     information: Literal["cbf-filter"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0, 4.0), "alpha": (0.3, 1.0, 3.0, 10.0, 30.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0, 8.0), "alpha": (0.5, 2.0, 8.0, 32.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of gradient play")
     alpha: Annotated[float, Unit("1/s")] = Field(

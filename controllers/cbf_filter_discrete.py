@@ -83,7 +83,7 @@ class DiscreteCbfFilterController(LawTable):
 
     information: Literal["discrete-cbf-filter"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0, 4.0), "alpha": (0.01, 0.03, 0.1, 0.3, 1.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0, 8.0), "alpha": (0.02, 0.1, 0.3, 1.0)}
     )
     mode: Annotated[str, MODES] = Field("sampled", description="only 'sampled': once a period")
     gain: float = Field(1.0, gt=0, description="k of gradient play")

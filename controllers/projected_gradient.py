@@ -139,7 +139,7 @@ class ProjectedGradientController(LawTable):
 
     information: Literal["projected-gradient"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
-        {"gain": (0.5, 1.0, 2.0, 4.0), "recovery": (1.0, 3.0, 10.0, 30.0)}
+        {"gain": (0.5, 1.0, 2.0, 4.0, 8.0), "recovery": (1.0, 3.0, 10.0, 30.0)}
     )
     gain: float = Field(1.0, gt=0, description="k of gradient play")
     recovery: Annotated[float, Unit("1/s")] = Field(
