@@ -13,7 +13,9 @@ import xarray
 from scipy.optimize import brentq
 
 import gne_mj
+from gne_mj.barrier import LogBarrier
 from gne_mj.cli import main
+from gne_mj.user_files import load_module
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 COMMAND = Path(sys.executable).with_name("gne-mj")
@@ -339,3 +341,19 @@ def test_a_kernel_law_must_not_pass_for_another(copied, tmp_path, capsys, monkey
     assert "needs a kernel named storage" in refused(capsys, monkeypatch, tmp_path, *arguments)[1]
     path.write_text(text.replace("    return Damped(gains, damping, tau)", "    return 3"))
     assert "must return a Law" in refused(capsys, monkeypatch, tmp_path, *arguments)[1]
+
+
+def test_a_relaxed_barrier_is_the_barrier_where_there_is_slack_and_goes_on_smoothly():
+    law = load_module(EXAMPLES / "law" / "relaxed_plain.py")
+    game = gne_mj.load_scenario("desired-velocity").system_objects()[0].game
+    y, none = np.array([3.1, 3.2, 3.3, 3.2, 3.1]), np.zeros(0)
+    expected = game.pseudo_gradient(y) + LogBarrier(game, 0.2).gradient(y)
+    assert np.allclose(law.action(game, 0.2, y, none, 1.5, 1e-3), -1.5 * expected, atol=1e-12)
+    near = [law.action(game, 0.2, y, none, 1.0, -game.constraints(y)[0] * (1 + e))
+            for e in (-1e-9, 1e-9)]  # fmt: skip
+    assert np.allclose(*near, atol=1e-7)
+    outside = np.array([9.0, 3.0, 3.0, 3.0, 3.0])
+    pushed = law.action(game, 0.2, outside, none, 1.0, 0.1) + game.pseudo_gradient(outside)
+    assert pushed[0] < -100.0
+    assert law.ACTS_OUTSIDE
+    assert set(law.TUNED) == {"gain", "width"}
