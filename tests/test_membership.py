@@ -248,6 +248,19 @@ def test_an_interval_is_a_run_of_its_own_to_the_bit(law, engine, mode):
     assert np.all(np.isnan(state[-1][2]))
 
 
+def test_positions_beside_a_reference_that_moves_go_on_in_mujoco_where_they_are():
+    leaving = {"changes": [{"time": 0.2, "leaves": [3]}], "away": 0.0}
+    parts = {"agents.contacts": False, "simulation.duration": 0.4}
+    runs = [
+        gne_mj.run("formation", parts, engine=each, membership=leaving)
+        for each in ("ode", "mujoco")
+    ]
+    twin, robots = (run.data["action"].values for run in runs)
+    assert np.any(runs[0].system.agents.parameters[:, 7] != 0.0)
+    assert_allclose(robots, twin, rtol=0, atol=1e-9)
+    assert all(run.holds for run in runs)
+
+
 def test_what_was_measured_is_of_the_whole_run():
     """Against rows of every step."""
     changes = [

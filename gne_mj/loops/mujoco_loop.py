@@ -102,7 +102,7 @@ class MujocoLoop(ClosedLoop):
     def start_at(self, step: int) -> None:
         """See the base class."""
         self._progress.step = self._progress.work.memory_step = step
-        self.plant.data.time = self.time
+        self.plant.go_to_time(self.time)
 
     def _adopt(self, setup: Setup) -> None:
         self._parameter_block = mujoco_parameter_block(

@@ -82,6 +82,10 @@ class FleetPlant(Plant):
         What MuJoCo derives from them (``mj_setConst``) is not among them.
         """
 
+    def go_to_time(self, time: float) -> None:
+        """Let it be another time in s; what is told of the state stays."""
+        self.data.time = time
+
     @abstractmethod
     def refresh(self) -> None:
         """Bring up to date what is read and of the last step's start."""

@@ -99,5 +99,11 @@ class PositionPlant(MujocoPlant):
         state[:, 2] += self._reference
         super().reset(state)
 
+    def go_to_time(self, time: float) -> None:
+        """See the base class: robots are where the reference is then."""
+        qpos, _ = self._joints
+        self.data.qpos[qpos] += self._reference * (time - self.data.time)
+        super().go_to_time(time)
+
 
 PLANT = PositionPlant
