@@ -370,9 +370,9 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         long_name="whether the two agents hear each other", page="behind", batch=False,
     ),
     Variable(
-        "messages", ("time", "agent"), _messages,
+        "sent_message", ("time", "agent"), _messages,
         there=lambda system: triggered(system.faults), unit="",
-        long_name="messages of each agent that came over links so far", figure=True, page="line",
+        long_name="messages sent so far", figure=True, page="line",
     ),
     Variable(
         "there", ("time", "agent"), _there, there=lambda system: system.membership is not None,

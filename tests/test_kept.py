@@ -288,3 +288,23 @@ def test_it_is_shown_and_shown_again(run, tmp_path):
         values = trajectory["robots"]["estimate"].values
         np.testing.assert_allclose(found["robots/estimate"], values, atol=1e-3)
         assert meta["systems"][0]["kept"] == {"by": [2, 3, 4, 5], "action": [0, 1, 2, 3]}
+
+
+@pytest.mark.parametrize("more", [
+    {"estimates": "needed"},
+    {"communication": {"type": "event", "threshold": 0.1, "decay": 0.2}},
+])  # fmt: skip
+def test_batches_have_the_bits_of_runs_alone(tmp_path, more):
+    controller = {"information": "partial", "mode": "sampled", "coupling": 3.0, **more}
+    scenario = gm.load_scenario("velocity-sync", {
+        "agents": {"type": "integrator", "count": 5}, "controller": controller,
+        "plant.engine": "ode", "simulation.duration": 0.5,
+    })  # fmt: skip
+    found = gm.batch(scenario, {"barrier.rho": [0.1, 0.4]}, runs=2, out=tmp_path / "batch")
+    for rho, start, last in zip(
+        found["barrier.rho"].values, found["initial_action"].values, found["final_action"].values,
+        strict=True,
+    ):  # fmt: skip
+        changes = {"initial.action": start.tolist(), "barrier.rho": float(rho)}
+        alone = gm.run(scenario, changes)["robots"]["action"].values[-1]
+        np.testing.assert_array_equal(last, alone)

@@ -386,8 +386,8 @@ def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
     assert meta["systems"][2]["kept"] is None
     assert events["triggered"] is True
     assert events["message_period"] is None
-    (messages,) = (each for each in events["quantities"] if each["name"] == "messages")
+    (messages,) = (each for each in events["quantities"] if each["name"] == "sent_message")
     assert messages["labels"] == ["1", "2", "3"]
-    counted = found["events/quantity/messages"]
+    counted = found["events/quantity/sent_message"]
     assert np.all(np.diff(counted, axis=0) >= 0.0)
     assert np.sum(counted[-1]) == trajectory.reports["events"]["messages"]["sent"] > 0
