@@ -4,8 +4,9 @@ u_i = -dJ_i/dy_i(y) - dphi/dy_i(y). A static law: it has no memory.
 """
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -91,6 +92,9 @@ class FullController(LawTable):
     """All actions are measured [eq:nonlinFIfeedback]"""
 
     information: Literal["full"]
+    tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
+        {"barrier.rho": (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)}
+    )
 
     def build(self, game: Game) -> Law:
         """The law."""

@@ -10,8 +10,9 @@ agents keep only the estimates that matter, kernels and memory are those of
 """
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -275,6 +276,9 @@ class DistributedController(EstimatesTable):
     """Neighbours' messages and nothing else [eq:CenterFeedback]"""
 
     information: Literal["distributed"]
+    tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
+        {"epsilon": (0.003, 0.01, 0.03), "gain": (0.1, 0.3, 1.0), "barrier.rho": (0.01, 0.1)}
+    )
     epsilon: Annotated[float, Unit("s")] = Field(
         gt=0, description="time constant of estimates and z"
     )

@@ -13,8 +13,9 @@ keep only those that matter, what :mod:`gne_mj.controllers.kept` has, and the ke
 """
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -187,6 +188,9 @@ class PartialController(EstimatesTable):
     """Costs at estimates that neighbours exchange [eq:nonlinearPIFeedback]"""
 
     information: Literal["partial"]
+    tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
+        {"coupling": (1.0, 3.0, 10.0, 30.0), "barrier.rho": (0.003, 0.01, 0.03, 0.1)}
+    )
     coupling: float = Field(1.0, gt=0, description="c; the paper has 1")
     time_constant: Annotated[float, Unit("s")] = Field(
         1.0, gt=0, description="tau of the estimates; the paper has 1"

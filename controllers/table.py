@@ -22,7 +22,8 @@ class LawTable(Table):
     """A law and how it acts.
 
     Attributes:
-        tuned: its gains, each with the values that a comparison of laws may choose among.
+        tuned: its gains, each with the values that a comparison of laws may choose among; at most
+            three of its keys, or dotted keys of the system as ``barrier.rho``.
     """
 
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})

@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from gne_mj.batches import open_batch
     from gne_mj.batches import run_batch as batch
     from gne_mj.changing_graph import disc, switching
+    from gne_mj.comparison import compare
     from gne_mj.environment import load_environment
     from gne_mj.expressions import band, fixed, game, private
     from gne_mj.game_model import Game
     from gne_mj.graph import Graph, complete, line, ring, star
     from gne_mj.interface import (
-        Comparison,
         Figures,
         Run,
+        Variations,
         bias,
         cbf_filter,
         certify,
         check,
-        compare,
         custom_agents,
         discrete_cbf_filter,
         estimate_corruption,
@@ -62,6 +62,7 @@ if TYPE_CHECKING:
         setup,
         silence,
         solve,
+        vary,
         view,
     )
     from gne_mj.scenario import Scenario, load_scenario, scenario_of
@@ -73,7 +74,6 @@ __version__ = version("gne-mj")
 
 __all__ = [
     "Clock",
-    "Comparison",
     "Figures",
     "Game",
     "Graph",
@@ -83,6 +83,7 @@ __all__ = [
     "Simulation",
     "System",
     "Trajectory",
+    "Variations",
     "__version__",
     "band",
     "batch",
@@ -137,6 +138,7 @@ __all__ = [
     "solve",
     "star",
     "switching",
+    "vary",
     "view",
 ]
 
@@ -153,6 +155,7 @@ _PLACES = {
     "Trajectory": "gne_mj.trajectory",
     "band": "gne_mj.expressions",
     "batch": "gne_mj.batches",
+    "compare": "gne_mj.comparison",
     "complete": "gne_mj.graph",
     "disc": "gne_mj.changing_graph",
     "fixed": "gne_mj.expressions",

@@ -32,8 +32,8 @@ class Outside(NamedTuple):
 def parts_of_bounds(game: Game, g: Array) -> Array:
     """How far constraints' values (..., p) are beyond bounds, as part of the bound; 0.1 is 10%.
 
-    Of a bound on a gap it is the gap's; else g over -g(0), which is b of a y <= b. Not a number of
-    constraints that have no such bound (as y >= 0), and of games that move.
+    Of a bound on a gap it is the gap's; else g over |g(0)|, which is |b| of a y <= b. Not a number
+    of constraints that have no such bound (as y >= 0), and of games that move.
     """
     bounds = game.gap_bounds
     if motion_of(game) is not None:
@@ -41,7 +41,7 @@ def parts_of_bounds(game: Game, g: Array) -> Array:
     if bounds is not None:
         return np.asarray(np.sqrt(np.maximum(g + bounds**2, 0.0)) / bounds - 1.0)
     with np.errstate(all="ignore"):
-        bound = -game.constraints(np.zeros(game.actions))
+        bound = np.abs(game.constraints(np.zeros(game.actions)))
         known = np.isfinite(bound) & (bound > 0.0)
         return np.where(known, g / np.where(known, bound, 1.0), np.nan)
 

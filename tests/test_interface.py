@@ -133,7 +133,7 @@ def test_a_graph_is_its_edges_in_a_table():
         (lambda: gm.setup("velocity-snyc"), "did you mean 'velocity-sync'?"),
         (lambda: GAME.changed(bugdet=3.0), "did you mean 'budget'?"),
         (lambda: gm.setup(GAME, {"game.object": "game 0"}).system_objects(), "another Python proc"),
-        (lambda: gm.compare(GAME, {"rho": 0.1}), "its values must be a list"),
+        (lambda: gm.vary(GAME, {"rho": 0.1}), "its values must be a list"),
         (lambda: gm.solve("paper"), "name one of robots, channels"),
     ],
 )  # fmt: skip
@@ -253,10 +253,10 @@ def test_solve_certify_and_check_take_what_there_is():
     assert gm.check(GAME).holds
 
 
-def test_a_comparison_is_a_small_table():
+def test_variations_are_a_small_table():
     scenario = gm.setup(GAME, **SHORT)
     seen = []
-    found = gm.compare(
+    found = gm.vary(
         scenario, {"law": [gm.full_information(), gm.partial_information()], "rho": [0.1, 0.01]},
         progress=lambda number, of: seen.append((number, of)),
     )  # fmt: skip

@@ -176,7 +176,7 @@ SHORT = {"plant.engine": "ode", "simulation.duration": 5.0}
         ("a run of 5 s", lambda out, asked: gm.run("velocity-sync", SHORT, progress=asked)),
         (
             "2 runs, 10 s of them together",
-            lambda out, asked: gm.compare(
+            lambda out, asked: gm.vary(
                 "velocity-sync", {"rho": [0.1, 0.2]}, SHORT, progress=asked
             ),
         ),
@@ -188,7 +188,7 @@ SHORT = {"plant.engine": "ode", "simulation.duration": 5.0}
             ),
         ),
     ],
-    ids=["run", "compare", "batch"],
+    ids=["run", "vary", "batch"],
 )  # fmt: skip
 def test_programs_ask_for_it(words, run, clock, monkeypatch, capsys, tmp_path):
     """Whatever takes however long: nothing is told unless ``progress`` is True."""

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gne_mj.batches.sweep import Sweep
 from gne_mj.bounds import MOST_RECORDED, MOST_RUNS, check_room
+from gne_mj.equilibrium import middle
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
 from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.starts import random_starts, separated_starts
@@ -34,6 +35,7 @@ _NOT_SWEPT = {
     "recording.period": "all runs of a batch share their sample times",
     "description": "it changes nothing",
 }
+EQUILIBRIUM, MIDDLE = "equilibrium", "middle"  # what random starts lie around
 _CHUNK_RUNS = 256
 _CHUNK_BYTES = 2**27  # of rows in memory
 _CHECK = 1  # which random numbers say what is checked
@@ -71,6 +73,8 @@ class Plan:
         starts: random interior starts of each combination; 0 for the scenario's own start.
         seed: from which the starts' seeds follow.
         spread: how far towards the boundary random starts lie, between 0 and 1.
+        about: what they lie around: "equilibrium", the penalised one, or "middle", that of the set
+            as found from the scenario's own start, which depends neither on law nor on penalty.
         record: every which sample is kept; 0 for summaries only.
         chunk: runs that are stored together; chosen if 0.
         check_in_mujoco: the share of runs, on engine "ode", that are made in MuJoCo too; from 0
@@ -82,6 +86,7 @@ class Plan:
     starts: int = 0
     seed: int = 0
     spread: float = 0.9
+    about: str = EQUILIBRIUM
     record: int = 0
     chunk: int = 0
     check_in_mujoco: float = 0.0
@@ -93,6 +98,8 @@ class Plan:
             raise InvalidInput("seed", self.seed, "it must not exceed 2^53")
         if not isinstance(self.spread, int | float) or not 0.0 < self.spread < 1.0:
             raise InvalidInput("spread", self.spread, "it must lie between 0 and 1, without them")
+        if self.about not in (EQUILIBRIUM, MIDDLE):
+            raise InvalidInput("about", self.about, f"it must be '{EQUILIBRIUM}' or '{MIDDLE}'")
         share = self.check_in_mujoco
         if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
             raise InvalidInput("check_in_mujoco", share, "it must lie between 0 and 1")
@@ -261,12 +268,12 @@ class Plan:
         assert system is not None
         if not self.starts:
             return np.tile(system.start, (len(starts), 1))
-        middle = system.centre
+        around = self._middle(system)
         seeds = self.seeds[list(starts)].tolist()
         if system.separation is not None:
             with part_of(f"systems.{self.name}"):
-                return separated_starts(system.game, middle, seeds, self.spread, system.separation)
-        return random_starts(system.game, middle, seeds, self.spread)
+                return separated_starts(system.game, around, seeds, self.spread, system.separation)
+        return random_starts(system.game, around, seeds, self.spread)
 
     def positions(
         self, combination: Combination, starts: Sequence[int]
@@ -282,7 +289,11 @@ class Plan:
         if not self.starts or resting:
             return [None] * len(starts)
         seeds = [(int(seed), 1) for seed in self.seeds[list(starts)]]
-        return list(random_starts(system.game, system.centre, seeds, self.spread))
+        return list(random_starts(system.game, self._middle(system), seeds, self.spread))
+
+    def _middle(self, system: System) -> NDArray[np.float64]:
+        """What random starts lie around, (m,)."""
+        return system.centre if self.about == EQUILIBRIUM else middle(system.game, system.start)
 
     def alone(self, run: int) -> Scenario:
         """The scenario of one run, with its start and seed written out.
@@ -314,6 +325,7 @@ class Plan:
             "runs": self.starts,
             "seed": self.seed,
             "spread": self.spread,
+            **({"about": self.about} if self.about != EQUILIBRIUM else {}),
             "record": self.record,
             "chunk": self.chunk,
             **({"check_in_mujoco": self.check_in_mujoco} if self.check_in_mujoco else {}),
@@ -330,6 +342,7 @@ class Plan:
             starts=manifest["runs"],
             seed=manifest["seed"],
             spread=manifest["spread"],
+            about=manifest.get("about", EQUILIBRIUM),
             record=manifest["record"],
             chunk=manifest["chunk"],
             check_in_mujoco=manifest.get("check_in_mujoco", 0.0),

@@ -15,7 +15,6 @@ from gne_mj.interface.agents import (
     planar_robots,
 )
 from gne_mj.interface.analyses import certify, check, solve
-from gne_mj.interface.comparison import Comparison, compare
 from gne_mj.interface.faults import (
     bias,
     estimate_corruption,
@@ -45,16 +44,16 @@ from gne_mj.interface.rivals import (
 )
 from gne_mj.interface.running import Run, run, setup
 from gne_mj.interface.show import Figures, plot, view
+from gne_mj.interface.variations import Variations, vary
 
 __all__ = [
-    "Comparison",
     "Figures",
     "Run",
+    "Variations",
     "bias",
     "cbf_filter",
     "certify",
     "check",
-    "compare",
     "custom_agents",
     "discrete_cbf_filter",
     "estimate_corruption",
@@ -88,5 +87,6 @@ __all__ = [
     "setup",
     "silence",
     "solve",
+    "vary",
     "view",
 ]

@@ -189,6 +189,10 @@ class SystemTable(Table):
         game, agents = self._parts(simulation)
         with part_of("controller"):
             law = self.controller.build(game)
+        if self.margin and not (MODES[self.controller.mode].promises or law.acts_outside):
+            raise InvalidInput(
+                "margin", "given", "it is for mode 'implicit', where a margin is a promise"
+            )
         check_estimates(game, law)
         if at is None:
             state, memory = self._start(game, agents, law)
@@ -319,10 +323,6 @@ class SystemTable(Table):
                 "margin",
                 "given",
                 f"no margin is known for a game that moves (game.{self.game.moving[0]})",
-            )
-        if not MODES[self.controller.mode].promises:
-            raise InvalidInput(
-                "margin", "given", "it is for mode 'implicit', where a margin is a promise"
             )
         period = simulation.control_period or simulation.timestep
         with named(period="simulation.control_period", observer="controller.observer"):

@@ -21,7 +21,7 @@ MOST = 100  # runs; more are a batch
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison:
+class Variations:
     """Runs of one set-up that differ in a few values.
 
     Attributes:
@@ -70,21 +70,22 @@ def _row(report: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @answering
-def compare(
+def vary(
     source: Source,
-    vary: Mapping[str, Sequence[Any]],
+    values: Mapping[str, Sequence[Any]],
     changes: Mapping[str, Any] | None = None,
     *,
     progress: Callable[[int, int], None] | bool = False,
-) -> Comparison:
+) -> Variations:
     """Run all combinations of a few values, and put the runs beside each other.
 
     >>> laws = [gne_mj.full_information(), gne_mj.partial_information("ring")]
-    >>> gne_mj.compare("velocity-sync", {"law": laws, "rho": [0.1, 0.01]})
+    >>> gne_mj.vary("velocity-sync", {"law": laws, "rho": [0.1, 0.01]})
 
     Args:
         source: a scenario, or a game.
-        vary: dotted keys, or the names that :func:`gne_mj.setup` has for parts, with their values.
+        values: dotted keys, or the names that :func:`gne_mj.setup` has for parts, each with a list
+            of values.
         changes: of all runs.
         progress: True to tell on stderr how long it takes and how far it is, as commands do; or
             what is called before each run with its number, from 0, and how many there are.
@@ -92,13 +93,13 @@ def compare(
     Raises:
         InvalidInput: names the key, the value and what would be right; before anything is run.
     """
-    for key, values in vary.items():
-        if isinstance(values, str | bytes | Mapping) or not isinstance(values, Sequence):
-            raise InvalidInput(f"vary.{key}", values, "its values must be a list")
-    combinations = [dict(zip(vary, values, strict=True)) for values in product(*vary.values())]
+    for key, each in values.items():
+        if isinstance(each, str | bytes | Mapping) or not isinstance(each, Sequence):
+            raise InvalidInput(f"values.{key}", each, "its values must be a list")
+    combinations = [dict(zip(values, each, strict=True)) for each in product(*values.values())]
     if not 0 < len(combinations) <= MOST:
         raise InvalidInput(
-            "vary", f"{len(combinations)} runs", f"there must be 1 to {MOST}; more are a batch"
+            "values", f"{len(combinations)} runs", f"there must be 1 to {MOST}; more are a batch"
         )
     base = load_scenario(source, changes)
     scenarios = [load_scenario(base, part_changes(source, each)) for each in combinations]
@@ -114,7 +115,7 @@ def compare(
             runs.append(run_scenario(scenario, _within(tell, done, total, words)))
             done += scenario.clock().duration
     varied = tuple({key: _words(value) for key, value in each.items()} for each in combinations)
-    return Comparison(varied, tuple(runs))
+    return Variations(varied, tuple(runs))
 
 
 def _within(tell: Tell, done: float, total: float, words: str) -> Callable[[float], None]:
