@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from test_view_browser import opened, origins, quiet, seek, until
+from test_view_browser import opened, origins, quiet, seek, session, until
 
 import gne_mj
 from gne_mj.viewer import serve
@@ -133,3 +133,37 @@ def test_the_closest_approach_is_found(shown, paper):
     assert end - begin == pytest.approx(0.08 * 4)
     marks = shown.locator("#time-marks button")
     assert "channels: closest approach" in marks.nth(1).get_attribute("aria-label")
+
+
+SIZES = ((390, 844), (720, 450), (900, 600), (1440, 900), (1920, 1080))
+ON_TOP = """selector => {
+    const own = document.querySelector(selector)
+    own.scrollIntoView({ block: "nearest" })
+    const box = own.getBoundingClientRect()
+    const found = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2)
+    return own.contains(found) || own.parentElement === found
+}"""
+
+
+def test_nothing_covers_anything_at_any_size(page, recorded):
+    with session() as live:
+        opened(page, live.server.url)
+        page.evaluate("document.getElementById('tuning').open = true")
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            page.evaluate("() => new Promise(resolve => requestAnimationFrame(resolve))")
+            assert page.locator("#time-track").bounding_box()["width"] > 150
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+            assert page.locator("#view").bounding_box()["height"] >= 150
+            for part in ("#legend", "#plots figure figcaption", "#plots .chart", "#tuning-body",
+                         "#tools", "#play", "#fold"):  # fmt: skip
+                assert page.evaluate(ON_TOP, part), (width, part)
+        quiet(recorded, *origins(live.server))
+
+
+def test_fit_shows_everything_after_one_was_followed(shown):
+    shown.locator("#follow").select_option(index=2)
+    assert shown.evaluate("window.gne.state().follow.kind") == "agent"
+    shown.locator("#fit").click()
+    assert shown.evaluate("window.gne.state().follow.kind") == "fleet"
+    assert shown.locator("#follow").input_value() == "fleet"

@@ -238,9 +238,13 @@ def test_of_a_dragged_slider_only_the_last_value_counts():
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("systems.robots.game.reference_velocity", 30.0, "Refused: at the present outputs"),
-        ("systems.robots.barrier.rho", -1.0, "systems.robots.barrier.rho: got -1.0"),
-        ("systems.robots.barrier.rho", "much", "systems.robots.barrier.rho: got 'much'"),
+        (
+            "systems.robots.game.reference_velocity",
+            30.0,
+            "robots, reference v₀: at the present outputs constraint",
+        ),
+        ("systems.robots.barrier.rho", -1.0, "robots, penalty ρ: got -1.0"),
+        ("systems.robots.barrier.rho", "much", "robots, penalty ρ: got 'much'"),
         ("systems.robots.barrier.rho", float("nan"), "it must be a finite number"),
         ("simulation.timestep", 1.0, "key: got 'simulation.timestep'"),
         (None, 1.0, "this scenario has no such slider"),
@@ -264,13 +268,13 @@ def test_what_counts_is_where_the_outputs_are_now():
     with watched(changes={**ODE, "simulation.duration": 100.0}) as (session, page):
         session._move(15_000)
         page.ask(do="set", key="systems.robots.game.reference_velocity", value=-1.0)
-        assert "Refused" in page.errors[-1]
+        assert "at the present outputs" in page.errors[-1]
         assert "g = 7" in page.errors[-1]  # (3 + 1)^2 - 9
         page.ask(do="set", key="systems.robots.game.reference_velocity", value=5.0)
         assert len(page.errors) == 1
         assert session.simulation.systems[0].game.parameters[0] == 5.0
         page.ask(do="restart")
-        assert "initial velocity" in page.errors[-1]  # and the run goes on
+        assert page.errors[-1].endswith("set back robots, reference v₀ to 3 (now 5)")
         session._move(10)
         assert session.simulation.time > 30.0
 
@@ -290,12 +294,11 @@ def test_no_slider_drives_a_run_out_of_its_set(scenario, system, moves, refused)
         for time, rho in moves:
             session._move(session.simulation.clock.steps(time - session.simulation.time))
             page.ask(do="set", key=key, value=rho)
-        assert [text.split(",")[0] for text in page.errors] == [
-            f"{key}: got {rho}" for rho in refused
-        ]
+        assert [text.split(",")[0] for text in page.errors] == [f"{system}" for rho in refused]
         for text in page.errors:
             assert "with it the run would end in 0." in text
-            assert text.endswith("s as 'left_feasible_set'")
+            assert f"penalty ρ: got {refused[0]}" in text
+            assert "s as 'left_feasible_set'; it stays at " in text
         taken = [rho for _, rho in moves if rho not in refused]
         assert [done["value"] for done in session.simulation.interventions] == taken
         assert session.simulation.systems[0].rho == session._values[key] == taken[-1]

@@ -13,7 +13,7 @@ import numpy as np
 from meshcat import Visualizer
 
 from gne_mj.certificate import status_now
-from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, part_of
+from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, Refusal, part_of
 from gne_mj.scenario import Scenario, as_done, load_scenario
 from gne_mj.simulation import SystemRun
 from gne_mj.system import System, mode_of
@@ -203,7 +203,8 @@ class Session:
             try:
                 self._do(message, browser)
             except GneError as error:
-                self._notice(_complaint(error), browser)
+                key = str(message.get("key", ""))
+                self._notice(self._words(error, self._controls.get(key)), browser, about=key)
             except Exception as error:  # no message may end a run
                 self._notice(f"This failed: {type(error).__name__}: {error}", browser)
         if asked:
@@ -253,9 +254,27 @@ class Session:
         try:
             scenario.system_objects()
         except InfeasibleStart as error:  # the run goes on
-            self._notice(str(error))
+            self._notice(f"It cannot begin so: {_rest(error, 'at the start')}; {self._set_back()}")
             return
         self._next = scenario
+
+    def _set_back(self) -> str:
+        """Which sliders to set back, in words."""
+        moved = [
+            f"{each.system}, {each.label} to {each.value:.4g} (now {self._values[key]:.4g})"
+            for key, each in self._controls.items()
+            if self._values[key] != each.value
+        ]
+        return f"set back {', or '.join(moved)}"
+
+    def _words(self, error: GneError, control: Control | None) -> str:
+        """What is refused, in one sentence with the page's words."""
+        if control is None:
+            return str(error)
+        stays = f"it stays at {self._values[control.key]:.4g}"
+        return (
+            f"{control.system}, {control.label}: {_rest(error, 'at the present outputs')}; {stays}"
+        )
 
     def _set_speed(self, value: Any) -> None:
         if value is not None:
@@ -341,8 +360,12 @@ class Session:
         self.server.tell({"kind": "controls", "values": self._values}, browser)
         self._tell_interventions(browser)
 
-    def _notice(self, text: str, browser: Browser | None = None, *, level: str = "error") -> None:
-        self.server.tell({"kind": "notice", "level": level, "text": text}, browser)
+    def _notice(
+        self, text: str, browser: Browser | None = None, *, level: str = "error", about: str = ""
+    ) -> None:
+        """Say something; of what is ``about`` the same the page shows the last sentence only."""
+        message = {"kind": "notice", "level": level, "text": text, "about": about or text}
+        self.server.tell(message, browser)
 
     def _history(self) -> bytes:
         """What was recorded so far, for the plots."""
@@ -444,11 +467,11 @@ def _number(key: Any, value: Any) -> float:
     return number
 
 
-def _complaint(error: GneError) -> str:
-    """One sentence for the page."""
+def _rest(error: GneError, where: str) -> str:
+    """What an error says, without the key of the scenario's file; where a constraint is broken."""
     if isinstance(error, InfeasibleStart):
         return (
-            f"Refused: at the present outputs constraint '{error.constraint}' would have"
-            f" g = {error.value:.4g}, which must be negative."
+            f"{where} constraint '{error.constraint}' would have g = {error.value:.4g},"
+            " which must be negative"
         )
-    return str(error)
+    return error.about if isinstance(error, Refusal) else str(error)

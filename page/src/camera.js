@@ -88,7 +88,6 @@ export class Camera {
 
   fit() {
     if (!this.layout.known) return;
-    if (this.follow.kind !== "agent") this.follow = { kind: "fleet" };
     const target = this.followed();
     const direction = this.defaultDirection();
     const near = this.follow.kind === "agent" ? 6 : this.fitDistance(direction, target);

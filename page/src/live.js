@@ -199,7 +199,7 @@ export class Live {
 
   /** @param {any} message */
   hear(message) {
-    if (message.kind === "notice") notify(message.text, message.level);
+    if (message.kind === "notice") notify(message.text, message.level, message.about);
     else if (message.kind === "controls") this.listener.controls(message.values);
     else if (message.kind === "interventions") this.interventions = message.done;
   }

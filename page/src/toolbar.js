@@ -94,6 +94,12 @@ export class Toolbar {
     );
   }
 
+  /** Everything in view again, whatever was followed. */
+  fit() {
+    byId("follow").value = "fleet";
+    this.setFollow("fleet");
+  }
+
   /** @param {string} value of an option */
   setFollow(value) {
     const { camera } = this.scene;

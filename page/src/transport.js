@@ -38,6 +38,7 @@ export class Transport {
     const lost = live !== null && !live.connected;
     for (const button of [this.play, byId("step"), this.speed]) button.disabled = !seekable && lost;
     byId("back").disabled = !seekable;
+    byId("step").title = seekable ? "A sample on (→; with shift 1 s)" : "A step on, then pause (→)";
     const restart = byId("restart");
     restart.disabled = lost;
     restart.title = live ? "Restart the simulation (R)" : "To the start (R)";

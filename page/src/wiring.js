@@ -14,7 +14,7 @@ export const wire = (page) => {
     ArrowRight: (/** @type {KeyboardEvent} */ { shiftKey }) => page.step(1, shiftKey),
     ArrowLeft: (/** @type {KeyboardEvent} */ { shiftKey }) => page.step(-1, shiftKey),
     r: () => page.restart(),
-    f: () => scene.camera.fit(),
+    f: () => toolbar.fit(),
     l: () => toolbar.toggleLabels(),
     c: () => toolbar.toggleLinks(),
     g: () => toolbar.toggleGhosts(),

@@ -12,6 +12,7 @@
       if (value === void 0 || value === null || value === false) continue;
       if (name === "text") made.textContent = value;
       else if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+      else if (name.startsWith("aria-")) made.setAttribute(name, String(value));
       else made.setAttribute(name, value === true ? "" : value);
     }
     made.append(...children.filter((child) => child !== null && child !== void 0));
@@ -392,18 +393,34 @@
 
   // src/notices.js
   var MOST = 3;
-  var notify = (text, level = "info") => {
+  var STAYS = { info: 5e3, error: 12e3 };
+  var shown = /* @__PURE__ */ new Map();
+  var notify = (text, level = "info", about = text) => {
+    shown.get(about)?.();
     const error = level === "error";
     const notice = element(
       "div",
       { class: `toast ${error ? "error" : ""}` },
       element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
-      element("span", { text })
+      element("span", { class: "said", text }),
+      element("button", {
+        type: "button",
+        class: "icon",
+        text: "✕",
+        "aria-label": "close this message",
+        onclick: () => close()
+      })
     );
+    const due = setTimeout(() => close(), STAYS[level]);
+    const close = () => {
+      clearTimeout(due);
+      notice.remove();
+      if (shown.get(about) === close) shown.delete(about);
+    };
+    shown.set(about, close);
     const place = byId(error ? "alerts" : "notices");
     place.append(notice);
     while (place.children.length > MOST) place.firstChild?.remove();
-    setTimeout(() => notice.remove(), error ? 12e3 : 5e3);
   };
 
   // src/pack.js
@@ -653,7 +670,7 @@
     }
     /** @param {any} message */
     hear(message) {
-      if (message.kind === "notice") notify(message.text, message.level);
+      if (message.kind === "notice") notify(message.text, message.level, message.about);
       else if (message.kind === "controls") this.listener.controls(message.values);
       else if (message.kind === "interventions") this.interventions = message.done;
     }
@@ -6290,8 +6307,8 @@
       this.movingBounds = [];
       this.mouseInside = false;
       this.chips = element("div", { class: "plot-chips" });
-      const shown = spec.columns.length;
-      this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
+      const shown2 = spec.columns.length;
+      this.several = spec.total > shown2 ? `${shown2} of ${spec.total} shown` : "";
       this.note = element("span", { class: "plot-note", text: this.several });
       this.reading = new Reading(this);
       const name = `${spec.system.name}: ${spec.title} over time`;
@@ -6307,7 +6324,7 @@
       this.root.append(captionOf(this), this.chips, this.chart, this.reading.spoken);
       this.timeLine = new TimeLine(element("div", { class: "time-line" }));
       this.exitLine = new TimeLine(exitLine());
-      this.values = shown > MOST_CHIPS ? [] : spec.labels.map((_2, k) => this.addChip(k));
+      this.values = shown2 > MOST_CHIPS ? [] : spec.labels.map((_2, k) => this.addChip(k));
       this.readout = element("span", { class: "readout" });
       if (!this.values.length) this.chips.append(this.readout);
       this.chips.append(this.note);
@@ -7217,7 +7234,6 @@
     }
     fit() {
       if (!this.layout.known) return;
-      if (this.follow.kind !== "agent") this.follow = { kind: "fleet" };
       const target = this.followed();
       const direction = this.defaultDirection();
       const near = this.follow.kind === "agent" ? 6 : this.fitDistance(direction, target);
@@ -7326,22 +7342,22 @@
       this.copies.clear();
     }
     /** @param {Agent | null} shown */
-    show(shown) {
+    show(shown2) {
       this.forget();
-      this.shown = shown;
+      this.shown = shown2;
       if (this.scene.instant) this.apply(this.scene.instant);
       this.scene.dirty();
     }
     /** @param {Instant} instant */
     apply(instant) {
-      const { shown } = this;
-      const system = this.scene.meta?.systems.find((each) => each.name === shown?.system);
+      const { shown: shown2 } = this;
+      const system = this.scene.meta?.systems.find((each) => each.name === shown2?.system);
       const { estimate, action } = (system && instant.systems[system.name]) ?? {};
-      this.group.visible = Boolean(system && shown && estimate && action);
-      if (!system || !shown || !estimate || !action) return;
-      const row = estimatesOf(system, shown.agent, estimate, action.length);
-      if (system.drawn_as === "bars") this.outlines(system, shown.agent, row);
-      else this.shadows(system, shown.agent, row, action);
+      this.group.visible = Boolean(system && shown2 && estimate && action);
+      if (!system || !shown2 || !estimate || !action) return;
+      const row = estimatesOf(system, shown2.agent, estimate, action.length);
+      if (system.drawn_as === "bars") this.outlines(system, shown2.agent, row);
+      else this.shadows(system, shown2.agent, row, action);
     }
     /**
      * @param {System} system
@@ -8097,6 +8113,11 @@
         element("option", { value: "none", text: "nothing" })
       );
     }
+    /** Everything in view again, whatever was followed. */
+    fit() {
+      byId("follow").value = "fleet";
+      this.setFollow("fleet");
+    }
     /** @param {string} value of an option */
     setFollow(value) {
       const { camera } = this.scene;
@@ -8131,12 +8152,12 @@
     /** @param {boolean} on */
     setGhosts(on2) {
       const { value } = byId("ghost-agent");
-      const shown = on2 && value ? JSON.parse(value) : null;
-      press(byId("ghosts"), shown !== null);
-      byId("ghost-label").hidden = shown === null;
-      byId("ghost-note").hidden = shown === null;
-      if (shown) byId("ghost-note").textContent = this.ghostNote(shown);
-      this.scene.ghosts.show(shown);
+      const shown2 = on2 && value ? JSON.parse(value) : null;
+      press(byId("ghosts"), shown2 !== null);
+      byId("ghost-label").hidden = shown2 === null;
+      byId("ghost-note").hidden = shown2 === null;
+      if (shown2) byId("ghost-note").textContent = this.ghostNote(shown2);
+      this.scene.ghosts.show(shown2);
     }
     /** @param {Agent} agent */
     ghostNote({ system: name, agent }) {
@@ -8193,6 +8214,7 @@
       const lost = live !== null && !live.connected;
       for (const button of [this.play, byId("step"), this.speed]) button.disabled = !seekable && lost;
       byId("back").disabled = !seekable;
+      byId("step").title = seekable ? "A sample on (→; with shift 1 s)" : "A step on, then pause (→)";
       const restart = byId("restart");
       restart.disabled = lost;
       restart.title = live ? "Restart the simulation (R)" : "To the start (R)";
@@ -8492,7 +8514,7 @@
       ArrowRight: ({ shiftKey }) => page.step(1, shiftKey),
       ArrowLeft: ({ shiftKey }) => page.step(-1, shiftKey),
       r: () => page.restart(),
-      f: () => scene.camera.fit(),
+      f: () => toolbar.fit(),
       l: () => toolbar.toggleLabels(),
       c: () => toolbar.toggleLinks(),
       g: () => toolbar.toggleGhosts(),
