@@ -15,6 +15,7 @@ from commands import environment
 
 import gne_mj as gm
 from gne_mj.controllers import FullInformation
+from gne_mj.controllers.table import LawTable
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.games import cournot_game, velocity_game
 from gne_mj.registry import AGENTS, FAULTS, LAWS
@@ -66,6 +67,20 @@ MAKERS = {
     "silence": (FAULTS, gm.silence),
     "estimate-corruption": (FAULTS, gm.estimate_corruption),
 }
+# Laws of others, whose functions leave out the keys that are for the paper's laws
+RIVALS = {
+    "primal-dual": gm.primal_dual_play,
+    "primal-dual-partial": gm.primal_dual_partial,
+    "l1-penalty": gm.l1_penalty,
+    "quadratic-penalty": gm.quadratic_penalty,
+    "recursive-safe-flow": gm.recursive_safe_flow,
+    "feedback-seeking": gm.feedback_seeking,
+    "safe-monotone-flow": gm.safe_monotone_flow,
+    "cbf-filter": gm.cbf_filter,
+    "discrete-cbf-filter": gm.discrete_cbf_filter,
+    "projected-gradient": gm.projected_gradient,
+    "receding-horizon": gm.receding_horizon,
+}
 
 
 def plain_default(value):
@@ -85,11 +100,21 @@ def test_a_function_has_the_keys_and_defaults_of_its_table(name):
             assert parameter.default is inspect.Parameter.empty, key
 
 
+@pytest.mark.parametrize("name", RIVALS)
+def test_a_rivals_function_has_keys_and_defaults_of_its_table(name):
+    fields, given = LAWS._tables[name].model_fields, inspect.signature(RIVALS[name]).parameters
+    own = set(fields) - set(LawTable.model_fields) - {"information", "estimates", "communication"}
+    assert set(given) - {"mode"} == own
+    for key, parameter in given.items():
+        assert parameter.default == fields[key].default, key
+
+
 def test_every_type_that_scenarios_know_has_a_function():
     for registry, others in ((AGENTS, {"mixed"}), (LAWS, {"python", "custom"}), (FAULTS, set())):
         shipped = {name for name in registry
                    if registry._tables[name].__module__.startswith("gne_mj.")}  # fmt: skip
         made = {name for name, (owner, _) in MAKERS.items() if owner is registry}
+        made |= set(RIVALS) if registry is LAWS else set()
         assert shipped - others == made
 
 
