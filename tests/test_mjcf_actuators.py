@@ -50,6 +50,9 @@ FORCES = [
     ('<motor name="u" tendon="cable" gear="3"/>', "winding", 2.0),
     ('<motor name="u" tendon="cable" gear="3"/>', "own", 6.0),
     ('<general name="u" site="front" gainprm="6" gear="1 0 0 0 0 0"/>', "x", 1.0),
+    ('<position name="u" joint="x" kp="5" kv="2"/>', "x", 1.0),  # servos, inverted
+    ('<velocity name="u" joint="x" kv="2" gear="-3"/>', "x", 1.0),
+    ('<velocity name="u" tendon="cable" kv="2"/>', "winding", 2.0),
 ]
 
 
@@ -75,8 +78,13 @@ def test_a_force_that_follows_with_a_lag(tmp_path):
 
 
 REFUSED = [
-    ('<position name="u" joint="x" kp="5"/>', "a position servo of stiffness 5"),
-    ('<velocity name="u" joint="x" kv="2"/>', "a velocity servo of gain 2"),
+    ('<position name="u" joint="x" kp="5" timeconst="1"/>', "a position servo of stiffness 5"),
+    (
+        '<position name="u" joint="x" ctrlrange="-1 1"/>',
+        "ctrlrange of a position servo would clamp",
+    ),
+    ('<velocity name="u" joint="x" kv="2" ctrlrange="-1 1"/>', "ctrlrange of a velocity servo"),
+    ('<velocity name="u" joint="x" kv="2" delay="0.01" nsample="9"/>', "velocity servo of gain 2"),
     ('<intvelocity name="u" joint="x" kp="2"/>', "an integrated-velocity servo of stiffness 2"),
     ('<damper name="u" joint="x" kv="2" ctrlrange="0 1"/>', "depends on its length or velocity"),
     ('<cylinder name="u" joint="x" timeconst="1" bias="1 0 0"/>', "it has a bias force"),

@@ -235,5 +235,5 @@ def test_what_a_robot_does_not_have_is_refused(tmp_path, output, words):
 )
 def test_tables_that_say_too_little_or_too_much(table, key):
     with pytest.raises(InvalidInput) as caught:
-        OutputTable.model_validate(table).outputs(1)
+        OutputTable.model_validate(table).channels(1)
     assert caught.value.key == key

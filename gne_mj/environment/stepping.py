@@ -12,8 +12,7 @@ from gne_mj.loops.feedback import inside
 from gne_mj.loops.layout import steps_in
 from gne_mj.loops.link import parts_at
 from gne_mj.native import address_in, compiled, copy, kernel, source_key
-from gne_mj.parameter_block import integers
-from gne_mj.plants.mujoco import PLACES, sizes_in
+from gne_mj.plants.mujoco import sizes_in
 from gne_mj.plants.native_mujoco import (
     Offsets,
     call_state,
@@ -132,14 +131,13 @@ def push(at, fleet, tools, limit, rows, e):
     if kept == 0:
         return False
     block = abs(parameter_block_of(at, tools.model, data))
-    places, ctrl = integers(block, PLACES), field(data, at.ctrl, sizes_in(block).nu)
     limited = 0
     for r in range(len(given)):
         asked = given[r]
         given[r] = min(max(asked, -limit[r]), limit[r])
         if given[r] != asked:
             limited = 1
-        ctrl[fleet.actuator_of(places, r)] = given[r]
+    fleet.drive(at, data, block, given, True)
     rows.limited[e] += limited
     return True
 

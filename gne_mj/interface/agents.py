@@ -137,7 +137,7 @@ def mjcf_robots(
     file: str | Path | Sequence[str | Path],
     *,
     output: Any,
-    input: str | Sequence[str] | Sequence[Sequence[str]],
+    input: Any,
     lookahead: float | None = None,
     local_damping: ArrayLike | None = None,
     reference_velocity: ArrayLike | None = None,
@@ -150,7 +150,7 @@ def mjcf_robots(
         file: an MJCF file, or its text, which begins with ``<``; one for all or one each.
         output: the joint or velocity sensor that is y_i, likewise, or a table that says what
             (docs/robots.md), as ``{"body": "hull", "axes": ["x", "y"]}``; of vectors a list.
-        input: the actuator that u_i drives, likewise.
+        input: the actuator that u_i drives, likewise, or a table of several, or of a force.
         lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
         local_damping: d in N s/m, then: the force is u - d v.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.

@@ -29,8 +29,7 @@ from gne_mj.loops.mujoco_workspace import place_of, workspace_at
 from gne_mj.loops.ode import AGAIN, CONTINUOUS, DONE, ENDED, UNDER_WAY, control_step
 from gne_mj.loops.recorder import record
 from gne_mj.native import address_in, callback, compiled, copy, kernel, source_key
-from gne_mj.parameter_block import floats_at, integers
-from gne_mj.plants.mujoco import PLACES
+from gne_mj.parameter_block import floats_at
 from gne_mj.plants.native_mujoco import (
     ACTIVATION,
     CALLBACK,
@@ -95,10 +94,8 @@ def _control_of(at: Offsets, fleet: ModuleType, faults: ModuleType) -> Any:
             record(block, faults, parts, step, Present(state, memory, qpos))
         if good and continuous:
             division.note(stage, parts.problem, work)
-        places, ctrl = integers(parameter_block, PLACES), field(data, at.ctrl, place.sizes.nu)
         applied = faults.push(parts.problem, parts.clock, step, work.u, work.applied)
-        for r in range(len(applied)):
-            ctrl[fleet.actuator_of(places, r)] = applied[r] if good else 0.0
+        fleet.drive(at, data, parameter_block, applied, good)
 
     return callback(CALLBACK, control)
 

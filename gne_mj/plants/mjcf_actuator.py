@@ -3,14 +3,17 @@
 MuJoCo's actuator gives the force gain * a + bias, with a the control or an activation that follows
 it, and gear times that to the joint. A law gives forces: where the gain is a number, there is no
 bias and the activation at most a filter, dividing by gain and gear makes the control the force.
-All else, servos above all, would turn the law's force into something of another kind.
+A servo has a bias that is affine in its length and velocity; the control (f - bias)/gain makes it
+give the force f. MuJoCo's stages would add the bias again, so that both are left out: that holds
+while nothing clamps the control. All else would turn the law's force into one of another kind.
 """
+
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from gne_mj.errors import InvalidInput
-from gne_mj.plants.mjcf_robot import RobotFile
 
 _GAIN, _BIAS, _DYN, _TRN = mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn, mujoco.mjtTrn
 _FILTERS = (_DYN.mjDYN_NONE, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)
@@ -44,7 +47,12 @@ def no_force(model: mujoco.MjModel, actuator: int) -> str:
         return _GAINS.get(gain, "its gain is user code's")
     if bias not in (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE):
         return "its bias force is no number"
+    if is_servo(model, actuator) and not _clamps(model, actuator):
+        return ""
     if bias == _BIAS.mjBIAS_AFFINE and (constant or stiffness or damping):
+        if is_servo(model, actuator):
+            what = "position" if stiffness else "velocity" if damping else "biased"
+            return f"the ctrlrange of a {what} servo would clamp by where it is and how it moves"
         if stiffness:
             integrates = dyn == _DYN.mjDYN_INTEGRATOR
             what = "an integrated-velocity servo" if integrates else "a position servo"
@@ -55,11 +63,27 @@ def no_force(model: mujoco.MjModel, actuator: int) -> str:
     return "" if dyn in _FILTERS else "its activation has dynamics of its own"
 
 
+def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether a bias in proportion to length or velocity stands beside a control without lag."""
+    bias = np.any(model.actuator_biasprm[actuator, :3])
+    at_once = model.actuator_dyntype[actuator] == _DYN.mjDYN_NONE
+    late = model.actuator_delay[actuator] > 0
+    affine = model.actuator_biastype[actuator] == _BIAS.mjBIAS_AFFINE
+    return bool(affine and bias and at_once and not late)
+
+
+def _clamps(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether its control is clamped."""
+    ignored = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    return bool(model.actuator_ctrllimited[model.actuator_ctrladr[actuator]] and not ignored)
+
+
 def make_force(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    robot: RobotFile,
     actuator: int,
+    name: str,
+    path: Path,
     *,
     own_velocity: bool,
 ) -> float:
@@ -68,8 +92,8 @@ def make_force(
     Args:
         model: of the fleet; the actuator's gain and ranges are changed.
         data: in the reference pose, positions evaluated.
-        robot: whose actuator it is, for messages.
         actuator: its number.
+        name, path: its own and its file's, for messages.
         own_velocity: whether the output is the actuator's own velocity, gear included, so that the
             force that goes with it is the one before the gear.
 
@@ -90,11 +114,14 @@ def make_force(
         what = "the file's options disable it"
     if what:
         raise InvalidInput(
-            "robot.input",
-            robot.input,
-            f"in {robot.path.name} {what}, where a law needs a force: make it a <motor>, or name"
+            "input",
+            name,
+            f"in {path.name} {what}, where a law needs a force: make it a <motor>, or name"
             " another actuator",
         )
+    if is_servo(model, actuator):
+        model.actuator_biastype[actuator] = _BIAS.mjBIAS_NONE
+        model.actuator_biasprm[actuator] = 0.0
     scale, ctrl = gain * gear, model.actuator_ctrladr[actuator]
     if scale != 1.0:
         model.actuator_gainprm[actuator, 0] = 1.0 / gear
@@ -113,9 +140,8 @@ def _is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
 def _clamp(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, gear: float) -> float:
     """The greatest |u| that passes unchanged, u = gear times the actuator's force."""
     ranges = []
-    clamps = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
     ctrl, along = model.actuator_ctrladr[actuator], model.actuator_trnid[actuator, 0]
-    if clamps and model.actuator_ctrllimited[ctrl]:
+    if _clamps(model, actuator):
         ranges.append(model.actuator_ctrlrange[ctrl])
     if model.actuator_actlimited[actuator]:
         ranges.append(model.actuator_actrange[actuator])

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.errors import InvalidInput, named, nearest
+from gne_mj.errors import InvalidInput, named
 from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
@@ -17,19 +17,19 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
-from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
+from gne_mj.plants.mjcf_drive import add_effort, driving
 from gne_mj.plants.mjcf_prediction import (
     FRAME_FUNCTIONS,
     SENSOR_FUNCTIONS,
     ChannelPlace,
     Prediction,
-    actuator_of,
     add_forces,
+    drive,
     gather,
     refresh,
 )
-from gne_mj.plants.mjcf_reading import Term, array_word, names_in, terms_of
+from gne_mj.plants.mjcf_reading import Term, array_word, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
@@ -43,7 +43,7 @@ from gne_mj.plants.native_mujoco import (
 )
 from gne_mj.records import by_name
 
-__all__ = ["AGENT", "MjcfPlant", "actuator_of", "add_forces", "gather", "refresh", "stored"]
+__all__ = ["AGENT", "MjcfPlant", "add_forces", "drive", "gather", "refresh", "stored"]
 
 SPACING = 2.0  # m between robots, so that they do not touch
 NEWTON = 20  # steps to a start's positions
@@ -115,6 +115,8 @@ class MjcfPlant(FleetPlant):
         self._owners = owners_of(self.model, sizes_of_robots)
         share_floors(self.model, self.data, self._owners)
         self._terms: list[Term] = []  # of all outputs that are no joint's
+        with named(input="agents.input", output="agents.output"):
+            self._driving = driving(self.model, self.data, agents)
         flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -128,11 +130,12 @@ class MjcfPlant(FleetPlant):
         functions = [step_address(name) for name in self._refreshing] or [0, 0, 0]
         prediction = Prediction(
             self._twin._address, KNOWN_STATE, lookahead, array_word(self.data, "cvel"),
-            array_word(self.data, "subtree_com"), step_address(), step_address("mj_copyState"),
-            *functions,
+            array_word(self.data, "subtree_com"), len(self._terms), len(self._driving.factors),
+            step_address(), step_address("mj_copyState"), *functions,
         )  # fmt: skip
         readings = [number for term in self._terms for number in term.numbers(self.data)]
-        sizes = np.array([*self.sizes, *prediction, *readings], dtype=np.int64)
+        drives = self._driving.numbers
+        sizes = np.array([*self.sizes, *prediction, *readings, *drives], dtype=np.int64)
         self.parameter_arrays = [flat, self._numbers(agents), sizes]
         self._parameter_block = ParameterBlock(self.parameter_arrays)
 
@@ -142,9 +145,10 @@ class MjcfPlant(FleetPlant):
         return [places, self._numbers(agents), sizes]
 
     def _numbers(self, agents: Agents) -> NDArray[np.float64]:
-        """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors."""
+        """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors, of
+        readings and of drives."""
         factors = [term.factor for term in self._terms]
-        return np.concatenate([np.ravel(agents.parameters), factors])
+        return np.concatenate([np.ravel(agents.parameters), factors, self._driving.factors])
 
     def model_fields(
         self, parameters: NDArray[np.float64]
@@ -169,25 +173,16 @@ class MjcfPlant(FleetPlant):
             return FRAME_FUNCTIONS if self._terms else ()
         return SENSOR_FUNCTIONS
 
-    def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int, int]:
+    def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
         model, prefix = self.model, f"robot_{i // self.agents.dimension + 1}/"
-        actuator = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + robot.input))
-        if actuator < 0:
-            names = names_in(model, "actuator", prefix)
-            raise InvalidInput("agents.input", robot.input, nearest(robot.input, names))
         with named(output="agents.output"):
             terms = terms_of(model, prefix, robot.output)
-        row, only = int(model.actuator_outadr[actuator]), terms[0]
-        own = len(terms) == 1 and (only.source, only.entry) == ("actuator_velocity", row)
-        with named(robot="agents"):
-            least = make_force(model, self.data, robot, actuator, own_velocity=own)
-        self._check_limit(i, robot, least)
-        ctrl = int(model.actuator_ctrladr[actuator])
+        only = terms[0]
         if len(terms) == 1 and only.source == "qvel" and only.factor == 1.0:
-            return only.entry, only.place_entry, ctrl, 0
+            return only.entry, only.place_entry, 0
         self._check_ahead(i, robot, terms)
         self._terms += terms
-        return -1 - (len(self._terms) - len(terms)), -1, ctrl, len(terms)
+        return -1 - (len(self._terms) - len(terms)), -1, len(terms)
 
     def _check_ahead(self, i: int, robot: RobotFile, terms: list[Term]) -> None:
         """With a look-ahead outputs must have positions, and but joints a damping of their own."""
@@ -206,21 +201,6 @@ class MjcfPlant(FleetPlant):
             )
         if expected:
             raise InvalidInput("agents.output", str(robot.output), expected)
-
-    def _check_limit(self, i: int, robot: RobotFile, least: float) -> None:
-        """MuJoCo clamps silently; what the law asks for must not be changed unseen."""
-        if least <= 0:
-            raise InvalidInput(
-                "agents.input", robot.input, "its ranges must leave forces of both signs"
-            )
-        if self.agents.input_limit[i] > least:
-            raise InvalidInput(
-                "agents.input_limit",
-                float(self.agents.input_limit[i]),
-                f"actuator '{robot.input}' of agent"
-                f" {i // self.agents.dimension + 1} clamps its force: give a limit of at"
-                f" most {least:g}",
-            )
 
     def refresh(self) -> None:
         """Bring up to date what is read besides joints, which is of the last step's start."""
@@ -295,7 +275,7 @@ class MjcfPlant(FleetPlant):
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
         self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
-        self.data.ctrl[self.places.actuator] = u
+        self._driving.set(self.data.ctrl, np.asarray(u, dtype=np.float64))
         with callbacks(passive=self.passive):
             run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)
@@ -318,6 +298,8 @@ def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
         if i == 0:
             mjcf_file.adopt_options(world, spec)
         mjcf_file.check_options(world, spec, robot.path)
+        for channel in range(i * agents.dimension, (i + 1) * agents.dimension):
+            add_effort(spec, agents.robots[channel].input, channel, robot.path)
         sizes.append(sizes_of(spec))
         memory += max(spec.memory, 0)
         place = (0.0, spacing * i, 0.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -54,7 +54,6 @@ class Output:
 class OutputTable(Table):
     """A velocity of a part of the robot, or a sum of such."""
 
-    CHOICES: ClassVar[tuple[str, ...]] = KINDS
     body: str | None = Field(None, description="a body, at its frame's origin")
     site: str | None = Field(None, description="a site")
     geom: str | None = Field(None, description="a geom, at its centre")
@@ -77,7 +76,7 @@ class OutputTable(Table):
     )
     factor: Annotated[float | None, Unit("")] = Field(None, description="in a sum; 1 if left out")
 
-    def outputs(self, axes: int, *, within: bool = False) -> tuple[Output, ...]:
+    def channels(self, axes: int, *, within: bool = False) -> tuple[Output, ...]:
         """One for each number that the table stands for.
 
         Args:
@@ -113,7 +112,7 @@ class OutputTable(Table):
     def _summed(tables: Sequence[OutputTable], factor: float) -> Output:
         terms: list[Output] = []
         for table in tables:
-            found = table.outputs(1, within=True)
+            found = table.channels(1, within=True)
             if len(found) != 1:
                 raise InvalidInput("output.sum", table.axes, "each of its tables is one number")
             terms += found
@@ -125,44 +124,43 @@ class OutputTable(Table):
                 raise InvalidInput(f"output.{key}", getattr(self, key), f"a {kind} has none")
 
 
-def channels_of(
-    given: str | OutputTable | Sequence[object], count: int, axes: int
-) -> list[str | Output]:
-    """The output of every channel, agent by agent.
+def channels_of(given: Any, count: int, axes: int) -> list[str | Output]:
+    """The output of every channel, agent by agent: see :func:`channels`."""
+    return channels("output", given, count, axes)
+
+
+def channels(key: str, given: Any, count: int, axes: int) -> list[Any]:
+    """What every channel has, agent by agent.
 
     Args:
+        key: that gives it.
         given: for all agents a name, a table, or a list of as many as an action has entries; or a
-            list with one of these for each agent.
+            list with one of these for each agent. A table stands for what its ``channels`` returns.
         count: N.
         axes: entries of an agent's action.
 
     Raises:
         InvalidInput: other numbers of them.
     """
-    if isinstance(given, str | OutputTable):
+    if not isinstance(given, list):
         rows = [_expanded([given], axes)] * count
     elif axes > 1 and not any(isinstance(entry, list) for entry in given):
-        all_of_one = _expanded(given, axes)
         each = [_expanded([entry], axes) for entry in given]
         one_each = len(each) == count and all(len(row) == axes for row in each)
-        rows = each if one_each else [all_of_one] * count
+        rows = each if one_each else [_expanded(given, axes)] * count
     else:
         rows = [_expanded(entry if isinstance(entry, list) else [entry], axes) for entry in given]
     if [len(row) for row in rows] != [axes] * count:
         one = "one name" if axes == 1 else f"a list of {axes} names"
         many = "" if axes == 1 else " such lists"
         counts = "" if axes == 1 else "; a table counts by its axes"
-        shown = given if not isinstance(given, OutputTable) else given.model_dump(exclude_none=True)
-        raise InvalidInput("output", shown, f"it must be {one} or a list of {count}{many}{counts}")
-    return [output for row in rows for output in row]
+        shown = given.model_dump(exclude_none=True) if isinstance(given, Table) else given
+        raise InvalidInput(key, shown, f"it must be {one} or a list of {count}{many}{counts}")
+    return [entry for row in rows for entry in row]
 
 
-def _expanded(entries: Sequence[object], axes: int) -> list[str | Output]:
-    found: list[str | Output] = []
+def _expanded(entries: Sequence[Any], axes: int) -> list[Any]:
+    found: list[Any] = []
     for entry in entries:
-        if isinstance(entry, OutputTable):
-            found += entry.outputs(axes)
-        else:
-            assert isinstance(entry, str)
-            found.append(entry)
+        found += [entry] if isinstance(entry, str) else entry.channels(axes)
     return found

@@ -32,6 +32,8 @@ class Prediction(NamedTuple):
     lookahead: int  # numbers of look-ahead in NUMBERS, before the readings' factors
     twists: int  # words of cvel and subtree_com in mjData
     centres: int
+    readings: int  # how many, behind these numbers
+    drives: int  # behind the readings
     # addresses of MuJoCo's functions
     step: int
     copy: int
@@ -50,17 +52,24 @@ class ChannelPlace(Numbers):
 
     output: int  # the joint's degree of freedom, or (negative) the first of its readings less one
     position: int  # the joint's entry of qpos, or -1
-    actuator: int  # entry of ctrl
     readings: int  # how many; 0 of a joint
 
 
-PLACE = len(names_of(ChannelPlace))
+class Drive(Numbers):
+    """That a channel's input, by a factor, is a part of a control."""
+
+    channel: int
+    actuator: int  # entry of ctrl
+    first: int  # whether it is that entry's first one, so that the others are added to it
+
+
+PLACE, DRIVE = len(names_of(ChannelPlace)), len(names_of(Drive))
 # Between the places and the sizes: tau, d and v_0 of each channel, nothing where outputs are
-# velocities; then the readings' factors
+# velocities; then the readings' factors, and the drives'
 NUMBERS = 1
 READINGS = len(Sizes._fields) + len(Prediction._fields)  # where they begin in SIZES
 prediction_in = in_numbers(Prediction, SIZES, len(Sizes._fields))
-_place_in = numbers_in(ChannelPlace)
+_place_in, _drive_in = numbers_in(ChannelPlace), numbers_in(Drive)
 
 
 @kernel
@@ -134,9 +143,16 @@ def refresh(model, data, parameter_block):
 
 
 @kernel
-def actuator_of(places, r):
-    """Which entry of ctrl is the input of channel r."""
-    return place_of(places, r).actuator
+def drive(at, data, parameter_block, u, on):
+    """Make inputs u (m,) mjData's controls; zero if not ``on``."""
+    prediction, numbers = prediction_in(parameter_block), floats(parameter_block, NUMBERS)
+    table = integers(parameter_block, SIZES)[READINGS + READING * prediction.readings :]
+    factors = numbers[prediction.lookahead + prediction.readings :]
+    ctrl = field(data, at.ctrl, sizes_in(parameter_block).nu)
+    for k in range(prediction.drives):
+        each = _drive_in(table, k * DRIVE)
+        part = factors[k] * u[each.channel] if on else 0.0
+        ctrl[each.actuator] = part if each.first != 0 else ctrl[each.actuator] + part
 
 
 @kernel
@@ -148,13 +164,11 @@ def roll(channels, clock, state, u, scratch):
 def set_out(context, channels, state, u, trial):
     """Make the second mjData what the simulation is now, under u (m,)."""
     at, model, data, parameter_block = context
-    prediction, places = prediction_in(parameter_block), integers(parameter_block, PLACES)
+    prediction = prediction_in(parameter_block)
     twin = prediction.twin
     call_state(prediction.copy, model, data, twin, prediction.known)
     mark_twin(at, parameter_block, twin)
-    ctrl = field(twin, at.ctrl, sizes_in(parameter_block).nu)
-    for r in range(len(u)):
-        ctrl[actuator_of(places, r)] = u[r]
+    drive(at, twin, parameter_block, u, True)
 
 
 @kernel

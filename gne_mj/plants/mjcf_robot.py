@@ -18,6 +18,7 @@ from gne_mj.native import kernel
 from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.lookahead import LookaheadKeys
+from gne_mj.plants.mjcf_input import Input, InputTable, inputs_of
 from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
@@ -40,13 +41,14 @@ class RobotFile:
         path: its MJCF file.
         output: y_i: the name of a joint (slide or hinge) or of a sensor of one velocity, or a
             declared one.
-        input: name of the actuator whose force u_i is, at the joint or tendon that it drives; at
-            an ``actuatorvel`` sensor of its own the force before the gear.
+        input: what u_i drives: the name of the actuator whose force it is, at the joint or tendon
+            that it drives (at an ``actuatorvel`` sensor of its own the force before the gear), or
+            a declared one.
     """
 
     path: Path
     output: str | Output
-    input: str
+    input: str | Input
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,10 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         description="joint or velocity sensor that is y_i, or of y = q + tau v; or a table that"
         " says what; of vectors a list of these, for all agents or each"
     )
-    input: str | list[str] | list[list[str]] = Field(description="actuator that u_i drives")
+    input: str | InputTable | list[str | InputTable] | list[list[str | InputTable]] = Field(
+        description="actuator that u_i drives, or a table of several, or of a force at a body;"
+        " likewise"
+    )
 
     @property
     def positions(self) -> bool:
@@ -125,8 +130,9 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         if len(files) != self.count:
             raise InvalidInput("file", self.file, f"it must be one name or a list of {self.count}")
         outputs = channels_of(self.output, self.count, axes)
-        names = (np.repeat(files, axes), outputs, self._names("input", axes))
-        robots = tuple(RobotFile(Path(f), o, i) for f, o, i in zip(*names, strict=True))
+        inputs = inputs_of(self.input, self.count, axes)
+        channels = zip(np.repeat(files, axes), outputs, inputs, strict=True)
+        robots = tuple(RobotFile(Path(path), output, input) for path, output, input in channels)
         kind, numbers = sys.modules[__name__], np.zeros((len(robots), 0))
         if self.positions:
             tau = np.full(len(robots), self.lookahead)
@@ -137,18 +143,3 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         return MjcfRobots(
             kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions
         )
-
-    def _names(self, key: str, axes: int) -> list[str]:
-        """Of every channel, from one name for all agents or one each; of vectors lists of names."""
-        given, rows = getattr(self, key), []
-        if isinstance(given, str):
-            rows = [[given]] * self.count
-        elif axes > 1 and all(isinstance(entry, str) for entry in given):
-            rows = [given] * self.count
-        else:
-            rows = [[entry] if isinstance(entry, str) else entry for entry in given]
-        if [len(row) for row in rows] != [axes] * self.count:
-            one = "one name" if axes == 1 else f"a list of {axes} names"
-            many = "" if axes == 1 else " such lists"
-            raise InvalidInput(key, given, f"it must be {one} or a list of {self.count}{many}")
-        return [name for row in rows for name in row]

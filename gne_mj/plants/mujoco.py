@@ -102,6 +102,15 @@ def actuator_of(places, r):
 
 
 @kernel
+def drive(at, data, parameter_block, u, on):
+    """Make inputs u (m,) mjData's controls; zero if not ``on``."""
+    places = integers(parameter_block, PLACES)
+    ctrl = field(data, at.ctrl, sizes_in(parameter_block).nu)
+    for r in range(len(u)):
+        ctrl[actuator_of(places, r)] = u[r] if on else 0.0
+
+
+@kernel
 def stored(channels, state, userdata):
     """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
     return stored_of(flexible_robot, channels, state, userdata)

@@ -16,8 +16,8 @@ from gne_mj.plants.mujoco import (
     ATAN,
     PLACES,
     MujocoPlant,
-    actuator_of,
     add_atan_forces,
+    drive,
     place_of,
     refresh,
     sizes_in,
@@ -26,7 +26,7 @@ from gne_mj.plants.mujoco import (
 from gne_mj.plants.native_mujoco import field, number
 from gne_mj.plants.position_robot import LOCAL_DAMPING, LOOKAHEAD, REFERENCE_VELOCITY
 
-__all__ = ["AGENT", "PLANT", "actuator_of", "add_forces", "gather", "refresh", "stored"]
+__all__ = ["AGENT", "PLANT", "add_forces", "drive", "gather", "refresh", "stored"]
 
 AGENT = position_robot
 
