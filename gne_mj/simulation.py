@@ -246,6 +246,8 @@ class Simulation:
         run = self._runs[system]
         if not run.inside:
             raise InvalidInput("system", system, "it must not have left its set")
+        if not run.is_there(channel):
+            raise InvalidInput("channel", channel, "the agent must be there")
         run.push(channel, force, max(1, self.clock.steps(duration)))
         game = run.system.game
         agent, axis = int(game.agent_of_action[channel]) + 1, game.axis_of_action[channel]
@@ -335,6 +337,10 @@ class SystemRun:
         self._due: int | None = None  # the step at which the next row is recorded; None: at once
         self._pushes: list[tuple[int, float, int]] = []  # output, force, until which step
         self._recorded: list[SystemRecord] = []
+
+    def is_there(self, channel: int) -> bool:
+        """Whether an output's agent is there: some leave and join."""
+        return bool(np.isfinite(self.loop.present().state[channel, self.system.agents.kind.OUTPUT]))
 
     @property
     def inside(self) -> bool:

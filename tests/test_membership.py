@@ -261,6 +261,26 @@ def test_positions_beside_a_reference_that_moves_go_on_in_mujoco_where_they_are(
     assert all(run.holds for run in runs)
 
 
+def test_nobody_who_is_away_is_pushed_and_numbers_stay():
+    leaving = {"changes": [{"time": 0.1, "leaves": [3]}]}
+    robots = {"simulation.duration": 0.3, "simulation.timestep": 2e-3}
+    simulation = gne_mj.setup(
+        "velocity-sync", robots, engine="mujoco", membership=leaving
+    ).simulation_object()
+    simulation.push("robots", 3, 5.0, 0.2)  # which goes on over the change
+    simulation.advance(60)
+    with pytest.raises(InvalidInput, match="the agent must be there"):
+        simulation.push("robots", 2, 1.0, 0.1)
+    with pytest.raises(InvalidInput, match="numbers stay as they are"):
+        simulation.change({"barrier.rho": 0.02})
+    pushed = simulation.run()["robots"]["action"].values[-1]
+    alone = gne_mj.run("velocity-sync", robots, engine="mujoco", membership=leaving)
+    assert pushed[3] > alone.data["action"].values[-1, 3] + 0.2
+    planned = {**robots, "interventions": [{"time": 0.2, "changes": {"barrier.rho": 0.02}}]}
+    with pytest.raises(InvalidInput, match="numbers stay as they are"):
+        gne_mj.setup("velocity-sync", planned, membership=leaving).simulation_object()
+
+
 def test_what_was_measured_is_of_the_whole_run():
     """Against rows of every step."""
     changes = [

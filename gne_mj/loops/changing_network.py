@@ -87,6 +87,10 @@ class ChangingNetworkLoop(LoopInPieces):
         """See the base class."""
         self._loop.push(force)
 
+    def push_unit(self, channel: int) -> str:
+        """See the base class."""
+        return self._loop.push_unit(channel)
+
     def start_at(self, step: int) -> None:
         """See the base class."""
         self._loop.start_at(step)

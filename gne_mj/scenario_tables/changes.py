@@ -58,6 +58,9 @@ def check_stays(before: Scenario, after: Scenario) -> None:
         if name != "systems" and getattr(before, name) != getattr(after, name):
             raise InvalidInput(name, "another value", _STAYS)
     for name, table in after.systems.items():
+        if table.membership is not None and table != before.systems[name]:
+            expected = "where agents leave and join numbers stay as they are"
+            raise InvalidInput(f"systems.{name}.membership", "given", expected)
         for part in SystemTable.model_fields:
             if part not in ("game", "barrier", "controller") and (
                 getattr(before.systems[name], part) != getattr(table, part)

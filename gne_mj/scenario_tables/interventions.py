@@ -41,7 +41,8 @@ class PushTable(Table):
         channel = axes.get(self.axis, of_agent[0])
 
         def act(simulation: Simulation) -> None:
-            if simulation.runs[system.name].inside:  # one that has left is not pushed
+            run = simulation.runs[system.name]
+            if run.inside and run.is_there(channel):  # one that has left is not pushed
                 simulation.push(system.name, channel, self.force, self.duration)
 
         return act
