@@ -307,7 +307,9 @@ def test_what_was_done_by_hand_is_done_again_by_a_file():
     planned = gne_mj.run("velocity-sync", {**changes, "interventions": PLANNED})
     for run in (again, planned):
         assert same(run, by_hand)
-        reports = [{**each.reports["robots"], "wall_time": 0} for each in (run, by_hand)]
+        reports = [
+            {**each.reports["robots"], "wall_time": 0, "step_time": 0} for each in (run, by_hand)
+        ]
         assert reports[0] == reports[1]
     assert planned.interventions == by_hand.interventions
     assert again.interventions[1]["what"] == "robot 2 pushed by 4 N for 0.2 s"
