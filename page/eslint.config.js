@@ -5,7 +5,7 @@ const BROWSER = [
   "Blob", "DecompressionStream", "Element", "HTMLInputElement", "ResizeObserver", "Response", "TextDecoder",
   "URL", "WebSocket", "addEventListener", "atob", "clearTimeout", "devicePixelRatio", "document",
   "fetch", "getComputedStyle", "innerHeight", "innerWidth", "localStorage", "location",
-  "matchMedia", "performance", "requestAnimationFrame", "setTimeout", "window",
+  "matchMedia", "navigator", "performance", "requestAnimationFrame", "setTimeout", "window",
 ];
 
 export default [

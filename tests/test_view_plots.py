@@ -1,12 +1,14 @@
 """Plots that one can work with: time and values, lines, scales, files, and the closest approach."""
 
 import csv
+import tomllib
 
 import numpy as np
 import pytest
 from test_view_browser import opened, origins, quiet, seek, session, until
 
 import gne_mj
+from gne_mj.scenario import load_scenario
 from gne_mj.viewer import serve
 
 
@@ -167,3 +169,29 @@ def test_fit_shows_everything_after_one_was_followed(shown):
     shown.locator("#fit").click()
     assert shown.evaluate("window.gne.state().follow.kind") == "fleet"
     assert shown.locator("#follow").input_value() == "fleet"
+
+
+def test_a_moment_a_run_and_what_was_done_are_kept(page, recorded, tmp_path):
+    simulation = load_scenario("velocity-sync", {"simulation.duration": 1.0}).simulation_object()
+    simulation.advance(100)
+    simulation.change({"barrier.rho": 0.3})
+    trajectory = simulation.run()
+    server = serve(trajectory, "kept")
+    opened(page, f"{server.url}#t=0.4")
+    until(page, "window.gne.time() === 0.4")
+    page.locator("#keep summary").click()
+    with page.expect_download() as loading:
+        page.locator("#keep-run").click()
+    path = tmp_path / "run.html"
+    loading.value.save_as(path)
+    assert page.evaluate("document.getElementById('keep').open") is False
+    page.evaluate("navigator.clipboard.writeText = text => { window.name = text }")
+    page.locator("#keep summary").click()
+    page.locator("#keep-scenario").click()
+    until(page, "window.name.includes('interventions')")
+    again = gne_mj.run(tomllib.loads(page.evaluate("window.name")))
+    assert np.array_equal(again["robots"]["state"], trajectory["robots"]["state"])
+    quiet(recorded, *origins(server))
+    server.close()
+    opened(page, path.as_uri())
+    assert page.locator("#keep-run").is_hidden()

@@ -35,8 +35,13 @@ def html_page(trajectory: Trajectory, title: str | None = None) -> str:
     Raises:
         InvalidInput: see :func:`gne_mj.viewer.replay.replay_pack`.
     """
-    data = base64.b64encode(replay_pack(trajectory, title)).decode("ascii")
-    text = _begin("file", title or "gne-mj replay")
+    return packed_page(replay_pack(trajectory, title), title or "gne-mj replay")
+
+
+def packed_page(pack: bytes, title: str) -> str:
+    """The same of a replay's compressed pack."""
+    data = base64.b64encode(pack).decode("ascii")
+    text = _begin("file", title)
     text = text.replace(
         "<head>",
         f'<head>\n<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.recorded import recorded_system, sizes_of
-from gne_mj.scenario import load_scenario
+from gne_mj.scenario import load_scenario, scenario_of
 from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.pack import packed_small
 from gne_mj.viewer.scene import Scene
@@ -86,9 +86,18 @@ def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
         **scene.meta(),
         "outcome": {name: outcome(report) for name, report in trajectory.reports.items()},
         "interventions": trajectory.interventions,
+        "scenario": _text(trajectory),
         "command_lengths": [len(command) for command in commands.sent],
     }
     return packed_small(meta, {name: _lean(name, array) for name, array in arrays.items()})
+
+
+def _text(trajectory: Trajectory) -> str | None:
+    """The file of the scenario with what was done; None where no keys say it."""
+    try:
+        return scenario_of(trajectory).toml()
+    except InvalidInput:
+        return None
 
 
 def outcome(report: dict[str, Any]) -> dict[str, Any]:

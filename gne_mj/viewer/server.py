@@ -24,7 +24,7 @@ from tornado.httpserver import HTTPServer
 from tornado.websocket import WebSocketClosedError
 
 from gne_mj.errors import InvalidInput
-from gne_mj.viewer.html import page_file, served_page
+from gne_mj.viewer.html import packed_page, page_file, served_page
 
 with warnings.catch_warnings():  # it imports a module of pyzmq that pyzmq warns of
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -168,7 +168,7 @@ class _Guarded(tornado.web.RequestHandler):
 
 
 class _File(_Guarded):
-    """The page, its files, and the replay's pack."""
+    """The page, its files, the replay's pack, and the replay as one file to keep."""
 
     def initialize(self, server: Server) -> None:
         self.server = server
@@ -180,6 +180,10 @@ class _File(_Guarded):
         elif name == "replay" and server.replay is not None:
             self.set_header("Content-Type", "application/octet-stream")
             self.write(server.replay)
+        elif name == "run.html" and server.replay is not None:
+            self.set_header("Content-Type", "text/html; charset=utf-8")
+            self.set_header("Content-Disposition", "attachment")
+            self.write(packed_page(server.replay, server.title))
         else:
             try:
                 data = page_file(name)

@@ -1,6 +1,7 @@
 // A running simulation as what is shown: it has the time, and does what it is asked to.
 import { History } from "./history.js";
 import { instantOfFrame } from "./instant.js";
+import { keepScenario } from "./keep.js";
 import { notify } from "./notices.js";
 import { fetchReplay } from "./pack.js";
 import { Socket } from "./socket.js";
@@ -200,6 +201,7 @@ export class Live {
   /** @param {any} message */
   hear(message) {
     if (message.kind === "notice") notify(message.text, message.level, message.about);
+    else if (message.kind === "scenario") keepScenario(message.text);
     else if (message.kind === "controls") this.listener.controls(message.values);
     else if (message.kind === "interventions") this.interventions = message.done;
   }

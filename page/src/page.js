@@ -1,6 +1,7 @@
 // The page: puts a source of instants, the scene, plots and controls together.
 import { byId } from "./dom.js";
 import { Header, warn } from "./header.js";
+import { Keep } from "./keep.js";
 import { Live } from "./live.js";
 import { Overlay } from "./overlay.js";
 import { fetchReplay, fromBase64, unpack } from "./pack.js";
@@ -32,6 +33,7 @@ export class Page {
     this.header = new Header((time) => this.lead(time));
     this.toolbar = new Toolbar(this.scene, this.overlay);
     this.transport = new Transport(this);
+    this.keep = new Keep(this);
     /** @type {Live | null} */
     this.live = null; // the simulation, in mode "live"
     /** @type {Playback | null} */
@@ -87,6 +89,7 @@ export class Page {
     this.setScene(playback.meta, playback);
     this.markOutcome(playback);
     playback.restart();
+    this.keep.go();
   }
 
   startLive() {
@@ -289,8 +292,7 @@ export class Page {
     if (!this.instant) return;
     const render = this.scene.needsRender;
     if (render) this.scene.render();
-    const { moving } = this.overlay;
-    if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
+    if (render || this.overlay.moving || this.wasMoving) this.overlay.draw(this.instant, now);
     this.wasMoving = this.overlay.moving;
     this.drawn = true;
     this.live?.saw(this.scene.complete);
@@ -311,6 +313,7 @@ export class Page {
     this.header.show(meta, source);
     this.toolbar.showLegend(this.instant);
     this.transport.show(source, this.live);
+    this.keep.show();
     // slow plots must not take more than a sixth of the time
     this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
   }

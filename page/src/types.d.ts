@@ -97,6 +97,7 @@ export interface Scene {
   pushes?: Push[];
   outcome?: Record<string, State>; // of a replay
   interventions?: Intervention[];
+  scenario?: string | null; // a file's text, with what was done
   command_lengths?: number[];
 }
 
@@ -200,6 +201,10 @@ export interface Elements {
   "ghost-tools": HTMLElement;
   "ghost-label": HTMLElement;
   "ghost-agent": HTMLSelectElement;
+  keep: HTMLDetailsElement;
+  "keep-link": HTMLButtonElement;
+  "keep-scenario": HTMLButtonElement;
+  "keep-run": HTMLAnchorElement;
   tuning: HTMLDetailsElement;
   "tuning-body": HTMLElement;
   pane: HTMLElement;

@@ -270,6 +270,157 @@
     return `${system.name}: ${status(word).words}${when}${message ? `: ${message}` : ""}`;
   };
 
+  // src/export.js
+  var DIGITS = 9;
+  var download = (name, blob) => {
+    const url = URL.createObjectURL(blob);
+    element("a", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  };
+  var fileOf = ({ spec }) => [spec.system.name, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
+  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  var csvOf = (plot) => {
+    const { spec, plots, hidden } = plot;
+    const [from, to] = plots.window;
+    const { time } = plots.source.store;
+    const columns = plot.columns();
+    const on2 = [...columns.keys()].filter((k) => !hidden.has(k));
+    const unit = spec.unit ? ` (${spec.unit})` : "";
+    const names = on2.map((k) => quoted(`${spec.noun} ${spec.labels[k]}`.trim() + unit));
+    const rows = [["time (s)", ...names].join(",")];
+    time.forEach((t, i) => {
+      if (t < from || t > to) return;
+      const values = on2.map((k) => columns[k][i]);
+      const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
+      rows.push(texts.join(","));
+    });
+    return [...rows, ""].join("\n");
+  };
+  var saveCsv = (plot) => download(`${fileOf(plot)}.csv`, new Blob([csvOf(plot)], { type: "text/csv" }));
+  var pictureOf = ({ uplot, spec, hidden, lineOf }) => {
+    if (!uplot) return null;
+    const chart = uplot.ctx.canvas;
+    const ratio = chart.width / uplot.width;
+    const on2 = [...spec.labels.keys()].filter((k) => !hidden.has(k));
+    const perRow = Math.max(1, Math.floor(uplot.width / 110));
+    const key = on2.length > 14 || spec.total === 1 ? [] : on2;
+    const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
+    const canvas = element("canvas", {
+      width: chart.width,
+      height: chart.height + ratio * (above + below)
+    });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      canvas.getContext("2d")
+    );
+    context.fillStyle = colour("panel");
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(chart, 0, ratio * above);
+    context.scale(ratio, ratio);
+    context.textBaseline = "middle";
+    context.fillStyle = colour("text");
+    context.font = "600 14px system-ui, sans-serif";
+    context.fillText(`${spec.system.name}: ${spec.title}`, 8, above / 2);
+    context.font = "12px system-ui, sans-serif";
+    key.forEach((k, n) => {
+      const look = lineOf.call({ spec }, k);
+      const x = 8 + 110 * (n % perRow);
+      const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
+      Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
+      context.setLineDash(look.dash);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x + 20, y);
+      context.stroke();
+      context.fillText(spec.shorts[k], x + 26, y, 80);
+    });
+    return canvas;
+  };
+  var savePng = (plot) => pictureOf(plot)?.toBlob((blob) => blob && download(`${fileOf(plot)}.png`, blob));
+
+  // src/notices.js
+  var MOST = 3;
+  var STAYS = { info: 5e3, error: 12e3 };
+  var shown = /* @__PURE__ */ new Map();
+  var notify = (text, level = "info", about = text) => {
+    shown.get(about)?.();
+    const error = level === "error";
+    const notice = element(
+      "div",
+      { class: `toast ${error ? "error" : ""}` },
+      element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
+      element("span", { class: "said", text }),
+      element("button", {
+        type: "button",
+        class: "icon",
+        text: "✕",
+        "aria-label": "close this message",
+        onclick: () => close()
+      })
+    );
+    const due = setTimeout(() => close(), STAYS[level]);
+    const close = () => {
+      clearTimeout(due);
+      notice.remove();
+      if (shown.get(about) === close) shown.delete(about);
+    };
+    shown.set(about, close);
+    const place = byId(error ? "alerts" : "notices");
+    place.append(notice);
+    while (place.children.length > MOST) place.firstChild?.remove();
+  };
+
+  // src/keep.js
+  var momentAsked = () => {
+    const found = /^#t=([\d.]+)$/.exec(location.hash);
+    return found ? Number(found[1]) : null;
+  };
+  var copy = async (text, what, file) => {
+    try {
+      await navigator.clipboard.writeText(text);
+      notify(`${what} is copied.`, "info", what);
+    } catch {
+      download(file, new Blob([text], { type: "text/plain" }));
+      notify(`${what} is saved as ${file}.`, "info", what);
+    }
+  };
+  var keepScenario = (text) => {
+    if (text) copy(text, "The scenario with what was done", "scenario.toml");
+    else notify("What was done to this run is not said by any keys of a scenario.", "error");
+  };
+  var Keep = class {
+    /** @param {Page} page */
+    constructor(page) {
+      this.page = page;
+      byId("keep-link").onclick = () => this.link();
+      byId("keep-scenario").onclick = () => this.scenario();
+      addEventListener("hashchange", () => this.go());
+      addEventListener("click", ({ target }) => {
+        if (target instanceof Element && !target.closest("#keep summary")) byId("keep").open = false;
+      });
+    }
+    /** To the moment that the address asks for, in a replay. */
+    go() {
+      const time = momentAsked();
+      if (time !== null && this.page.playback) this.page.seek(time);
+    }
+    link() {
+      location.hash = `t=${Number((this.page.source?.time ?? 0).toFixed(4))}`;
+      copy(location.href, "The link to this moment", "link.txt");
+    }
+    scenario() {
+      const { live, playback } = this.page;
+      if (playback) keepScenario(playback.meta.scenario);
+      else live?.send({ do: "scenario" });
+    }
+    /** Says what can be kept now: a run when it has ended, unless it is a file already. */
+    show() {
+      const { mode: mode2, playback } = this.page;
+      byId("keep-run").hidden = mode2 === "file" || !playback;
+      byId("keep-link").hidden = !playback;
+    }
+  };
+
   // src/instant.js
   var partsOf = (system) => [
     "action",
@@ -389,38 +540,6 @@
     greatest(name) {
       return this.peaks[name] || 0;
     }
-  };
-
-  // src/notices.js
-  var MOST = 3;
-  var STAYS = { info: 5e3, error: 12e3 };
-  var shown = /* @__PURE__ */ new Map();
-  var notify = (text, level = "info", about = text) => {
-    shown.get(about)?.();
-    const error = level === "error";
-    const notice = element(
-      "div",
-      { class: `toast ${error ? "error" : ""}` },
-      element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
-      element("span", { class: "said", text }),
-      element("button", {
-        type: "button",
-        class: "icon",
-        text: "✕",
-        "aria-label": "close this message",
-        onclick: () => close()
-      })
-    );
-    const due = setTimeout(() => close(), STAYS[level]);
-    const close = () => {
-      clearTimeout(due);
-      notice.remove();
-      if (shown.get(about) === close) shown.delete(about);
-    };
-    shown.set(about, close);
-    const place = byId(error ? "alerts" : "notices");
-    place.append(notice);
-    while (place.children.length > MOST) place.firstChild?.remove();
   };
 
   // src/pack.js
@@ -671,6 +790,7 @@
     /** @param {any} message */
     hear(message) {
       if (message.kind === "notice") notify(message.text, message.level, message.about);
+      else if (message.kind === "scenario") keepScenario(message.text);
       else if (message.kind === "controls") this.listener.controls(message.values);
       else if (message.kind === "interventions") this.interventions = message.done;
     }
@@ -1795,14 +1915,14 @@
   }
   var TypedArray = Object.getPrototypeOf(Uint8Array);
   var __proto__ = "__proto__";
-  function copy(o, _isObj = isObj) {
+  function copy2(o, _isObj = isObj) {
     let out;
     if (isArr(o)) {
       let val = o.find((v) => v != null);
       if (isArr(val) || _isObj(val)) {
         out = Array(o.length);
         for (let i = 0; i < o.length; i++)
-          out[i] = copy(o[i], _isObj);
+          out[i] = copy2(o[i], _isObj);
       } else
         out = o.slice();
     } else if (o instanceof TypedArray)
@@ -1811,7 +1931,7 @@
       out = {};
       for (let k in o) {
         if (k != __proto__)
-          out[k] = copy(o[k], _isObj);
+          out[k] = copy2(o[k], _isObj);
       }
     } else
       out = o;
@@ -1824,9 +1944,9 @@
       for (let key in src) {
         if (key != __proto__) {
           if (isObj(targ[key]))
-            assign(targ[key], copy(src[key]));
+            assign(targ[key], copy2(src[key]));
           else
-            targ[key] = copy(src[key]);
+            targ[key] = copy2(src[key]);
         }
       }
     }
@@ -3468,7 +3588,7 @@
     const under = self.under = placeDiv(UNDER, wrap);
     wrap.appendChild(can);
     const over = self.over = placeDiv(OVER, wrap);
-    opts = copy(opts);
+    opts = copy2(opts);
     const pxAlign = +ifNull(opts.pxAlign, 1);
     const pxRound = pxRoundGen(pxAlign);
     (opts.plugins || []).forEach((p) => {
@@ -4187,7 +4307,7 @@
       for (let k in pendScales) {
         let psc = pendScales[k];
         if (psc != null) {
-          let wsc = wipScales[k] = copy(scales[k], fastIsObj);
+          let wsc = wipScales[k] = copy2(scales[k], fastIsObj);
           if (psc.min != null)
             assign(wsc, psc);
           else if (k != xScaleKey || mode2 == 2) {
@@ -5679,74 +5799,6 @@
     paths.bars = bars;
     paths.spline = monotoneCubic;
   }
-
-  // src/export.js
-  var DIGITS = 9;
-  var download = (name, blob) => {
-    const url = URL.createObjectURL(blob);
-    element("a", { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1e4);
-  };
-  var fileOf = ({ spec }) => [spec.system.name, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
-  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  var csvOf = (plot) => {
-    const { spec, plots, hidden } = plot;
-    const [from, to] = plots.window;
-    const { time } = plots.source.store;
-    const columns = plot.columns();
-    const on2 = [...columns.keys()].filter((k) => !hidden.has(k));
-    const unit = spec.unit ? ` (${spec.unit})` : "";
-    const names = on2.map((k) => quoted(`${spec.noun} ${spec.labels[k]}`.trim() + unit));
-    const rows = [["time (s)", ...names].join(",")];
-    time.forEach((t, i) => {
-      if (t < from || t > to) return;
-      const values = on2.map((k) => columns[k][i]);
-      const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
-      rows.push(texts.join(","));
-    });
-    return [...rows, ""].join("\n");
-  };
-  var saveCsv = (plot) => download(`${fileOf(plot)}.csv`, new Blob([csvOf(plot)], { type: "text/csv" }));
-  var pictureOf = ({ uplot, spec, hidden, lineOf }) => {
-    if (!uplot) return null;
-    const chart = uplot.ctx.canvas;
-    const ratio = chart.width / uplot.width;
-    const on2 = [...spec.labels.keys()].filter((k) => !hidden.has(k));
-    const perRow = Math.max(1, Math.floor(uplot.width / 110));
-    const key = on2.length > 14 || spec.total === 1 ? [] : on2;
-    const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
-    const canvas = element("canvas", {
-      width: chart.width,
-      height: chart.height + ratio * (above + below)
-    });
-    const context = (
-      /** @type {CanvasRenderingContext2D} */
-      canvas.getContext("2d")
-    );
-    context.fillStyle = colour("panel");
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(chart, 0, ratio * above);
-    context.scale(ratio, ratio);
-    context.textBaseline = "middle";
-    context.fillStyle = colour("text");
-    context.font = "600 14px system-ui, sans-serif";
-    context.fillText(`${spec.system.name}: ${spec.title}`, 8, above / 2);
-    context.font = "12px system-ui, sans-serif";
-    key.forEach((k, n) => {
-      const look = lineOf.call({ spec }, k);
-      const x = 8 + 110 * (n % perRow);
-      const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
-      Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
-      context.setLineDash(look.dash);
-      context.beginPath();
-      context.moveTo(x, y);
-      context.lineTo(x + 20, y);
-      context.stroke();
-      context.fillText(spec.shorts[k], x + 26, y, 80);
-    });
-    return canvas;
-  };
-  var savePng = (plot) => pictureOf(plot)?.toBlob((blob) => blob && download(`${fileOf(plot)}.png`, blob));
 
   // src/caption.js
   var symbolOf = (tex) => {
@@ -7404,10 +7456,10 @@
         const ahead = this.ahead(system, agent, row, action);
         const sources = this.scene.tinted.get(system.name)?.[agent] ?? [];
         const copies = this.copiesOf(agent, () => sources.map((mesh2) => this.copy(mesh2)));
-        copies.forEach((copy2, k) => {
-          copy2.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
-          ahead.forEach((v, axis) => copy2.matrix.elements[12 + axis] += v);
-          copy2.visible = Math.hypot(...ahead) > 0.01;
+        copies.forEach((copy3, k) => {
+          copy3.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
+          ahead.forEach((v, axis) => copy3.matrix.elements[12 + axis] += v);
+          copy3.visible = Math.hypot(...ahead) > 0.01;
         });
       }
     }
@@ -7435,10 +7487,10 @@
         depthWrite: false
       });
       material.emissive.set(colour("ghost")).multiplyScalar(0.35);
-      const copy2 = new THREE.Mesh(mesh2.geometry, material);
-      copy2.matrixAutoUpdate = false;
-      this.group.add(copy2);
-      return copy2;
+      const copy3 = new THREE.Mesh(mesh2.geometry, material);
+      copy3.matrixAutoUpdate = false;
+      this.group.add(copy3);
+      return copy3;
     }
   };
 
@@ -8605,6 +8657,7 @@
       this.header = new Header((time) => this.lead(time));
       this.toolbar = new Toolbar(this.scene, this.overlay);
       this.transport = new Transport(this);
+      this.keep = new Keep(this);
       this.live = null;
       this.playback = null;
       this.meta = null;
@@ -8655,6 +8708,7 @@
       this.setScene(playback.meta, playback);
       this.markOutcome(playback);
       playback.restart();
+      this.keep.go();
     }
     startLive() {
       const tuning = new Tuning((message) => live.send(message));
@@ -8834,8 +8888,7 @@
       if (!this.instant) return;
       const render = this.scene.needsRender;
       if (render) this.scene.render();
-      const { moving } = this.overlay;
-      if (render || moving || this.wasMoving) this.overlay.draw(this.instant, now);
+      if (render || this.overlay.moving || this.wasMoving) this.overlay.draw(this.instant, now);
       this.wasMoving = this.overlay.moving;
       this.drawn = true;
       this.live?.saw(this.scene.complete);
@@ -8855,6 +8908,7 @@
       this.header.show(meta, source);
       this.toolbar.showLegend(this.instant);
       this.transport.show(source, this.live);
+      this.keep.show();
       this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
     }
   };
