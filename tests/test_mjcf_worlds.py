@@ -1,5 +1,6 @@
 """What files of robots say of the whole world: honoured, refused, or told to no one."""
 
+import dataclasses
 import warnings
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 import gne_mj
 from gne_mj.errors import EngineError, InvalidInput
 from gne_mj.plants.mjcf_fleet import MjcfPlant
-from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
+from gne_mj.plants.mjcf_robot import MjcfAgents, RobotFile, mjcf_robots
 from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.plants.native_mujoco import LOST, check_warnings, lost_text
 from gne_mj.scenario import load_scenario
@@ -297,3 +298,42 @@ def test_a_batch_keeps_its_runs_where_forces_were_left_out(tmp_path, monkeypatch
     )
     status = found["status"].to_numpy().tolist()
     assert sorted(status) == ["completed"] * 3 + ["forces_left_out"]
+
+
+BALL = """
+<mujoco><worldbody>
+  <geom type="plane" size="5 5 1"/>
+  <body name="ball" pos="0 0 0.1"><freejoint/><geom size="0.1"/><site name="middle"/></body>
+</worldbody></mujoco>"""
+# contacts with the floor and of neighbours, which overlap, and whether they rest
+TOUCHES = {"floor": (3, 0, True), "agents": (0, 2, False), "none": (0, 0, False)}
+
+
+@pytest.mark.parametrize("which", TOUCHES)
+def test_contacts_that_there_are(tmp_path, which):
+    path, spacing = tmp_path / "ball.xml", 0.15
+    path.write_text(BALL)
+    table = MjcfAgents.model_validate({
+        "type": "mjcf-robot", "count": 3, "file": str(path), "output": {"site": "middle"},
+        "input": {"body": "ball"}, "contacts": which, "spacing": spacing,
+    })  # fmt: skip
+    path.write_text(BALL.replace("<body pos", '<body name="body" pos'))
+    plant = MjcfPlant(table.build((1, 1, 1)), 0.001, "euler")
+    mujoco.mj_forward(plant.model, plant.data)
+    floor, pairs, rests = TOUCHES[which]
+    with_floor = np.any(plant.model.geom_bodyid[plant.data.contact.geom] == 0, axis=-1)
+    assert (int(np.sum(with_floor)), int(np.sum(~with_floor))) == (floor, pairs)
+    assert np.allclose(plant.data.qpos[1::7], [0.0, 0.15, 0.3])
+    plant.step(np.zeros(3), 200)
+    heights = plant.data.qpos[2::7]
+    if rests:
+        assert np.allclose(heights, 0.1, rtol=0, atol=2e-3)
+    if which == "none":
+        assert np.allclose(heights, 0.1 - 0.5 * 9.81 * 0.2**2, rtol=0, atol=1.1e-3)
+
+
+def test_all_contacts_are_as_files_say_and_neighbours_need_room(tmp_path):
+    robot = boat(tmp_path)
+    agents = dataclasses.replace(mjcf_robots((robot,) * 2, np.full(2, np.inf)), spacing=0.1)
+    with pytest.raises(InvalidInput, match=r"overlaps 'robot_2/hull' of agent 2, 0.1 m beside it"):
+        MjcfPlant(agents, 0.002).reset(np.zeros((2, 2)))

@@ -76,7 +76,7 @@ def key_of(system: System, clock: Clock, setup: Setup) -> Hashable:
     agents, game = system.agents, system.game
     return (
         system.engine, system.integrator, clock.timestep, agents.kind, agents.dimension,
-        (agents.robots, agents.together) if isinstance(agents, MjcfRobots) else None,
+        agents.world if isinstance(agents, MjcfRobots) else None,
         system.equation, system.fault_kernels, _network_changes(system),
         game.actions, game.constraints_count, game.agents, agents.states,
         len(system.loop_memory), setup.clock.mode, setup.history, setup.solver,

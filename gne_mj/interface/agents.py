@@ -141,6 +141,8 @@ def mjcf_robots(
     lookahead: float | None = None,
     local_damping: ArrayLike | None = None,
     reference_velocity: ArrayLike | None = None,
+    spacing: float | None = None,
+    contacts: str = "all",
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
     """Robots of your own, which MuJoCo moves.
@@ -154,6 +156,8 @@ def mjcf_robots(
         lookahead: tau in s; with it y_i is the joint's position with a look-ahead, q + tau v.
         local_damping: d in N s/m, then: the force is u - d v.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
+        spacing: in m along y from one robot to the next; 2 if left out.
+        contacts: "all" as files say, or but those with the "floor", of "agents", or "none".
         input_limit: in N or N m.
     """
     each = [file] if isinstance(file, str | Path) else list(file)
@@ -168,6 +172,8 @@ def mjcf_robots(
         lookahead=lookahead,
         local_damping=local_damping,
         reference_velocity=reference_velocity,
+        spacing=spacing,
+        contacts=contacts,
         input_limit=input_limit,
     )
 

@@ -64,6 +64,36 @@ def share_floors(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[in
             owners[kept] |= owners[geom]
 
 
+def let_touch(model: mujoco.MjModel, which: str) -> None:
+    """Leave but some contacts of a fleet.
+
+    Args:
+        model: of the fleet; collision bits are changed, or contacts switched off.
+        which: "all" as files say; "floor": of robots with what stands in the world, neither with
+            each other nor within one; "agents": all but those with what stands in the world;
+            "none". Pairs that a file names stay, but for "none".
+    """
+    if which == "none":
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    stands, contype, conaffinity = (
+        model.geom_bodyid == 0,
+        model.geom_contype,
+        model.geom_conaffinity,
+    )
+    if which == "agents":
+        contype[stands] = conaffinity[stands] = 0
+    if which == "floor":
+        of, by = np.bitwise_or.reduce(contype[stands]), np.bitwise_or.reduce(conaffinity[stands])
+        lands = ~stands & ((contype & by | conaffinity & of) != 0)
+        there = stands & ((contype | conaffinity) != 0)
+        contype[:], conaffinity[:] = lands, there
+    for name in ("contype", "conaffinity"):
+        bits = getattr(model, f"body_{name}")
+        if which != "all":
+            bits[:] = 0
+            np.bitwise_or.at(bits, model.geom_bodyid, getattr(model, f"geom_{name}"))
+
+
 def check_apart(
     model: mujoco.MjModel,
     data: mujoco.MjData,

@@ -17,7 +17,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
-from gne_mj.plants.mjcf_contacts import check_apart, owners_of, share_floors, sizes_of
+from gne_mj.plants.mjcf_contacts import check_apart, let_touch, owners_of, share_floors, sizes_of
 from gne_mj.plants.mjcf_drive import add_effort, driving
 from gne_mj.plants.mjcf_prediction import (
     FRAME_FUNCTIONS,
@@ -45,10 +45,12 @@ from gne_mj.records import by_name
 
 __all__ = ["AGENT", "MjcfPlant", "add_forces", "drive", "gather", "refresh", "stored"]
 
-SPACING = 2.0  # m between robots, so that they do not touch
 NEWTON = 20  # steps to a start's positions
 # What to do where they do
-BESIDE = f", {SPACING:g} m beside it: make its file narrower, or its floor a plane, which all share"
+BESIDE = (
+    ", {:g} m beside it: give more spacing, make its file narrower, or its floor a plane, which all"
+    " share"
+)
 TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
 AGENT = mjcf_robot
 
@@ -114,6 +116,7 @@ class MjcfPlant(FleetPlant):
             mujoco.mj_fwdPosition(self.model, self.data)
         self._owners = owners_of(self.model, sizes_of_robots)
         share_floors(self.model, self.data, self._owners)
+        let_touch(self.model, agents.touching)
         self._terms: list[Term] = []  # of all outputs that are no joint's
         with named(input="agents.input", output="agents.output"):
             self._driving = driving(self.model, self.data, agents)
@@ -241,7 +244,7 @@ class MjcfPlant(FleetPlant):
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
-        advice = TOGETHER if self.agents.together else BESIDE
+        advice = TOGETHER if self.agents.together else BESIDE.format(self.agents.spacing)
         with named(robots="agents.path"):
             check_apart(self.model, self.data, self._owners, self.agents.files, advice)
         missed = np.abs(self.state[:, 0] - state[:, 0])
@@ -287,7 +290,7 @@ PLANT = MjcfPlant
 def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
     """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
-    robots, spacing = agents.files, 0.0 if agents.together else SPACING
+    robots, spacing = agents.files, 0.0 if agents.together else agents.spacing
     floor, across = world.geom("floor"), 0.5 * spacing * (len(robots) - 1)
     floor.pos[1], floor.size[1] = across, floor.size[1] + across
     for path in dict.fromkeys(robot.path for robot in robots):

@@ -22,7 +22,7 @@ from gne_mj.plants.mjcf_input import Input, InputTable, inputs_of
 from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
-from gne_mj.toml_table import Fills, Sizes, dimension_of
+from gne_mj.toml_table import Fills, Sizes, Unit, dimension_of
 
 NAME = "MJCF robot"
 PARAMETERS: tuple[str, ...] = ()
@@ -30,6 +30,7 @@ STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
 INPUT_UNIT = "N or N m"
 KNOWS_STORAGE = False
+SPACING = 2.0  # m between robots, so that they do not touch
 FLEET = "gne_mj.plants.mjcf_fleet"
 
 
@@ -59,10 +60,19 @@ class MjcfRobots(Agents):
         robots: one a channel; those of an agent name the same file.
         together: whether all are put at one place, since their positions are what they decide;
             else beside each other.
+        spacing: in m from one to the next, then.
+        touching: which contacts there are, see :func:`gne_mj.plants.mjcf_contacts.let_touch`.
     """
 
     robots: tuple[RobotFile, ...] = ()
     together: bool = False
+    spacing: float = SPACING
+    touching: str = "all"
+
+    @property
+    def world(self) -> tuple[object, ...]:
+        """What tells their model from others of the same kind."""
+        return self.robots, self.together, self.spacing, self.touching
 
     @property
     def files(self) -> tuple[RobotFile, ...]:
@@ -117,6 +127,14 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         " likewise"
     )
 
+    spacing: Annotated[float | None, Unit("m")] = Field(
+        None, ge=0, description="along y from one robot to the next; 2 if left out"
+    )
+    contacts: Literal["all", "floor", "agents", "none"] = Field(
+        "all",
+        description="of robots with the floor and each other, as files say; or but one of these",
+    )
+
     @property
     def positions(self) -> bool:
         """See the base class."""
@@ -140,6 +158,11 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
             kind, numbers = mjcf_position, np.column_stack(parts)
         else:
             self.check_unused("it is for robots with a lookahead, whose outputs are positions")
+        if self.positions and self.spacing is not None:
+            raise InvalidInput(
+                "spacing", self.spacing, "with a lookahead positions say where they are"
+            )
         return MjcfRobots(
-            kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions
-        )
+            kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions,
+            spacing=SPACING if self.spacing is None else self.spacing, touching=self.contacts,
+        )  # fmt: skip
