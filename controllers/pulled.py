@@ -28,7 +28,7 @@ from gne_mj.native import kernel
 class Pulled(Law):
     """Another's wish and the barrier's gradient; the costs have no part in it."""
 
-    proven: ClassVar[LawTheorem] = LawTheorem("docs/learning.md, Theorem 10")
+    proven: ClassVar[LawTheorem] = LawTheorem("docs/learning.md, Theorem 11")
     guarded: ClassVar[bool] = True
 
     @property

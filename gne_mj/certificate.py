@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import exits, kept_apart, monitored, outside, run_metrics, tracking
-from gne_mj.epsilon import epsilon_bounds
+from gne_mj.epsilon import epsilon_at, epsilon_bounds
 from gne_mj.equilibrium import Equilibrium, measured_epsilon, variational_equilibrium
 from gne_mj.errors import SolverError
 from gne_mj.loops import monitor as watch
@@ -40,7 +40,7 @@ class Certificate:
         tracking: of games or penalties that move, the distance to y*(t) beside its bound
             (:func:`gne_mj.tracking.report`); None of others.
         epsilon: what agents could gain at the penalised equilibrium, against
-            :func:`gne_mj.epsilon.epsilon_bounds`.
+            :func:`gne_mj.epsilon.epsilon_bounds`, and where the run ended.
         settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
             whether it is known (not of MJCF robots, nor without a y*), and whether the theory
@@ -155,7 +155,7 @@ def certify_run(
         outside=outside.report(system.game, monitor, system.goes_on),
         equilibrium=present.spread(_equilibrium(present.system, present.action, present.time)),
         tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
-        epsilon=_epsilon(present.system, time[-1]),
+        epsilon=_epsilon(present.system, time[-1], present.action[-1]),
         settling_time=_settling_time(time, distance),
         lyapunov=_lyapunov(present, monitor, intervened),
         actuators=monitored.actuators(system, monitor),
@@ -312,7 +312,7 @@ def _variational_at(system: System, penalised: Equilibrium, time: float) -> Equi
         return None
 
 
-def _epsilon(system: System, end: float) -> dict[str, Any]:
+def _epsilon(system: System, end: float, y: NDArray[np.float64]) -> dict[str, Any]:
     # What agents could gain is asked of the set itself, also where the barrier keeps farther away.
     known, gains, game = system.equilibrium_at(end), None, system.game_at(end)
     if known is not None:
@@ -320,6 +320,7 @@ def _epsilon(system: System, end: float) -> dict[str, Any]:
             gains = measured_epsilon(of_the_set(game), known.action)
     return {
         "measured": None if gains is None else float(np.max(gains)),
+        "at_end": epsilon_at(of_the_set(game), y) if np.all(np.isfinite(y)) else None,
         **epsilon_bounds(game, system.rho, known, gains=gains),
     }
 

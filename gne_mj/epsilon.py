@@ -1,17 +1,19 @@
-"""What an agent could gain at most by deviating alone: the bounds of the paper's lemma."""
+"""What an agent could gain at most by deviating alone: the paper's lemma, and by measurement."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.equilibrium import Equilibrium
+from gne_mj.equilibrium import Equilibrium, measured_epsilon
+from gne_mj.errors import SolverError
 from gne_mj.game_model import Game
 
 Array = NDArray[np.float64]
 
 # Gains are differences of costs: relative to the costs, and to the bound
 _ROUNDING, _ABOVE = 1e-12, 1e-6
+_WIDER = 1e-9  # part of g by which bounds are widened beyond what a profile violates them by
 NOT_CONVEX = "not every J_i is convex in y_i"
 
 
@@ -73,3 +75,23 @@ def epsilon_bounds(
         "own_bound": [None if np.isnan(each) else each for each in own.tolist()],
         "refuted": refuted,
     }
+
+
+def epsilon_at(game: Game, y: Array) -> float | None:
+    """What an agent could gain at most by deviating alone from a profile (m,), as measured.
+
+    That is in the set itself; of a profile that is not strictly inside, in the set whose violated
+    bounds are wider by what it violates them by. None where a best response is not found.
+
+    Args:
+        game: without tightening.
+        y: finite.
+    """
+    g = game.constraints(y)
+    wider = np.where(g < 0.0, 0.0, g + _WIDER * (1.0 + np.abs(g)))
+    if np.any(wider > 0.0):
+        game = game.tightened(-wider)
+    try:
+        return float(np.max(measured_epsilon(game, y)))
+    except SolverError:
+        return None

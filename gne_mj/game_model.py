@@ -259,10 +259,13 @@ class Game:
         return "bounds on gaps" if self.gap_bounds is not None else self.constraint_class
 
     def tightened(self, tightening: ArrayLike) -> Self:
-        """The same game with a barrier of g + t < 0; t >= 0, one number or (p,)."""
+        """The same game with a barrier of g + t < 0; t is one number or (p,).
+
+        A negative t widens a bound.
+        """
         margin = np.broadcast_to(tightening, (self.constraints_count,)).astype(np.float64)
-        if not np.all(np.isfinite(margin)) or np.any(margin < 0):
-            raise InvalidInput("tightening", tightening, "it must be finite and not negative")
+        if not np.all(np.isfinite(margin)):
+            raise InvalidInput("tightening", tightening, "it must be finite")
         game = copy.copy(self)  # not `replace`, which would take plain functions for kernels
         game.__dict__.pop("data", None)  # holds the old one
         object.__setattr__(game, "tightening", margin)

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 import gne_mj as gm
 from gne_mj.controllers import FullInformation
 from gne_mj.controllers.plain_law import PlainLaw, PlainLawOutside
+from gne_mj.epsilon import epsilon_at
 from gne_mj.errors import InvalidInput
 from gne_mj.expressions import game
 from gne_mj.outside import parts_of_bounds
@@ -139,3 +140,19 @@ def test_batches_have_the_same_figures(tmp_path):
     settled = report["equilibrium"]["settling_time_to_variational"]
     assert settled is None
     assert np.isnan(float(runs["settling_time_to_variational"][0]))
+
+
+def test_what_agents_could_gain_where_a_run_ends():
+    """In closed form: within bounds, and beyond one, which is then as wide as that."""
+
+    def cost(i, y, p):
+        return 0.5 * (y[i] - p.wanted[i]) ** 2
+
+    def constraints(y, p):
+        for i in range(2):
+            yield f"bound {i + 1}", abs(y[i]) <= 1.0
+
+    bounded = game(2, cost, constraints, wanted=[2.0, 0.3])
+    assert_allclose(epsilon_at(bounded, np.array([0.5, 0.0])), 0.5 * (1.5**2 - 1.0), rtol=1e-6)
+    assert_allclose(epsilon_at(bounded, np.array([1.2, 0.0])), 0.5 * 0.3**2, rtol=1e-6)
+    assert_allclose(epsilon_at(bounded, np.array([1.0, 0.3])), 0.0, atol=1e-6)

@@ -15,11 +15,14 @@ from gne_mj.batches import Plan, Store
 from gne_mj.comparison.entrants import ALL, Entrant, Given, entrants
 from gne_mj.comparison.stored import batch
 from gne_mj.comparison.tuning import OBJECTIVE, Search, Tuned, tune
+from gne_mj.epsilon import epsilon_at
 from gne_mj.errors import InvalidInput
+from gne_mj.margins import of_the_set
 from gne_mj.progress import Tell, if_asked
 from gne_mj.scenario import Source, load_scenario
 from gne_mj.scenario_tables import Scenario
 from gne_mj.simulation import Simulation
+from gne_mj.system import System
 from gne_mj.theory.guarantees import certify
 from gne_mj.trajectory import Trajectory, versions
 
@@ -157,6 +160,11 @@ def _run(entrant: Entrant, folder: Path, how: Mapping[str, Any]) -> xarray.Datas
         "run", np.sqrt(np.mean(runs["rms_input"].to_numpy() ** 2, axis=1)),
         {**runs["rms_input"].attrs, "long_name": "RMS over time and channels"},
     )  # fmt: skip
+    ends = runs["final_action"].to_numpy()
+    data["epsilon"] = (
+        "run", np.array([_epsilon(system, clock.duration, end) for end in ends]),
+        {"long_name": "what an agent could gain by deviating alone at the end"},
+    )  # fmt: skip
     data["violation"] = (
         ("run", "time"),
         np.maximum(np.max(g, axis=2), 0.0),
@@ -167,6 +175,13 @@ def _run(entrant: Entrant, folder: Path, how: Mapping[str, Any]) -> xarray.Datas
         {"units": system.game.action_unit, "long_name": "to the variational equilibrium"},
     )  # fmt: skip
     return xarray.Dataset(data, {"time": ("time", runs["time"].to_numpy(), {"units": "s"})})
+
+
+def _epsilon(system: System, time: float, y: np.ndarray) -> float:
+    """What an agent could gain at a run's end; not a number where that is not known."""
+    known = np.all(np.isfinite(y))
+    found = epsilon_at(of_the_set(system.game_at(time)), y) if known else None
+    return np.nan if found is None else found
 
 
 def _beside(tuned: Sequence[Tuned], folder: Path) -> Trajectory:

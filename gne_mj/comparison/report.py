@@ -33,6 +33,7 @@ COLUMNS = (
     Shown("integral", "violation_integral", ("median",)),
     Shown("settling (s)", "settling_time_to_variational", ("median", "90%")),
     Shown("final error", "final_error_to_variational", ("median", "90%")),
+    Shown("epsilon", "epsilon"),
     Shown("RMS input", "rms_input"),
     Shown("peak input", "peak_input", ("median", "worst")),
 )

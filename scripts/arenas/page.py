@@ -33,7 +33,8 @@ COLUMNS = {
     "violation, worst": "violation, worst",
     "of the bound, worst": "of the bound", "outside (s), median": "outside (s)",
     "settling (s), median": "settling (s)", "final error, median": "final error",
-    "RMS input, median": "RMS input", "messages": "messages", "step (us)": "step (us)",
+    "epsilon, median": "epsilon", "RMS input, median": "RMS input", "messages": "messages",
+    "step (us)": "step (us)",
 }  # fmt: skip
 
 
@@ -173,9 +174,9 @@ def draw(curves: dict[str, Any], file: Path) -> None:
             else:
                 axes.plot(time, worst, label=law, **line_style(number))
                 number += 1
-        axes.plot([], [], color="black", linewidth=2.6, label="this package's laws: 0")
+        axes.plot([], [], color="black", linewidth=2.6, label="this package's laws: never")
         axes.set_yscale("symlog", linthresh=1e-3)
-        axes.set(xlabel="time (s)", ylabel="violation of the worst run, $\\max_l\\ [g_l]^+$")
+        axes.set(xlabel="time (s)", ylabel="how far outside the shared limits")
         axes.set_ylim(-2e-4, None)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         figure.savefig(file, dpi=160)
