@@ -25,7 +25,7 @@ GAME, _ = energy(6)
         (lambda: gm.run(GAME, law=gm.ring(6)), "law: got <Graph .* it must be a law, such as full"),
         (lambda: gm.run(GAME, agents=6), "agents: got 6, but it must be agents, such as"),
         (lambda: gm.load_scenario("velocity-sync", {"controller.graph": "ring"}),
-         "information = 'custom' or 'distributed' or 'partial', not to 'full'"),
+         "belongs to information = 'custom' or 'distributed' or .*, not to 'full'"),
     ],
 )  # fmt: skip
 def test_arguments_that_there_are_not_are_answered_with_those_that_there_are(call, words):

@@ -323,7 +323,10 @@ def test_pieces_to_tell_whose_exit_it_is_are_as_many_as_a_step_may_have():
 def test_a_slack_is_used_up_by_stages_too():
     """Three quarters at the second stage, none at the end; and twice as much at the third."""
     work = workspace_for_pieces(1, 2)
-    problem = SimpleNamespace(data=SimpleNamespace(tightening=np.array([0.0, 0.5])))
+    problem = SimpleNamespace(
+        data=SimpleNamespace(tightening=np.array([0.0, 0.5])),
+        settings=np.zeros(settings_of_laws.COUNT),
+    )
     stages = work.stages
     stages.g[:] = [-1.0, -1.5, -0.25, -1.5, -1.0, -2.5, -1.0, -1.5]  # stage by stage
     work.g[:] = [-1.0, -1.25]
@@ -336,7 +339,9 @@ def test_sizes_are_those_that_the_start_shows():
     """At least what is given; rounding and errors are measured by them."""
     work = workspace_for_pieces(3, 2)
     problem = SimpleNamespace(
-        data=SimpleNamespace(tightening=np.array([0.0, 0.5])), size=np.array([1.0, 0.25, 4.0])
+        data=SimpleNamespace(tightening=np.array([0.0, 0.5])),
+        size=np.array([1.0, 0.25, 4.0]),
+        settings=np.zeros(settings_of_laws.COUNT),
     )
     for y in ([0.5, -7.0, 2.0], [90.0, 0.0, 0.0]):  # the start, and what comes later
         work.y[:], work.g[:] = y, [-3.0, -1.5]
@@ -353,7 +358,9 @@ def piece_of(rate, g, y, h):
         tightening=np.zeros(p), member_pointer=m * np.arange(p + 1),
         member_index=np.tile(np.arange(m), p), offsets=np.arange(m + 1),
     )  # fmt: skip
-    problem = SimpleNamespace(data=data, size=np.ones(1 + p))
+    problem = SimpleNamespace(
+        data=data, size=np.ones(1 + p), settings=np.zeros(settings_of_laws.COUNT)
+    )
     k, point = [], y
     for stage, part in enumerate((0.5, 0.5, 1.0, None)):
         work.y[:], work.g[:] = point, g(point)

@@ -12,7 +12,7 @@ from own_games import boxed, plain_game
 
 from gne_mj import certificate, user_files
 from gne_mj.batches import make_plan
-from gne_mj.controllers import FullInformation
+from gne_mj.controllers import FullInformation, settings
 from gne_mj.cores import cores
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Push
@@ -139,7 +139,8 @@ def test_v_is_known_about_a_known_equilibrium_of_agents_that_have_one(about, sto
         storage_start=2.0, storage=1.0, storage_rise=0.0, storage_rise_time=0.0, started=1.0,
         saturated=0.0, time=3.0, exit=0,
     )  # fmt: skip
-    found = certificate._lyapunov(system, monitor, False)
+    present = SimpleNamespace(system=system, systems=(system,), whole=system)
+    found = certificate._lyapunov(present, monitor, False)
     assert found["known"] == found["claimed"] == (about and stored)
     assert (found["start"], found["final"]) == ((2.0, 1.0) if about else (None, None))
 
@@ -300,6 +301,10 @@ def test_what_a_step_by_old_factors_leaves_is_its_worst_entry_over_the_longest()
     assert kernel(3, SimpleNamespace(step=0.0 * step, old_step=old)) == 1.0
 
 
+def problem_of(data):
+    return SimpleNamespace(data=data, settings=np.zeros(settings.COUNT))
+
+
 def euler_piece(change, count=1):
     """A slack of 1 that a piece of 0.1 s changes by so much, judged; the division and its rates."""
     stages = SimpleNamespace(
@@ -310,7 +315,7 @@ def euler_piece(change, count=1):
     pieces = SimpleNamespace(
         member_pointer=[0, 1], member_index=[0], offsets=[0, 1], tightening=np.zeros(1)
     )
-    return division.judge(count, 0.1, SimpleNamespace(data=pieces), work), div, stages, work
+    return division.judge(count, 0.1, problem_of(pieces), work), div, stages, work
 
 
 def test_a_piece_of_eulers_method_is_compared_with_the_rate_of_the_one_before():
@@ -320,7 +325,7 @@ def test_a_piece_of_eulers_method_is_compared_with_the_rate_of_the_one_before():
     assert stages.g[1] == pytest.approx(1.0), "0.1 in 0.1 s"
     stages.g[0] = work.g[0]
     work.g[0] += 0.1 + 0.017  # half of what has changed is 0.0085 of a slack of 0.9: allowed 0.009
-    problem = SimpleNamespace(data=SimpleNamespace(tightening=np.zeros(1)))
+    problem = problem_of(SimpleNamespace(tightening=np.zeros(1)))
     assert division.judge(1, 0.1, problem, work) == -1
     stages.g[:2] = -0.9, 1.0
     work.g[0] = -0.9 + 0.1 + 0.019

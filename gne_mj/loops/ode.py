@@ -102,6 +102,7 @@ def control_step(faults, place, parts, at, storage, state, memory):
             measurement = faults.sense(problem, work, work.y, work.measurement)
             good = explicit_law(problem, at.time, stage, measurement, memory, work, monitor)
             good = good and faults.push_apart(problem, place, at)
+        work.now.state = 0.0  # an address is of no use where a workspace is copied to
         if not good:
             return False
         if at.stage == division.END:
