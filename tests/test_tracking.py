@@ -49,6 +49,24 @@ def test_cascades_are_within_their_bound():
     assert found["final_bound"] < 10.0 * found["largest_distance"]
 
 
+@pytest.mark.parametrize(
+    ("law", "kept"),
+    [({"information": "full"}, True), ({"information": "distributed", "epsilon": 0.1}, False)],
+)
+def test_certify_speaks_of_a_penalty_that_falls(law, kept):
+    """Theorem 6, of laws whose barrier is at the outputs as they are."""
+    barrier = {"rho": 1.0, "schedule": "halving", "floor": 1e-3}
+    tables = one("integrator", reference=0.0, barrier=barrier)
+    tables["systems"]["a"]["controller"] |= law
+    scenario = load_scenario(tables)
+    found = certify(scenario.system_objects()[0], scenario.clock())
+    assert ("in continuous time every shared constraint holds while the penalty falls"
+            in found.guaranteed) == kept  # fmt: skip
+    assert any(
+        "kept while the penalty falls: its barrier" in each for each in found.not_certified
+    ) == (not kept)
+
+
 def test_of_robots_the_distance_is_told_and_why_there_is_no_bound():
     report = run(one("flexible-robot", "sampled")).reports["a"]
     assert report["tracking"]["within"] is None

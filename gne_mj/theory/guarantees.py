@@ -17,7 +17,7 @@ from gne_mj.theory import verdict
 from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.constants import SAMPLED, told
 from gne_mj.theory.coupling import needed_connectivity
-from gne_mj.theory.moving import moving
+from gne_mj.theory.moving import falling, moving
 from gne_mj.theory.periods import linear_period, push_period
 from gne_mj.theory.pieces import forecast
 from gne_mj.theory.positions import positions_of
@@ -157,6 +157,7 @@ def _certify(system: System, clock: Clock) -> Guarantees:
     law, pieces = system.law, forecast(system, clock)
     positions, apart = positions_of(system, clock), kept_apart(theorem, held, clock)
     motion, known = moving(system, clock), system.known_equilibrium
+    parts = [part for part in (apart, motion, falling(system)) if part is not None]
     return Guarantees(
         system=_system(system),
         status=HELD if held is not None and held.promised else theorem.status,
@@ -188,18 +189,13 @@ def _certify(system: System, clock: Clock) -> Guarantees:
         guaranteed=verdict.together(
             verdict.guaranteed(theorem, held),
             [] if positions is None else positions.guaranteed(theorem, held),
-            *(part.guaranteed() for part in (apart, motion) if part is not None),
+            *(part.guaranteed() for part in parts),
         ),
         measured=verdict.measured(theorem, pieces),
         not_certified=[
             *verdict.not_certified(theorem, held, pieces),
             *([] if positions is None else positions.not_certified(held)),
-            *(
-                each
-                for part in (apart, motion)
-                if part is not None
-                for each in part.not_certified()
-            ),
+            *(each for part in parts for each in part.not_certified()),
         ],
     )
 

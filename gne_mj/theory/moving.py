@@ -1,4 +1,4 @@
-"""What is certain of a game that moves (docs/moving-problems.md): the set is kept."""
+"""What is certain of a game or a penalty that moves (docs/moving-problems.md): the set is kept."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -47,20 +47,10 @@ class MovingGame:
         slopes = [system.game_at(t).pseudo_gradient_jacobian(system.start) for t in self.times]
         return float(min(np.linalg.eigvalsh(0.5 * (s + s.T))[0] for s in slopes))
 
-    @property
+    @cached_property
     def obstacles(self) -> list[str]:
         """Why the set is not certain to be kept in continuous time; empty if it is."""
-        system, convex = self.system, convex_constraints(self.system)
-        found = [] if convex.granted else [f"[{convex.label}] {convex.why}"]
-        if not system.law.guarded or system.game.private:
-            found.append("its barrier must be at the outputs as they are, and shared by all")
-        if system.agents.kind not in PUSHED:
-            found.append(f"{system.agents.kind.NAME}s: the proof is for outputs that inputs push")
-        if system.faults or limited(system):
-            found.append("the proof has neither faults nor input limits")
-        if system.separation is not None:
-            found.append("half-planes turn besides")
-        return found
+        return obstacles_to_keeping(self.system)
 
     def assumption(self) -> Assumption:
         """What mode implicit needs of the game at all times, not at the start alone."""
@@ -120,6 +110,53 @@ class MovingGame:
             "that y tends to y*, which moves: a run tells how far it is from y*(t), and beside it"
             " what that is at most, where it is known (tracking)",
         ]
+
+
+@dataclass(frozen=True, eq=False)
+class FallingPenalty:
+    """A system whose penalty falls while its game stands still."""
+
+    system: System
+
+    @cached_property
+    def obstacles(self) -> list[str]:
+        """See :class:`MovingGame`."""
+        return obstacles_to_keeping(self.system)
+
+    def guaranteed(self) -> list[str]:
+        """That the set is kept, in continuous time."""
+        if self.obstacles or mode_of(self.system).departure(self.system):
+            return []
+        return ["in continuous time every shared constraint holds while the penalty falls"]
+
+    def not_certified(self) -> list[str]:
+        """What is not promised."""
+        return [
+            *(f"that the set is kept while the penalty falls: {why}" for why in self.obstacles),
+            "that y tends to y*, which moves with the penalty: a run tells how far it is from"
+            " y*(t), and beside it what that is at most, where it is known (tracking)",
+        ]
+
+
+def obstacles_to_keeping(system: System) -> list[str]:
+    """Why Theorem 6 does not apply to a system; empty if it does."""
+    convex = convex_constraints(system)
+    found = [] if convex.granted else [f"[{convex.label}] {convex.why}"]
+    if not system.law.guarded or system.game.private:
+        found.append("its barrier must be at the outputs as they are, and shared by all")
+    if system.agents.kind not in PUSHED:
+        found.append(f"{system.agents.kind.NAME}s: the proof is for outputs that inputs push")
+    if system.faults or limited(system):
+        found.append("the proof has neither faults nor input limits")
+    if system.separation is not None:
+        found.append("half-planes turn besides")
+    return found
+
+
+def falling(system: System) -> FallingPenalty | None:
+    """The examination, of a penalty that falls in continuous time; None of others."""
+    falls = system.schedule is not None and motion_of(system.game) is None
+    return FallingPenalty(system) if falls and not mode_of(system).held else None
 
 
 def moving(system: System, clock: Clock) -> MovingGame | None:
