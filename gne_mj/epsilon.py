@@ -90,7 +90,7 @@ def epsilon_at(game: Game, y: Array) -> float | None:
     g = game.constraints(y)
     wider = np.where(g < 0.0, 0.0, g + _WIDER * (1.0 + np.abs(g)))
     if np.any(wider > 0.0):
-        game = game.tightened(-wider)
+        game = game.widened(wider)
     try:
         return float(np.max(measured_epsilon(game, y)))
     except SolverError:

@@ -259,16 +259,20 @@ class Game:
         return "bounds on gaps" if self.gap_bounds is not None else self.constraint_class
 
     def tightened(self, tightening: ArrayLike) -> Self:
-        """The same game with a barrier of g + t < 0; t is one number or (p,).
+        """The same game with a barrier of g + t < 0; t >= 0, one number or (p,)."""
+        return self._moved("tightening", tightening, 1.0)
 
-        A negative t widens a bound.
-        """
-        margin = np.broadcast_to(tightening, (self.constraints_count,)).astype(np.float64)
-        if not np.all(np.isfinite(margin)):
-            raise InvalidInput("tightening", tightening, "it must be finite")
+    def widened(self, by: ArrayLike) -> Self:
+        """The same game with a barrier of g < w; w >= 0, one number or (p,)."""
+        return self._moved("by", by, -1.0)
+
+    def _moved(self, key: str, given: ArrayLike, sign: float) -> Self:
+        margin = np.broadcast_to(given, (self.constraints_count,)).astype(np.float64)
+        if not np.all(np.isfinite(margin)) or np.any(margin < 0):
+            raise InvalidInput(key, given, "it must be finite and not negative")
         game = copy.copy(self)  # not `replace`, which would take plain functions for kernels
         game.__dict__.pop("data", None)  # holds the old one
-        object.__setattr__(game, "tightening", margin)
+        object.__setattr__(game, "tightening", sign * margin)
         return game
 
     @property

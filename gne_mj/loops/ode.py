@@ -63,7 +63,6 @@ def control_step(faults, place, parts, at, storage, state, memory):
 
     At the end of a piece of a step, mode continuous, what the next piece begins with is evaluated
     and kept: outputs and slacks, and the law where its action does not depend on the step.
-
     One kernel for all stages keeps loops small: that is most of their speed, and of compile time.
 
     Args:
