@@ -80,8 +80,11 @@ def load_gymnasium(
     """A Gymnasium environment of a scenario's fleet, in which one learner gives all forces.
 
     Args:
-        scenario, changes, system: as :func:`load_environment` has them.
-        bound, render_mode: as :class:`FleetEnv` has them.
+        scenario: as :func:`load_environment` has them.
+        changes: as :func:`load_environment` has them.
+        system: as :func:`load_environment` has them.
+        bound: as :class:`FleetEnv` has them.
+        render_mode: as :class:`FleetEnv` has them.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -108,9 +111,13 @@ def load_vector(
     """A Gymnasium vector environment of many fleets of a scenario, stepped natively on threads.
 
     Args:
-        scenario, changes, system: as :func:`load_environment` has them.
+        scenario: as :func:`load_environment` has them.
+        changes: as :func:`load_environment` has them.
+        system: as :func:`load_environment` has them.
         num_envs: how many fleets.
-        threads, bound, render_mode: as :class:`FleetVectorEnv` has them.
+        threads: as :class:`FleetVectorEnv` has them.
+        bound: as :class:`FleetVectorEnv` has them.
+        render_mode: as :class:`FleetVectorEnv` has them.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -138,8 +145,11 @@ def load_pettingzoo(
     """A PettingZoo environment (parallel API) of a scenario's fleet.
 
     Args:
-        scenario, changes, system: as :func:`load_environment` has them.
-        bound, render_mode: as :class:`FleetParallelEnv` has them.
+        scenario: as :func:`load_environment` has them.
+        changes: as :func:`load_environment` has them.
+        system: as :func:`load_environment` has them.
+        bound: as :class:`FleetParallelEnv` has them.
+        render_mode: as :class:`FleetParallelEnv` has them.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -164,7 +174,8 @@ def environment_of(
     """A dm_env environment of a MuJoCo fleet and its game: :class:`FleetTask` says what is what.
 
     Args:
-        system, clock: as :func:`setting_of` has them.
+        system: as :func:`setting_of` has them.
+        clock: as :func:`setting_of` has them.
         reward: "sum", minus the sum of all costs; "each", minus its cost to each agent, (N,).
         random: seed or generator of the random starts.
         **options: as :func:`setting_of` has them.

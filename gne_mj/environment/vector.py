@@ -28,7 +28,8 @@ class FleetVectorEnv(VectorEnv[Array, Array, Array]):
         setting: what an episode is.
         count: how many.
         threads: how many of the processor's cores step them; all if left out.
-        bound, render_mode: as of one environment.
+        bound: as of one environment.
+        render_mode: as of one environment.
 
     Attributes:
         setting: as given.
