@@ -80,11 +80,11 @@ def load_gymnasium(
     """A Gymnasium environment of a scenario's fleet, in which one learner gives all forces.
 
     Args:
-        scenario: as :func:`load_environment` has them.
-        changes: as :func:`load_environment` has them.
-        system: as :func:`load_environment` has them.
-        bound: as :class:`FleetEnv` has them.
-        render_mode: as :class:`FleetEnv` has them.
+        scenario: as :func:`load_environment` has it.
+        changes: as :func:`load_environment` has it.
+        system: as :func:`load_environment` has it.
+        bound: as :class:`FleetEnv` has it.
+        render_mode: as :class:`FleetEnv` has it.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -111,13 +111,13 @@ def load_vector(
     """A Gymnasium vector environment of many fleets of a scenario, stepped natively on threads.
 
     Args:
-        scenario: as :func:`load_environment` has them.
-        changes: as :func:`load_environment` has them.
-        system: as :func:`load_environment` has them.
+        scenario: as :func:`load_environment` has it.
+        changes: as :func:`load_environment` has it.
+        system: as :func:`load_environment` has it.
         num_envs: how many fleets.
-        threads: as :class:`FleetVectorEnv` has them.
-        bound: as :class:`FleetVectorEnv` has them.
-        render_mode: as :class:`FleetVectorEnv` has them.
+        threads: as :class:`FleetVectorEnv` has it.
+        bound: as :class:`FleetVectorEnv` has it.
+        render_mode: as :class:`FleetVectorEnv` has it.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -145,11 +145,11 @@ def load_pettingzoo(
     """A PettingZoo environment (parallel API) of a scenario's fleet.
 
     Args:
-        scenario: as :func:`load_environment` has them.
-        changes: as :func:`load_environment` has them.
-        system: as :func:`load_environment` has them.
-        bound: as :class:`FleetParallelEnv` has them.
-        render_mode: as :class:`FleetParallelEnv` has them.
+        scenario: as :func:`load_environment` has it.
+        changes: as :func:`load_environment` has it.
+        system: as :func:`load_environment` has it.
+        bound: as :class:`FleetParallelEnv` has it.
+        render_mode: as :class:`FleetParallelEnv` has it.
         **options: as :func:`setting_of` has them.
 
     Raises:
@@ -174,8 +174,8 @@ def environment_of(
     """A dm_env environment of a MuJoCo fleet and its game: :class:`FleetTask` says what is what.
 
     Args:
-        system: as :func:`setting_of` has them.
-        clock: as :func:`setting_of` has them.
+        system: as :func:`setting_of` has it.
+        clock: as :func:`setting_of` has it.
         reward: "sum", minus the sum of all costs; "each", minus its cost to each agent, (N,).
         random: seed or generator of the random starts.
         **options: as :func:`setting_of` has them.
