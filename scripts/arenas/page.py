@@ -157,26 +157,44 @@ def write(results: dict[str, Any], folder: Path) -> None:
     PAGE.write_text(made, encoding="utf-8")
     curves = folder.joinpath(*FIGURE, CURVE)
     if curves.exists():
-        draw(json.loads(curves.read_text(encoding="utf-8")), DOCS / "figures" / "arena.png")
+        drawn = json.loads(curves.read_text(encoding="utf-8"))
+        draw(drawn, results["cases"]["/".join(FIGURE)], DOCS / "figures" / "arena.png")
 
 
-def draw(curves: dict[str, Any], file: Path) -> None:
-    """Everybody's violation over time, ours at zero."""
+def draw(curves: dict[str, Any], case: dict[str, Any], file: Path) -> None:
+    """The violation over time of laws that were outside, and below it the names of the others.
+
+    Args:
+        curves: of the case, as :func:`keep_curves` has them.
+        case: its results.
+        file: to write.
+    """
     from gne_mj.plots.style import line_style, styled, subplots
 
+    by_worst = sorted(case["laws"], key=lambda law: -law["of the bound, worst"])
+    left = [law for law in by_worst if law["inside"] < law["runs"]]
+    never = sorted(
+        (law["law"] for law in case["laws"] if law not in left), key=lambda law: not _is_ours(law)
+    )
+    time, least = np.array(curves["time"]), 1e-3  # below which heights are in proportion
     with styled():
         figure, grid = subplots(1, 1, 7.2, 3.4)
-        axes, time, number = grid[0, 0], np.array(curves["time"]), 0
-        for law, curve in curves["laws"].items():
-            worst = np.array([np.nan if v is None else v for v in curve["worst"]])
-            if _is_ours(law):
-                axes.plot(time, worst, color="black", linewidth=2.6, zorder=3)
-            else:
-                axes.plot(time, worst, label=law, **line_style(number))
-                number += 1
-        axes.plot([], [], color="black", linewidth=2.6, label="this package's laws: never")
-        axes.set_yscale("symlog", linthresh=1e-3)
+        axes = grid[0, 0]
+        for number, law in enumerate(left):
+            worst = np.array(curves["laws"][law["law"]]["worst"], dtype=float)
+            label = f"{law['law']} ({100 * law['of the bound, worst']:.3g}%)"
+            axes.plot(time, worst, label=label, **line_style(number))
+        axes.axhline(0.0, color="black", linewidth=2.6)
+        axes.axhspan(-least, 0.0, color="green", alpha=0.12, linewidth=0)
+        names = ", ".join(f"{law}*" if _is_ours(law) else law for law in never)
+        words = f"never outside: {names}    (* this package's)"
+        axes.text(0.5 * time[-1], -0.5 * least, words, ha="center", va="center", fontsize=8)
+        axes.set_yscale("symlog", linthresh=least)
         axes.set(xlabel="time (s)", ylabel="how far outside the shared limits")
-        axes.set_ylim(-2e-4, None)
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.set(xlim=(0.0, time[-1]), ylim=(-least, None))
+        axes.set_yticks([0.0, *(10.0**k for k in range(-3, 1))])
+        axes.legend(
+            loc="center left", bbox_to_anchor=(1.0, 0.5),
+            title="outside, at most by\n(of the bound)", alignment="left",
+        )  # fmt: skip
         figure.savefig(file, dpi=160)
