@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import gne_mj as gm
 from gne_mj.equilibrium_path import EquilibriumPath
 from gne_mj.games import velocity_game
 from gne_mj.scenario import load_scenario, run
@@ -65,6 +66,18 @@ def test_certify_speaks_of_a_penalty_that_falls(law, kept):
     assert any(
         "kept while the penalty falls: its barrier" in each for each in found.not_certified
     ) == (not kept)
+
+
+def test_a_cost_without_bound_at_the_boundary_makes_it_an_assumption():
+    """From y = 1, dy/dt = -1/(2 y) + 0.1/y: it does leave."""
+    game = gm.game(
+        2, lambda i, y, p: 0.5 * np.log(y[i]), lambda y, p: [y[0] >= 0, y[1] >= 0, y.sum() <= 4]
+    )
+    falls = {"barrier.schedule": "exponential", "barrier.floor": 1e-3}
+    made = gm.setup(game, falls, agents=gm.integrators(2), law=gm.full_information(), rho=0.1)
+    (kept,) = gm.certify(made).guaranteed
+    assert kept.startswith("in continuous time every shared constraint holds while the penalty")
+    assert kept.endswith("provided [bounded F] F is bounded over the set, up to its boundary")
 
 
 def test_of_robots_the_distance_is_told_and_why_there_is_no_bound():

@@ -1,5 +1,6 @@
 """One assumption or condition, and how certain it is."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 MET, ASSUMED, UNKNOWN, FAILS = "met", "assumed", "unknown", "not met"
@@ -24,3 +25,9 @@ class Assumption:
     def granted(self) -> bool:
         """Whether conclusions may be drawn from it."""
         return self.status in (MET, ASSUMED)
+
+
+def provided(conditions: Iterable[Assumption]) -> str:
+    """How a sentence goes on that rests on what is only assumed; empty if all is met."""
+    terms = [f"[{each.label}] {each.why}" for each in conditions if each.status == ASSUMED]
+    return f", provided {' and '.join(terms)}" if terms else ""

@@ -9,8 +9,9 @@ import numpy as np
 from gne_mj.motion import motion_of
 from gne_mj.plants import flexible_robot, integrator, pi_cascade, position_robot
 from gne_mj.system import Clock, System, mode_of
-from gne_mj.theory.assumption import ASSUMED, FAILS, MET, Assumption
+from gne_mj.theory.assumption import ASSUMED, FAILS, MET, Assumption, provided
 from gne_mj.theory.commanded_input import limited
+from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
 from gne_mj.theory.convexity import convex_constraints
 
 # Outputs that inputs push, all else that moves them being bounded while they are
@@ -94,7 +95,7 @@ class MovingGame:
         return [
             "in continuous time every shared constraint holds as long as numbers move at finite"
             f" rates and the set has an interior, which it has at {len(self.times)} times that were"
-            " looked at"
+            f" looked at{provided(conditions_of_keeping(self.system))}"
         ]
 
     def not_certified(self) -> list[str]:
@@ -127,7 +128,8 @@ class FallingPenalty:
         """That the set is kept, in continuous time."""
         if self.obstacles or mode_of(self.system).departure(self.system):
             return []
-        return ["in continuous time every shared constraint holds while the penalty falls"]
+        terms = provided(conditions_of_keeping(self.system))
+        return [f"in continuous time every shared constraint holds while the penalty falls{terms}"]
 
     def not_certified(self) -> list[str]:
         """What is not promised."""
@@ -138,10 +140,21 @@ class FallingPenalty:
         ]
 
 
+def conditions_of_keeping(system: System) -> tuple[Assumption, ...]:
+    """What Theorem 6 assumes of the game: convex constraints, and an F that is bounded there."""
+    game, label = system.game, "bounded F"
+    slopes, still = Slopes(game, game.box, system.start, feasible=True), motion_of(game) is None
+    known = slopes.label == EXACT or (still and slopes.label == BOUNDED)
+    if known and np.isfinite(slopes.theta_1.value):
+        bounded = Assumption(label, MET, "dF/dy is bounded over the set")
+    else:
+        bounded = Assumption(label, ASSUMED, "F is bounded over the set, up to its boundary")
+    return convex_constraints(system), bounded
+
+
 def obstacles_to_keeping(system: System) -> list[str]:
     """Why Theorem 6 does not apply to a system; empty if it does."""
-    convex = convex_constraints(system)
-    found = [] if convex.granted else [f"[{convex.label}] {convex.why}"]
+    found = [f"[{c.label}] {c.why}" for c in conditions_of_keeping(system) if not c.granted]
     if not system.law.guarded or system.game.private:
         found.append("its barrier must be at the outputs as they are, and shared by all")
     if system.agents.kind not in PUSHED:

@@ -9,7 +9,7 @@ import numpy as np
 from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import followed_position
 from gne_mj.system import Clock, System
-from gne_mj.theory.assumption import ASSUMED, FAILS, MET, Assumption
+from gne_mj.theory.assumption import FAILS, MET, Assumption, provided
 from gne_mj.theory.convexity import convex_constraints
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
 from gne_mj.theory.zero_order_hold import ZeroOrderHold
@@ -78,21 +78,20 @@ class Positions:
         """What follows from what is guaranteed of outputs."""
         if not self.granted:
             return []
-        terms = [f"[{c.label}] {c.why}" for c in self.conditions if c.status == ASSUMED]
-        provided = f", provided {' and '.join(terms)}" if terms else ""
+        terms = provided(self.conditions)
         if theorem.status in (CERTIFIED, CONDITIONAL):
-            return [f"positions keep every shared constraint wherever outputs do so{provided}"]
+            return [f"positions keep every shared constraint wherever outputs do so{terms}"]
         if held is None or not held.promised or not self.stepwise:
             return []
         if self.clock.steps(self.clock.control_period) == 1:
             return [
                 "positions keep every shared constraint wherever outputs do so, and so at every"
-                f" integration step, each of which ends a control period{provided}: safety alone,"
+                f" integration step, each of which ends a control period{terms}: safety alone,"
                 " where they come to rest is measured"
             ]
         return [
             "positions keep every shared constraint up to the first integration step between two"
-            f" control instants at which outputs do not{provided}: safety alone"
+            f" control instants at which outputs do not{terms}: safety alone"
         ]
 
     def not_certified(self, held: ZeroOrderHold | None) -> list[str]:

@@ -3,7 +3,7 @@
 from gne_mj.motion import motion_of
 from gne_mj.plants.agent_type import has_ode
 from gne_mj.system import mode_of
-from gne_mj.theory.assumption import ASSUMED
+from gne_mj.theory.assumption import ASSUMED, provided
 from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.pieces import Pieces
 from gne_mj.theory.theorem import CERTIFIED, CONDITIONAL, Theorem
@@ -32,12 +32,12 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
     limit = _limit(theorem)
     as_long = ", as long as no input limit is met" if limited(system) else ""
     trust = [f"[{a.label}]" for a in theorem.assumptions if a.status == ASSUMED]
-    provided = f", provided {' and '.join(trust)}" if trust else ""
+    terms = f", provided {' and '.join(trust)}" if trust else ""
     if theorem.status == CERTIFIED:
         return [
-            f"in continuous time every shared constraint holds for all time{as_long}{provided}",
-            f"y(t) tends to the penalised equilibrium, {limit}{as_long}{provided}",
-            f"the Lyapunov function never rises{as_long}{provided}",
+            f"in continuous time every shared constraint holds for all time{as_long}{terms}",
+            f"y(t) tends to the penalised equilibrium, {limit}{as_long}{terms}",
+            f"the Lyapunov function never rises{as_long}{terms}",
         ]
     if theorem.status == CONDITIONAL:
         assert theorem.epsilon_bound is not None
@@ -45,14 +45,12 @@ def guaranteed(theorem: Theorem, held: ZeroOrderHold | None = None) -> list[str]
         small = "below some epsilon* > 0" if star is None else f"up to {star.epsilon:.4g} s"
         return [
             f"for all epsilon {small}, in continuous time, every shared constraint"
-            f" holds for all time{as_long}{provided}",
-            f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}"
-            f"{provided}",
+            f" holds for all time{as_long}{terms}",
+            f"for them the penalised equilibrium is exponentially stable, {limit}{as_long}{terms}",
         ]
     if held is not None and held.promised:
-        terms = [f"[{c.label}] {c.why}" for c in held.conditions if c.status == ASSUMED]
         promise = _BETWEEN if held.system.guarded else _AT_INSTANTS
-        return [promise + (f", provided {' and '.join(terms)}" if terms else "")]
+        return [promise + provided(held.conditions)]
     if held is None and system.guarded and has_ode(system.agents.kind):
         return [_FORESEEN]
     if not theorem.obstacles:
