@@ -1,8 +1,9 @@
 """An environment of a system, or of a scenario's."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,32 @@ from gne_mj.scenario import load_scenario
 from gne_mj.starts import random_starts
 from gne_mj.system import Clock, System
 
-Environment = TypeVar("Environment")
+
+@contextmanager
+def setting_in(
+    scenario: str | Path | Mapping[str, Any],
+    changes: Mapping[str, Any] | None,
+    system: str | None,
+    options: Mapping[str, Any],
+) -> Iterator[Setting]:
+    """A scenario's setting; what is refused within is named by the scenario's keys."""
+    with named(source="scenario"):
+        what = "environments"
+        loaded = load_scenario(scenario, changes).without_interventions(what)
+        loaded = loaded.without_membership(what)
+    name = loaded.name_of(system)
+    built = loaded.systems[name].build(name, loaded.simulation)
+    with loaded.naming(name):
+        yield setting_of(built, loaded.clock(), **options)
 
 
 def load_environment(
     scenario: str | Path | Mapping[str, Any],
     changes: Mapping[str, Any] | None = None,
     system: str | None = None,
+    *,
+    reward: Literal["sum", "each"] = "sum",
+    random: int | np.random.Generator | None = None,
     **options: Any,
 ) -> FleetEnvironment:
     """A dm_env environment of a scenario's fleet.
@@ -37,7 +57,9 @@ def load_environment(
         scenario: as :func:`gne_mj.load_scenario` has it.
         changes: likewise.
         system: which of the scenario's systems; may be left out if there is only one.
-        **options: as :func:`environment_of` and :func:`setting_of` have them.
+        reward: as :func:`environment_of` has it.
+        random: as :func:`environment_of` has it.
+        **options: as :func:`setting_of` has them.
 
     Raises:
         InvalidInput: names the key, the value and what would be right.
@@ -47,25 +69,8 @@ def load_environment(
     >>> timestep = environment.reset()
     >>> timestep = environment.step(np.zeros(environment.action_spec().shape))
     """
-    return of_scenario(environment_of, scenario, changes, system, options)
-
-
-def of_scenario(
-    make: Callable[..., Environment],
-    scenario: str | Path | Mapping[str, Any],
-    changes: Mapping[str, Any] | None,
-    system: str | None,
-    options: Mapping[str, Any],
-) -> Environment:
-    """What ``make`` makes of a scenario's system and clock, with its keys in messages."""
-    with named(source="scenario"):
-        what = "environments"
-        loaded = load_scenario(scenario, changes).without_interventions(what)
-        loaded = loaded.without_membership(what)
-    name = loaded.name_of(system)
-    built = loaded.systems[name].build(name, loaded.simulation)
-    with loaded.naming(name):
-        return make(built, loaded.clock(), **options)
+    with setting_in(scenario, changes, system, options) as setting:
+        return FleetEnvironment(setting, reward, random)
 
 
 def load_gymnasium(
@@ -90,11 +95,8 @@ def load_gymnasium(
     Raises:
         InvalidInput, InfeasibleStart: as :func:`load_environment`.
     """
-
-    def made(built: System, clock: Clock, **given: Any) -> FleetEnv:
-        return FleetEnv(setting_of(built, clock, **given), bound=bound, render_mode=render_mode)
-
-    return of_scenario(made, scenario, changes, system, options)
+    with setting_in(scenario, changes, system, options) as setting:
+        return FleetEnv(setting, bound=bound, render_mode=render_mode)
 
 
 def load_vector(
@@ -114,7 +116,7 @@ def load_vector(
         scenario: as :func:`load_environment` has it.
         changes: as :func:`load_environment` has it.
         system: as :func:`load_environment` has it.
-        num_envs: how many fleets.
+        num_envs: as :class:`FleetVectorEnv` has it.
         threads: as :class:`FleetVectorEnv` has it.
         bound: as :class:`FleetVectorEnv` has it.
         render_mode: as :class:`FleetVectorEnv` has it.
@@ -123,14 +125,10 @@ def load_vector(
     Raises:
         InvalidInput, InfeasibleStart: as :func:`load_environment`.
     """
-
-    def made(built: System, clock: Clock, **given: Any) -> FleetVectorEnv:
-        setting = setting_of(built, clock, **given)
+    with setting_in(scenario, changes, system, options) as setting:
         return FleetVectorEnv(
             setting, num_envs, threads=threads, bound=bound, render_mode=render_mode
         )
-
-    return of_scenario(made, scenario, changes, system, options)
 
 
 def load_pettingzoo(
@@ -155,12 +153,8 @@ def load_pettingzoo(
     Raises:
         InvalidInput, InfeasibleStart: as :func:`load_environment`.
     """
-
-    def made(built: System, clock: Clock, **given: Any) -> FleetParallelEnv:
-        setting = setting_of(built, clock, **given)
+    with setting_in(scenario, changes, system, options) as setting:
         return FleetParallelEnv(setting, bound=bound, render_mode=render_mode)
-
-    return of_scenario(made, scenario, changes, system, options)
 
 
 def environment_of(

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gne_mj.environment.episodes import Episodes
-from gne_mj.environment.load import of_scenario, setting_of
+from gne_mj.environment.load import setting_in
 from gne_mj.environment.setting import Guard, Setting
 
 PULL, LIMIT, AT_ONCE = 20.0, 200.0, 250
@@ -122,9 +122,9 @@ def setting(case: Case, guarded: bool) -> Setting:
         "agents.input_limit": LIMIT,
     }  # fmt: skip
     options = {"start": "random", "spread": 0.99}
-    found = of_scenario(setting_of, case.scenario, changes, None, options)
     guard = Guard(PULL, case.between, case.decentralised) if guarded else None  # type: ignore
-    return replace(found, guard=guard)
+    with setting_in(case.scenario, changes, None, options) as found:
+        return replace(found, guard=guard)
 
 
 def campaign(case: Case, policy: Policy, count: int, seed: int, *, guarded: bool) -> Count:
