@@ -2,13 +2,15 @@
 
 import json
 import runpy
-from functools import cache
+from functools import cache, partial
+from math import nan
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from builders import EQUAL, FIVE, V0, clock, robot_state, robot_system
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -308,12 +310,18 @@ def test_what_cannot_be_is_refused_in_one_sentence():
     system = robot_system(robot_state(FIVE), EQUAL, engine="mujoco")
     setting = setting_of(system, clock(0.01, 1.0))
     for call, said in (
+        (
+            lambda: guarded(gymnasium.wrappers.ClipAction(single)),
+            "environment: got 'ClipAction', but it must be one of this package's",
+        ),
         (lambda: guarded(single, pull=0.0), "pull: got 0.0, but it must be positive"),
         (lambda: guarded(single, between="garded"), "between: got 'garded', but"),
         (lambda: FleetEnv(setting, render_mode="human"), "render_mode: got 'human', but"),
-        (lambda: FleetVectorEnv(setting, 0), "count: got 0, but it must be at least 1"),
+        (lambda: FleetVectorEnv(setting, 0), "num_envs: got 0, but it must be a whole number"),
+        (lambda: FleetEnv(setting, bound=nan), "bound: got nan, but it must be positive"),
+        (lambda: vector().reset(seed=[1, 2]), "seed: got '2 seeds', but there are 5 fleets"),
         (lambda: parallel.step({}), "actions: got [], but reset first"),
-        (lambda: single.step(np.zeros(4)), "action: got 'shape (1, 4)', but"),
+        (lambda: single.step(np.zeros(4)), "action: got 'shape (4,)', but its shape must be (5,)"),
     ):
         with pytest.raises(InvalidInput) as caught:
             call()
@@ -323,6 +331,25 @@ def test_what_cannot_be_is_refused_in_one_sentence():
         parallel.step({name: np.zeros(1 if name != "agent_2" else 3) for name in parallel.agents})
     assert gne_mj.environment.guarded is guarded
     assert environment_of(system, clock(0.01, 1.0)).setting.guard is None
+
+
+def test_nothing_is_done_before_a_reset_and_closing_loses_nothing():
+    for made in (load_gymnasium, partial(load_vector, num_envs=2, threads=2), load_pettingzoo):
+        environment = made("velocity-sync", SHORT, render_mode="ansi")
+        refused = [environment.render]
+        if made is load_pettingzoo:
+            refused.append(environment.state)
+        else:
+            refused.append(lambda made=environment: made.step(np.zeros(made.action_space.shape)))
+        for call in refused:
+            with pytest.raises(ResetNeeded, match="reset"):
+                call()
+        first, _ = environment.reset(seed=0)
+        environment.close()
+        environment.close()
+        again, _ = environment.reset(seed=0)
+        assert str(first) == str(again)
+        assert "0.000 s: y = 1.000 0.000" in str(environment.render())
 
 
 def test_the_recipe_trains_a_policy_that_is_a_law(monkeypatch, tmp_path, capsys):

@@ -3,11 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.cores import cores
 from gne_mj.environment.observation import View, finite_costs
+from gne_mj.environment.picture import Picture, drawn
 from gne_mj.environment.setting import Setting, action_of, check_begun
+from gne_mj.errors import InvalidInput
 
 Array = NDArray[np.float64]
 BOUND = 1e3  # of what is observed, if nothing else is said
@@ -47,11 +50,13 @@ class Episodes:
     def __init__(
         self, setting: Setting, count: int = 1, threads: int | None = None, bound: float = BOUND
     ) -> None:
+        if not bound > 0.0:
+            raise InvalidInput("bound", bound, "it must be positive")
         self.setting = setting
         self.fleets = setting.fleets(count, cores() if threads is None else threads)
         self.view = View(setting.system.game, self.fleets.plants[0], setting.information)
         self.bounds = self.view.bounds(bound)
-        self._done = np.zeros(count, dtype=np.int64)
+        self._done = np.full(count, -1)  # periods; -1: it has not begun
 
     def begin(self, row: int, rng: np.random.Generator) -> None:
         """Let an episode start anew; what is random of its start comes from ``rng``."""
@@ -71,9 +76,11 @@ class Episodes:
             going: (E,) which episodes go on; the others are left as they are.
 
         Raises:
+            ResetNeeded: one has not begun.
             InvalidInput: another shape, or an entry that is not a number.
             UserCodeError, NotFinite: costs that are none, inside.
         """
+        self._check_begun()
         setting, fleets, rows = self.setting, self.fleets, self.fleets.rows
         rows.pull[:] = action_of(actions, setting.limit, rows.pull.shape)
         goes = np.ones(fleets.count, dtype=bool) if going is None else going
@@ -91,6 +98,21 @@ class Episodes:
         """What is observed now, (E, columns), each entry cut to its bounds.
 
         Raises:
+            ResetNeeded: one has not begun.
             NotFinite: an entry that is not a number.
         """
+        self._check_begun()
         return np.clip(self.view.check(self.view.table(self.fleets)), *self.bounds)
+
+    def drawn(self, mode: str | None, row: int) -> Picture | str | None:
+        """A picture or a line of text of one of them, see :func:`gne_mj.environment.picture.drawn`.
+
+        Raises:
+            ResetNeeded: one has not begun.
+        """
+        self._check_begun()
+        return drawn(mode, self.setting.system, self.fleets, row)
+
+    def _check_begun(self) -> None:
+        if np.any(self._done < 0):
+            raise ResetNeeded("call reset() first: an episode has not begun")

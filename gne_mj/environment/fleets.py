@@ -181,6 +181,7 @@ class Fleets:
         """Let the threads go."""
         if "_pool" in vars(self):
             self._pool.shutdown()
+            del self._pool  # a later step has others
 
 
 def _tools(plant: FleetPlant, keeper: ParameterBlock | None, shared: bool) -> Tools:

@@ -3,6 +3,7 @@
 from typing import Any, Literal, Protocol, TypeVar
 
 from gne_mj.environment.setting import Guard, Setting
+from gne_mj.errors import InvalidInput
 
 
 class HasSetting(Protocol):
@@ -38,12 +39,17 @@ def guarded(
         decentralised: each agent finds its input alone, in its share of what is left of each bound.
 
     Raises:
-        InvalidInput: a pull that is not positive, or what mode ``implicit`` refuses.
+        InvalidInput: an environment that is wrapped, a pull that is not positive, or what mode
+            ``implicit`` refuses.
 
     >>> environment = load_environment("velocity-sync", {"agents.input_limit": 40.0})
     >>> environment = guarded(environment, pull=10.0)
     """
-    found: Environment = environment.of(
-        environment.setting.guarded(Guard(pull, between, decentralised))
-    )
+    if not hasattr(type(environment), "of"):  # Gymnasium's wrappers pass on some attributes
+        raise InvalidInput(
+            "environment", type(environment).__name__,
+            "it must be one of this package's; of a wrapped one give environment.unwrapped",
+        )  # fmt: skip
+    guard = Guard(pull, between, decentralised)
+    found: Environment = environment.of(environment.setting.guarded(guard))
     return found

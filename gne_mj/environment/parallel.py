@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from gne_mj.environment.episodes import BOUND, Episodes
-from gne_mj.environment.picture import MODES, Picture, drawn
+from gne_mj.environment.picture import MODES, Picture
 from gne_mj.environment.setting import Setting
 from gne_mj.environment.single import check_mode, info_of, joint_spaces
 from gne_mj.errors import InvalidInput
@@ -56,11 +56,11 @@ class FleetParallelEnv(ParallelEnv[str, Array, Array]):
         }
         view, limit, (lower, upper) = self.episodes.view, setting.limit, self.episodes.bounds
         self._columns = {name: view.own(i) for i, name in enumerate(self.possible_agents)}
-        self._observation_spaces = {
+        self.observation_spaces = {
             name: spaces.Box(lower[own], upper[own], dtype=np.float64)
             for name, own in self._columns.items()
         }
-        self._action_spaces = {
+        self.action_spaces = {
             name: spaces.Box(-limit[own], limit[own], dtype=np.float64)
             for name, own in self.action_entries.items()
         }
@@ -73,11 +73,11 @@ class FleetParallelEnv(ParallelEnv[str, Array, Array]):
 
     def observation_space(self, agent: str) -> spaces.Space[Array]:
         """What an agent sees."""
-        return self._observation_spaces[agent]
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Array]:
         """An agent's forces (m_i,)."""
-        return self._action_spaces[agent]
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -123,7 +123,7 @@ class FleetParallelEnv(ParallelEnv[str, Array, Array]):
 
     def render(self) -> Picture | str | None:
         """A picture or a line of text, by ``render_mode``."""
-        return drawn(self.render_mode, self.setting.system, self.episodes.fleets, 0)
+        return self.episodes.drawn(self.render_mode, 0)
 
     def close(self) -> None:
         """Let threads go."""

@@ -8,8 +8,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from gne_mj.environment.episodes import BOUND, Episodes
-from gne_mj.environment.picture import MODES, Picture, drawn
-from gne_mj.environment.setting import Setting
+from gne_mj.environment.picture import MODES, Picture
+from gne_mj.environment.setting import Setting, action_of
 from gne_mj.errors import InvalidInput, nearest
 
 Array = NDArray[np.float64]
@@ -72,14 +72,15 @@ class FleetEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold forces (m,) for a control period; they are cut to ``action_space``."""
-        taken = self.episodes.step(np.asarray(action, dtype=np.float64)[None])
+        limit = self.setting.limit
+        taken = self.episodes.step(action_of(action, limit, limit.shape)[None])
         reward = float(np.sum(taken.reward[0]))
         over = bool(taken.left[0]), bool(taken.over[0])
         return self._observed(), reward, *over, info_of(self.episodes, 0)
 
     def render(self) -> Picture | str | None:
         """A picture or a line of text, by ``render_mode``."""
-        return drawn(self.render_mode, self.setting.system, self.episodes.fleets, 0)
+        return self.episodes.drawn(self.render_mode, 0)
 
     def close(self) -> None:
         """Let threads go."""

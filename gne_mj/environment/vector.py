@@ -1,5 +1,6 @@
 """Many fleets as a Gymnasium vector environment, stepped natively on threads."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from gne_mj.environment.episodes import BOUND, Episodes
-from gne_mj.environment.picture import MODES, Picture, drawn
+from gne_mj.environment.picture import MODES, Picture
 from gne_mj.environment.setting import Setting
 from gne_mj.environment.single import check_mode, info_of, joint_spaces
 from gne_mj.errors import InvalidInput
@@ -21,12 +22,12 @@ Flags = NDArray[np.bool_]
 class FleetVectorEnv(VectorEnv[Array, Array, Array]):
     """Copies of :class:`gne_mj.environment.FleetEnv`, each as it would be alone, to the bit.
 
-    An episode that has ended starts anew in the next step, whose action for it is not looked at
+    An episode that has ended starts anew in the next step, whose action for it does nothing
     (``AutoresetMode.NEXT_STEP``).
 
     Args:
         setting: what an episode is.
-        count: how many.
+        num_envs: how many.
         threads: how many of the processor's cores step them; all if left out.
         bound: as of one environment.
         render_mode: as of one environment.
@@ -38,28 +39,28 @@ class FleetVectorEnv(VectorEnv[Array, Array, Array]):
     def __init__(
         self,
         setting: Setting,
-        count: int,
+        num_envs: int,
         *,
         threads: int | None = None,
         bound: float = BOUND,
         render_mode: str | None = None,
     ) -> None:
         check_mode(render_mode)
-        for key, value in (("count", count), ("threads", 1 if threads is None else threads)):
-            if value < 1:
-                raise InvalidInput(key, value, "it must be at least 1")
-        self.setting, self.num_envs, self.render_mode = setting, count, render_mode
+        for key, value in (("num_envs", num_envs), ("threads", 1 if threads is None else threads)):
+            if not isinstance(value, int | np.integer) or value < 1:
+                raise InvalidInput(key, value, "it must be a whole number, at least 1")
+        self.setting, self.num_envs, self.render_mode = setting, int(num_envs), render_mode
         self._threads, self._bound = threads, bound
         self.metadata = {
             "autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": list(MODES),
             "render_fps": 1.0 / setting.clock.control_period,
         }  # fmt: skip
-        self.episodes = Episodes(setting, count, threads, bound)
+        self.episodes = Episodes(setting, self.num_envs, threads, bound)
         self.single_observation_space, self.single_action_space = joint_spaces(self.episodes)
-        self.observation_space = batch_space(self.single_observation_space, count)
-        self.action_space = batch_space(self.single_action_space, count)
-        self._rngs: list[np.random.Generator | None] = [None] * count
-        self._ended: Flags = np.zeros(count, dtype=bool)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._rngs: list[np.random.Generator | None] = [None] * num_envs
+        self._ended: Flags = np.zeros(num_envs, dtype=bool)
 
     def of(self, setting: Setting) -> "FleetVectorEnv":
         """The same of another setting."""
@@ -71,11 +72,20 @@ class FleetVectorEnv(VectorEnv[Array, Array, Array]):
     def reset(
         self,
         *,
-        seed: int | list[int | None] | None = None,
+        seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """Start all anew; copy number e by the seed plus e, or the e-th seed. No options."""
-        if isinstance(seed, list):
+        """Start all anew; copy number e by the seed plus e, or the e-th seed. No options.
+
+        Raises:
+            InvalidInput: not one seed for each.
+        """
+        seeds: Sequence[int | None]
+        if isinstance(seed, Sequence):
+            if len(seed) != self.num_envs:
+                raise InvalidInput(
+                    "seed", f"{len(seed)} seeds", f"there are {self.num_envs} fleets"
+                )
             seeds = seed
         elif seed is None:
             seeds = [None] * self.num_envs
@@ -102,8 +112,7 @@ class FleetVectorEnv(VectorEnv[Array, Array, Array]):
 
     def render(self) -> tuple[Picture | str | None, ...]:
         """A picture or a line of text of each, by ``render_mode``."""
-        fleets, system = self.episodes.fleets, self.setting.system
-        return tuple(drawn(self.render_mode, system, fleets, e) for e in range(self.num_envs))
+        return tuple(self.episodes.drawn(self.render_mode, e) for e in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Let threads go."""
