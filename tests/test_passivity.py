@@ -1,133 +1,28 @@
 """The empirical test of passivity: it must not cry wolf, and must find every wolf there is."""
 
-import itertools
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import EQUAL, UNEQUAL, integrators, pi_cascades, reference_robots, robots
+from builders import EQUAL, UNEQUAL, integrators, reference_robots, robots
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from passive_plants import (
+    PASSIVE,
+    PRINTED,
+    Linear,
+    kept_by,
+    lagging_integrator,
+    ode,
+    scalars,
+    violators,
+)
 from scipy.integrate import quad, solve_ivp
-from scipy.linalg import expm
 from typer.testing import CliRunner
 
 from gne_mj.cli import app
 from gne_mj.errors import InvalidInput
 from gne_mj.passivity import CHECKS, examine, plants_of
-from gne_mj.passivity.excitation import COMBINATIONS, SIGNALS, STRATEGIES, Excitation
-from gne_mj.plants.base import Plant
-from gne_mj.plants.ode import OdePlant
-
-PASSIVE = {
-    "integrators": integrators(2),
-    "PI cascades": pi_cascades(3, 1.3, 1.2),
-    "robots": robots(EQUAL),
-    "unequal robots": robots(UNEQUAL),
-    "robots without dampers": robots({**UNEQUAL, "damping": [0.0] * 5}),
-}
-PRINTED = {**EQUAL, "stiffness": [1, 1, -1, 1, 1], "atan_coefficient": [1, 1, -1, 1, 1]}
-NEGATIVE_DAMPING = {**EQUAL, "damping": [1, 1, -0.02, 1, 1]}
-
-
-def ode(agents, integrator="rk4"):
-    return plants_of(agents, "ode", integrator)
-
-
-class Appendage(OdePlant):
-    """Robots that are driven at the main mass and measured at the appendage."""
-
-    @property
-    def output(self):
-        return self.state[:, 2]
-
-
-def agents_of(channels, **more):
-    """Agents without a storage function, whose states have no names."""
-    kind = SimpleNamespace(STATES=())
-    return SimpleNamespace(channels=channels, kind=kind, knows_storage=False, **more)
-
-
-class Linear(Plant):
-    """Channels x' = A x + B u, y = x_0, stepped exactly; at rest at (y, ..., y) unless told."""
-
-    def __init__(self, channels, timestep, a, b):
-        n = len(b)
-        self.agents = agents_of(channels, equilibrium=lambda y: np.outer(y, np.eye(n)[0]))
-        self.timestep, self.x = timestep, np.zeros((channels, n))
-        block = np.zeros((n + 1, n + 1))
-        block[:n, :n], block[:n, n] = a, b
-        self.map = expm(timestep * block)[:n]
-
-    @property
-    def state(self):
-        return self.x.copy()
-
-    @property
-    def output(self):
-        return self.x[:, 0].copy()
-
-    def reset(self, state):
-        self.x = np.array(state)
-
-    def step(self, u, steps=1):
-        for _ in range(steps):
-            self.x = np.column_stack([self.x, u]) @ self.map.T
-
-
-class Scalar(Plant):
-    """y' = f(y) + u by RK4; the input -f(y) keeps it at any y."""
-
-    def __init__(self, channels, timestep, f):
-        self.agents, self.timestep, self.f = agents_of(channels), timestep, f
-        self.y = np.zeros(channels)
-
-    @property
-    def state(self):
-        return self.y[:, None].copy()
-
-    @property
-    def output(self):
-        return self.y.copy()
-
-    def reset(self, state):
-        self.y = np.array(state)[:, 0]
-
-    def step(self, u, steps=1):
-        h = self.timestep
-        for _ in range(steps):
-            k1 = self.f(self.y) + u
-            k2 = self.f(self.y + 0.5 * h * k1) + u
-            k3 = self.f(self.y + 0.5 * h * k2) + u
-            k4 = self.f(self.y + h * k3) + u
-            self.y = self.y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-
-
-class Delayed(OdePlant):
-    """A plant whose inputs arrive late, by a tenth of a second."""
-
-    def reset(self, state):
-        super().reset(state)
-        self.queue = [np.zeros(self.agents.channels)] * round(0.1 / self.timestep)
-
-    def step(self, u, steps=1):
-        for _ in range(steps):
-            self.queue.append(np.array(u))
-            super().step(self.queue.pop(0))
-
-
-def lagging_integrator(lag):
-    """y' = v, lag v' = u - v: an actuator that follows its command late."""
-    return lambda copies, h: Linear(2 * copies, h, [[0, 1], [0, -1 / lag]], [0, 1 / lag])
-
-
-def scalars(f):
-    return lambda copies, h: Scalar(2 * copies, h, f)
-
-
-def kept_by(f):
-    return lambda y: (y[:, None], -f(y))
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "euler"])
@@ -197,20 +92,6 @@ def test_a_wrong_storage_function_is_refuted_though_the_plant_is_passive():
 
     report = examine(ode(integrators(2)), 0.02, storage=twice)
     assert {f.check for f in report.findings if f.violated} == {"storage risen"}
-
-
-def violators():
-    return {
-        "printed psi": (ode(robots(PRINTED)), {3}),
-        "negative damping": (ode(robots(NEGATIVE_DAMPING)), {3}),
-        "non-collocated": (
-            lambda copies, h: Appendage(robots(EQUAL).repeated(copies), h), {1, 2, 3, 4, 5}
-        ),
-        "delay": (lambda copies, h: Delayed(integrators(2).repeated(copies), h), {1, 2}),
-        "delayed robots": (
-            lambda copies, h: Delayed(robots(EQUAL).repeated(copies), h), {1, 2, 3, 4, 5}
-        ),
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize("storage", ["agents", None])
@@ -284,37 +165,6 @@ def test_an_error_that_fades_with_the_step_is_no_violation():
     assert "at 1000 times the outputs' range" in report.message
 
 
-def test_the_ranges_are_those_that_were_tried():
-    """By hand, from the trials' own starts and inputs: integrators only move with their input."""
-    report = examine(ode(integrators(2)), 0.02, trials=4, duration=4.0, outputs=(-1.0, 2.0))
-    assert [r.reach for r in report.ranges] == [1.0, 30.0, 1e3]
-    for tried in report.ranges:
-        assert set(tried.states) == {"action"}
-        assert 0 < tried.input <= 3 * 3.0 * tried.reach
-        assert tried.output == pytest.approx(tried.states["action"], rel=0.2)
-        assert tried.output <= 4.0 * tried.input + 1e-9  # from rest, in 4 s
-    words = "\n".join(report.summary())
-    assert "at 3 amplitudes" in words
-    assert f"tried up to {report.ranges[-1].output:.3g} from y*" in words
-    assert report.to_dict()["ranges"][2]["reach"] == 1e3
-
-
-def test_amplitudes_at_which_outputs_run_away_say_nothing():
-    class Fragile(OdePlant):
-        @property
-        def output(self):
-            y = super().output
-            return np.where(np.abs(y) > 10.0, np.nan, y)
-
-    report = examine(
-        lambda copies, h: Fragile(integrators(2).repeated(copies), h), 0.02, trials=12, duration=4.0
-    )
-    assert report.holds
-    assert [r.reach for r in report.ranges] == [1.0]
-    assert report.examined == 4.0
-    assert "at 30 times the outputs' range an output ran away" in report.message
-
-
 def repeated_by_scipy(example, numbers, output):
     """Energy taken out of one reference robot under a counter-example's inputs, by DOP853."""
     robot = reference_robots({key: values[:1] for key, values in numbers.items()})
@@ -340,71 +190,6 @@ def test_a_counterexample_repeats_in_an_independent_simulation(name):
     assert taken > 0
     assert abs(taken - example.finding.excess) <= example.finding.error
     assert len(example.input) * example.hold == pytest.approx(example.finding.time)
-
-
-@pytest.mark.parametrize("integrator", ["rk4", "euler"])
-def test_the_error_estimate_holds(integrator):
-    """Against the same trials at a step eight times finer, held inputs equal by construction."""
-    from gne_mj.passivity.trials import Extent, Subject, Trials
-
-    def trials(timestep):
-        build = ode(robots(UNEQUAL), integrator)
-        subject = Subject(build, np.full(5, -1.0), np.full(5, 1.0), np.arange(5))
-        return Trials(subject, Extent(24, timestep, 5.0, 0), range(24))
-
-    coarse = trials(0.01)
-    error = 2 * np.maximum.accumulate(np.abs(coarse.supplied[0] - coarse.supplied[1]))
-    plant = ode(robots(UNEQUAL), integrator)(24, 0.01 / 16)
-    plant.reset(coarse.initial_state)
-    supplied = 0.0
-    for k, u in enumerate(coarse.input):
-        integral, _ = coarse._hold(plant, k, slice(None), coarse.substeps * 16)
-        supplied = supplied + u * integral
-        excess = (
-            np.abs(coarse.supplied[1, k + 1] - supplied) - error[k + 1] - coarse.rounding[k + 1]
-        )
-        if k > 20:
-            assert np.all(excess <= 0)
-
-
-def test_trials_repeat_and_more_trials_add_to_them():
-    build = ode(robots(NEGATIVE_DAMPING))
-    first, again = (examine(build, 0.02, seed=5, trials=30) for _ in range(2))
-    assert first.to_dict() == again.to_dict()
-    worst = first.counterexample.finding
-    alone = examine(build, 0.02, seed=5, trials=worst.trial + 1)
-    assert worst in alone.findings
-    assert examine(build, 0.02, seed=6).counterexample != first.counterexample
-
-
-def test_many_agents_are_examined_in_batches():
-    numbers = {key: np.tile(values, 60) for key, values in NEGATIVE_DAMPING.items()}
-    report = examine(ode(robots(numbers)), 0.02, trials=12, duration=10.0)
-    assert {f.agent for f in report.findings if f.violated} <= set(range(3, 300, 5))
-    alone = examine(ode(robots(NEGATIVE_DAMPING)), 0.02, trials=12, duration=10.0)
-    assert {f.channel for f in report.findings} == set(range(1, 301))
-    assert report.agents == 300
-    assert not alone.holds
-    assert not report.holds
-    assert len(report.counterexample.input) > 0
-
-
-def test_channels_of_one_agent():
-    report = examine(ode(robots(PRINTED)), 0.02, owners=[0, 0, 1, 1, 2])
-    guilty = {(f.agent, f.channel) for f in report.findings if f.violated}
-    assert (guilty, report.agents) == ({(2, 3)}, 3)
-
-
-def test_a_plant_that_is_no_longer_a_number_ends_its_trials():
-    class Fragile(OdePlant):
-        @property
-        def output(self):
-            y = super().output
-            return np.where(np.abs(y) > 5.0, np.nan, y)
-
-    report = examine(lambda copies, h: Fragile(integrators(2).repeated(copies), h), 0.02)
-    assert 0 < report.examined < 20
-    assert "run away" in report.message
 
 
 def test_mujoco_gives_what_the_ode_gives():
@@ -453,37 +238,6 @@ def test_bad_numbers(key, bad):
 def test_bad_steps(bad):
     with pytest.raises(InvalidInput, match="timestep"):
         examine(ode(integrators(2)), bad)
-
-
-@given(seed=st.integers(0, 2**32 - 1), trial=st.integers(0, 3 * COMBINATIONS))
-def test_inputs_stay_within_their_amplitude_and_oppose_when_they_should(seed, trial):
-    rng = np.random.default_rng(seed)
-    program = Excitation.draw(rng, trial, np.array([1.0, 5.0, 0.1]), 0.02, 20.0)
-    for time in rng.uniform(0, 20, 50):
-        deviation = rng.normal(size=3) * [1.0, 0.0, 10.0]
-        u = program.input(time, deviation)
-        assert np.all(np.abs(u) <= program.amplitude * (1 + 1e-12))
-        if STRATEGIES[program.strategy[0]] in ("opposing", "damping"):
-            assert np.all((u * deviation <= 0) | (time < program.free))
-
-
-def test_trials_count_through_all_combinations():
-    rng, seen = np.random.default_rng(0), set()
-    for trial in range(COMBINATIONS):
-        program = Excitation.draw(rng, trial, np.ones(1), 0.02, 20.0)
-        seen.add((SIGNALS[program.signal[0]], STRATEGIES[program.strategy[0]]))
-    assert seen == set(itertools.product(SIGNALS, STRATEGIES))
-
-
-def test_signals_have_the_time_scales_they_are_said_to_have():
-    """The chirp's turning points: from one period in the trial up to one in eight holds."""
-    rng = np.random.default_rng(1)
-    program = Excitation.draw(rng, SIGNALS.index("chirp"), np.ones(1), 0.02, 20.0)
-    times = np.arange(0, 20, 1e-3)
-    u = np.array([program.input(t, np.zeros(1))[0] for t in times])
-    turns = times[1:-1][np.diff(np.sign(np.diff(u))) != 0]
-    assert turns[-1] - turns[-2] == pytest.approx(0.5 * 8 * 0.02, rel=0.05)
-    assert turns[1] - turns[0] > 1.0
 
 
 RUN = ("passivity", "cournot", "--set", "simulation.duration=2", "--trials", "3")
