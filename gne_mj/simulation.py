@@ -1,29 +1,19 @@
 """The one closed loop: measure -> law -> plant -> record, for all systems on one clock."""
 
-import signal
-import threading
 import time as real_time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gne_mj.bounds import MOST_RECORDED, check_room
-from gne_mj.certificate import Certificate, certify_run
-from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput, named, part_of
-from gne_mj.loops import monitor as watch
-from gne_mj.loops.base import Present, Samples
+from gne_mj.interruption import interruption
+from gne_mj.loops.base import Present
 from gne_mj.motion import motion_of
-from gne_mj.plain import raise_pending
-from gne_mj.run_metrics import check_numbers
 from gne_mj.signals import check_names, declared
 from gne_mj.system import Clock, System
-from gne_mj.trajectory import SystemRecord, Trajectory, joined, variables_of_parts
-from gne_mj.variables import Rows, Variable, changed
+from gne_mj.system_run import Snapshot, SystemRun
+from gne_mj.trajectory import Trajectory
 
 # Real time between looks at the user's wishes (progress, Ctrl-C), in s, and the first steps at most
 _CHUNK, _FIRST = 0.1, 10_000
@@ -53,27 +43,6 @@ class Planned:
 
     time: float
     act: "Callable[[Simulation], None]"
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """One system at one instant.
-
-    Attributes:
-        time: in s.
-        measurement: outputs y, shape (m,).
-        input: delivered inputs, shape (m,); not a number once the run has left the set.
-        constraint: g(y), shape (p,), negative inside.
-        state: (m, states), in the order of the agents' ``kind.STATES``.
-        memory: the law's memory.
-    """
-
-    time: float
-    measurement: NDArray[np.float64]
-    input: NDArray[np.float64]
-    constraint: NDArray[np.float64]
-    state: NDArray[np.float64]
-    memory: NDArray[np.float64]
 
 
 class Simulation:
@@ -137,7 +106,7 @@ class Simulation:
         return tuple(run.system for run in self._runs.values())
 
     @property
-    def runs(self) -> Mapping[str, "SystemRun"]:
+    def runs(self) -> Mapping[str, SystemRun]:
         """Each system's run, by its name."""
         return self._runs
 
@@ -318,245 +287,3 @@ def check_recording(systems: Sequence[System], clock: Clock) -> None:
     numbers = sum(system.recorded for system in systems)
     what = f"{rows} samples of {numbers} numbers"
     check_room("clock.sample_period", clock.sample_period, rows * numbers, what, MOST_RECORDED)
-
-
-class SystemRun:
-    """One system's loop and what it recorded.
-
-    Attributes:
-        system: with the numbers of now.
-        loop: its closed loop.
-        wall_time: real time in s that its steps took.
-    """
-
-    def __init__(self, system: System, clock: Clock) -> None:
-        self.system, self.clock = system, clock
-        self._shown = _shown(system)
-        self.loop = system.closed_loop(clock)
-        self.wall_time = 0.0
-        self._due: int | None = None  # the step at which the next row is recorded; None: at once
-        self._pushes: list[tuple[int, float, int]] = []  # output, force, until which step
-        self._recorded: list[SystemRecord] = []
-
-    def is_there(self, channel: int) -> bool:
-        """Whether an output's agent is there: some leave and join."""
-        return bool(np.isfinite(self.loop.present().state[channel, self.system.agents.kind.OUTPUT]))
-
-    @property
-    def inside(self) -> bool:
-        """Whether the run has not left its set."""
-        return bool(self.loop.monitor.exit == watch.INSIDE)
-
-    def step(self) -> Snapshot:
-        """One integration step; what is returned is its beginning."""
-        time = self.loop.time
-        samples = self.loop.advance(1, 1) if self.inside else self.loop.finish()
-        raise_pending()
-        if len(samples.input) == 0:  # it left the set in this very step
-            samples = self.loop.finish()
-        state = samples.state[0]
-        y = state[:, self.system.agents.kind.OUTPUT].copy()
-        constraint = self.system.game_at(time).constraints(y)
-        return Snapshot(time, y, samples.input[0], constraint, state, samples.memory[0])
-
-    def advance(self, steps: int) -> None:
-        """So many steps, if it is still inside, recorded once in a sample period."""
-        started = real_time.perf_counter()
-        now = self.clock.steps(self.loop.time)
-        end = now + steps
-        while now < end and self.inside:
-            if any(until <= now for *_, until in self._pushes):
-                self._pushes = [push for push in self._pushes if push[2] > now]
-                self.loop.push(self._pushed(self._pushes))
-            now = self._piece(now, min([end, *(until for *_, until in self._pushes)]))
-        self.wall_time += real_time.perf_counter() - started
-
-    def _piece(self, now: int, end: int) -> int:
-        """On towards a step as far as one call of the loop goes; returns the step reached."""
-        every = self.clock.steps(self.clock.sample_period)
-        if self._due is None or self._due < now:
-            self._due = now
-            self._forget_last()
-        if now < self._due:
-            end = min(end, self._due)
-            self.loop.advance(1, end - now)
-            raise_pending()
-            return end
-        # Whole sample periods; the last one may be shorter.
-        samples = (end - now) // every
-        stride = every if samples else end - now
-        samples = max(samples, 1)
-        rows = self.loop.advance(samples, stride)
-        raise_pending()
-        steps = now + stride * np.arange(len(rows.input), dtype=np.float64)
-        self._recorded.append(SystemRecord(self.system, steps * self.clock.timestep, rows))
-        self._due = now + samples * every
-        return now + samples * stride
-
-    def recorded(self, most: int) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
-        """Sample times so far in s, and what a trajectory has of them, by the variables' names.
-
-        Args:
-            most: samples; of more only every so many-th is there.
-        """
-        self._recorded = joined(self._recorded)  # so that the next time is quick
-        every = 1 + sum(len(part.time) for part in self._recorded) // (most + 1)
-        parts = [part.thinned(every) for part in self._recorded]
-        if not parts:
-            return np.zeros(0), {}
-        return np.concatenate([part.time for part in parts]), {
-            name: values
-            for name, (dimensions, values, _) in variables_of_parts(parts).items()
-            if dimensions[:1] == ("time",)
-        }
-
-    def present(self) -> dict[str, NDArray[Any]]:
-        """What a page shows of this instant, one row each, by the variables' names.
-
-        Inputs, and what else an instant's state does not say, are those of the last sample; before
-        the first one they are left out.
-        """
-        now = self.loop.present()
-        state, memory, configuration = (part[None] for part in now)
-        none = np.full(state.shape[:2], np.nan)
-        samples = Samples(state, none, memory, none, none, configuration)
-        instant = Rows(self.system, np.array([self.loop.time]), samples)
-        found = {}
-        for variable in self._shown:
-            rows = instant if variable.instant else self._last
-            if rows is not None:
-                found[variable.name] = variable.source(rows)
-        return found
-
-    @property
-    def _last(self) -> Rows | None:
-        """The last sample."""
-        part = next((part for part in reversed(self._recorded) if len(part.time)), None)
-        if part is None:
-            return None
-        return Rows(part.system, part.time[-1:], changed(part.samples, lambda rows: rows[-1:]))
-
-    def change(self, system: System) -> None:
-        """See :meth:`Simulation.change`."""
-        graphs = [each.law.graph for each in (self.system, system)]
-        if any(isinstance(graph, ChangingGraph) for graph in graphs) and graphs[0] is not graphs[1]:
-            tables = [getattr(graph, "table", None) for graph in graphs]
-            if tables[0] != tables[1]:
-                raise InvalidInput(
-                    "law.graph",
-                    "another one",
-                    "one that changes stays what it is while a run goes on",
-                )
-        if system.membership is not None:
-            raise InvalidInput(
-                "membership", "given", "where agents leave and join numbers stay as they are"
-            )
-        if system.between != self.system.between:
-            raise InvalidInput(
-                "between", system.between, "it stays as it is while a simulation goes on"
-            )
-        self.loop.adopt(system.setup(self.clock))
-        self.loop.kept_alive = system
-        self.system = system
-        self._shown = _shown(system)
-
-    def push(self, channel: int, force: float, steps: int) -> None:
-        """See :meth:`Simulation.push`."""
-        until = self.clock.steps(self.loop.time) + steps
-        pushes = [*self._pushes, (channel, force, until)]
-        self.loop.push(self._pushed(pushes))  # first, since it may refuse
-        self._pushes = pushes
-
-    def _pushed(self, pushes: Sequence[tuple[int, float, int]]) -> NDArray[np.float64]:
-        """(m,) forces of all of them together."""
-        forces = np.zeros(self.system.game.actions)
-        for channel, force, _ in pushes:
-            forces[channel] += force
-        return forces
-
-    def part(
-        self, tolerance: float, interrupted: bool, intervened: bool
-    ) -> tuple[list[SystemRecord], Certificate]:
-        """What was recorded, the present state being the last row, and what it shows."""
-        self._forget_last()
-        last = SystemRecord(self.system, np.array([self.loop.time]), self.loop.finish())
-        raise_pending()
-        self._recorded.append(last)
-        self._due = None
-        parts = joined(self._recorded)
-        time, samples = parts[-1].time, parts[-1].samples
-        y = samples.state[-1, :, self.system.agents.kind.OUTPUT]
-        check_numbers(self.system.game, self.loop.monitor, y, self.clock.timestep)
-        if len(parts) > 1:
-            time = np.concatenate([part.time for part in parts])
-            samples = Samples.join([part.samples for part in parts])
-        certificate = certify_run(
-            self.system,
-            time,
-            samples.state[:, :, self.system.agents.kind.OUTPUT],
-            samples.input,
-            self.loop.monitor,
-            tolerance=tolerance,
-            duration=self.clock.duration,
-            wall_time=self.wall_time,
-            interrupted=interrupted,
-            intervened=intervened,
-            network=self.loop.network,
-            membership=self.loop.membership,
-            clock=self.clock,
-        )
-        return parts, certificate
-
-    def _forget_last(self) -> None:
-        """Drop the last row if it is of the present time, as when a run goes on after its end."""
-        if not self._recorded:
-            return
-        last = self._recorded[-1]
-        if len(last.time) and last.time[-1] >= self.loop.time:
-            self._recorded[-1] = SystemRecord(last.system, last.time[:-1], last.samples.first(-1))
-
-
-def _shown(system: System) -> list[Variable]:
-    """What a page has of a system, by its present numbers."""
-    return [variable for variable in declared(system) if variable.page]
-
-
-_asked: threading.Event | None = None  # the event of the interruption that is going on
-
-
-@contextmanager
-def interruption(*signals: int) -> Iterator[threading.Event]:
-    """An event that a signal sets, so that a run ends between chunks and keeps what it has.
-
-    A second signal acts as usual. Within another interruption it is that one's event. Outside the
-    main thread signals are left alone. Ask the event, but do not wait for it: a signal that comes
-    while its lock is held would wait for ever.
-
-    Args:
-        signals: which; Ctrl-C (SIGINT) if there are none.
-    """
-    global _asked
-    if threading.current_thread() is not threading.main_thread():
-        yield threading.Event()
-        return
-    if _asked is not None:
-        yield _asked
-        return
-    event = _asked = threading.Event()
-    before = {number: signal.getsignal(number) for number in signals or (signal.SIGINT,)}
-
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-    def stop(number: int, frame: object) -> None:
-        restore()  # first, so that nothing interrupts the setting but what ends all
-        event.set()
-
-    try:
-        for number in before:
-            signal.signal(number, stop)
-        yield event
-    finally:
-        restore()
-        _asked = None

@@ -19,7 +19,8 @@ import gne_mj.exit_map
 import gne_mj.solutions
 from gne_mj.batches import Store, execute, make_plan, store
 from gne_mj.errors import InvalidInput, StorageError
-from gne_mj.simulation import Simulation, interruption
+from gne_mj.interruption import interruption
+from gne_mj.simulation import Simulation
 
 SHORT = ("--set", "simulation.duration=0.2", "--set", "plant.engine=ode")
 RUN = ("run", "velocity-sync", *SHORT)

@@ -70,7 +70,7 @@ def stopping() -> Iterator[threading.Event]:
 
     Nobody may wait for the event: the signal could come while its lock is held.
     """
-    from gne_mj.simulation import interruption
+    from gne_mj.interruption import interruption
 
     heard = [number for number in _OTHERS if signal.getsignal(number) is not signal.SIG_IGN]
     with interruption(signal.SIGINT, *heard) as stop:

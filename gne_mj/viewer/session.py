@@ -15,8 +15,8 @@ from meshcat import Visualizer
 from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, Refusal, part_of
 from gne_mj.scenario import Scenario, as_done, load_scenario
-from gne_mj.simulation import SystemRun
 from gne_mj.system import System, mode_of
+from gne_mj.system_run import SystemRun
 from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.controls import Control, controls_of, pushes_of
 from gne_mj.viewer.pacer import Pacer
