@@ -190,6 +190,36 @@ def test_sliders_follow_what_the_scenario_does():
         assert (system.rho, system.game.parameters[0]) == (0.4, 2.5)
         page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.6)
         assert session.simulation.systems[0].rho == 0.4
+        session._receive({"do": "restart"}, None)
+        session._look(0.0)
+        page.told.clear()
+        page.ask(do="pause")
+        stop = threading.Event()
+        threading.Timer(0.2, stop.set).start()
+        session.run(stop)  # from the start, where that has yet to be done
+        values = next(m["values"] for m in page.told if m["kind"] == "controls")
+        assert (values[rho], session._sliders.values["systems.robots.game.reference_velocity"]) == (
+            0.1,
+            2.6,
+        )
+
+
+def test_a_slider_resets_no_count_of_messages():
+    event = {"information": "partial", "graph": "ring", "mode": "sampled",
+             "communication": {"type": "event", "threshold": 0.05}}  # fmt: skip
+    with watched(changes={**ODE, "controller": event}) as (session, page):
+        run = session.simulation.runs["robots"]
+        session._move(100)
+        before, told = run.present()["sent_message"], run.loop.monitor.messages
+        page.ask(do="set", key="systems.robots.barrier.rho", value=0.3)
+        page.ask(do="set", key="systems.robots.controller.coupling", value=2.0)
+        page.ask(do="set", key="systems.robots.game.reference_velocity", value=2.5)
+        assert page.errors == []
+        assert np.array_equal(run.present()["sent_message"], before)
+        trajectory = to_the_end(session)
+    sent = trajectory["robots"]["sent_message"].to_numpy()
+    assert 0 < told < sent[-1].sum() == trajectory.reports["robots"]["messages"]["sent"]
+    assert np.all(np.diff(sent, axis=0) >= 0)
 
 
 @pytest.mark.parametrize(("begin", "ask"), [("viewer", "seen"), ("paused", "play")])
@@ -301,7 +331,7 @@ def test_no_slider_drives_a_run_out_of_its_set(scenario, system, moves, refused)
             assert "s as 'left_feasible_set'; it stays at " in text
         taken = [rho for _, rho in moves if rho not in refused]
         assert [done["value"] for done in session.simulation.interventions] == taken
-        assert session.simulation.systems[0].rho == session._values[key] == taken[-1]
+        assert session.simulation.systems[0].rho == session._sliders.values[key] == taken[-1]
         assert to_the_end(session).status in ("completed", "converged")
 
 
@@ -353,7 +383,7 @@ def test_a_users_own_game_is_not_read_again_for_a_slider(tmp_path):
         game = session.simulation.systems[0].game
         for name in ("charging_plain.py", "charging_fast.py"):
             (tmp_path / name).write_text("raise RuntimeError", encoding="utf-8")
-        page.ask(do="set", key=next(iter(session._controls)), value=0.05)
+        page.ask(do="set", key=next(iter(session._sliders.controls)), value=0.05)
         assert page.errors == []
         assert session.simulation.systems[0].game is game
         assert session.simulation.systems[0].rho == 0.05

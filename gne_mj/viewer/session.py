@@ -1,31 +1,27 @@
 """A simulation that people watch and act on: paced by the clock on the wall, driven by a page."""
 
-import math
 import queue
 import threading
 import time as real_time
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 from meshcat import Visualizer
 
 from gne_mj.certificate import status_now
-from gne_mj.errors import GneError, InfeasibleStart, InvalidInput, Refusal, part_of
-from gne_mj.scenario import Scenario, as_done, load_scenario
-from gne_mj.system import System, mode_of
-from gne_mj.system_run import SystemRun
+from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
+from gne_mj.scenario import Scenario, as_done
+from gne_mj.system import mode_of
 from gne_mj.trajectory import Trajectory
-from gne_mj.viewer.controls import Control, controls_of, pushes_of
+from gne_mj.viewer.controls import pushes_of
 from gne_mj.viewer.pacer import Pacer
 from gne_mj.viewer.pack import pack
 from gne_mj.viewer.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.viewer.scene import Scene
 from gne_mj.viewer.server import Browser, Server
 from gne_mj.viewer.shown_system import ShownSystem
-from gne_mj.viewer.trial import Trials
+from gne_mj.viewer.sliders import Sliders, finite
 
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can
@@ -64,16 +60,12 @@ class Session:
         port: int = 0,
         begin: Begin = "now",
     ) -> None:
-        self._tables = scenario.model_dump(mode="json", exclude_none=True)
-        self._changes: dict[str, Any] = {}
+        self._sliders = Sliders(scenario)
         self._pacer = Pacer(speed)
         self._ended: Trajectory | None = None
         self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
-        self._trials = Trials()
         self._asked: queue.Queue[tuple[dict[str, Any], Browser]] = queue.Queue()
-        self._controls = {control.key: control for control in controls_of(scenario)}
-        self._values = {key: control.value for key, control in self._controls.items()}
         self._begin(scenario)
         self._waits, self._playing = begin == "viewer", begin == "now"
         shown_systems = [
@@ -106,6 +98,7 @@ class Session:
         if self._next is not None:
             self._begin(self._next)
             self.server.broadcast(self._history())
+            self._tell_controls()
             self._tell_interventions()
         while not stop.is_set() and not self.simulation.ended and self._next is None:
             self._turn()
@@ -133,8 +126,8 @@ class Session:
 
     def _begin(self, scenario: Scenario) -> None:
         """A new run, at the scenario's start."""
-        simulation = scenario.simulation_object()
-        self.simulation, self._scenario = simulation, scenario
+        simulation = self.simulation = scenario.simulation_object()
+        self._sliders.begin(scenario)
         self._messages_from = 0
         self._next = self._ended = None
         self._playing, self._waits = True, False
@@ -175,15 +168,9 @@ class Session:
             simulation.advance(steps)
             self._pacer.took(steps, real_time.perf_counter() - started)
             if len(simulation.interventions) > done:
-                self._follow(simulation.interventions[done:])
-
-    def _follow(self, planned: list[dict[str, Any]]) -> None:
-        """Let sliders and later changes know what the scenario itself did."""
-        for done in planned:
-            self._scenario = load_scenario(self._scenario, done.get("keys"))
-        self._values = {control.key: control.value for control in controls_of(self._scenario)}
-        self.server.tell({"kind": "controls", "values": self._values})
-        self._tell_interventions()
+                self._sliders.follow(simulation.interventions[done:])
+                self._tell_controls()
+                self._tell_interventions()
 
     def _look(self, wait: float) -> None:
         """Do what browsers ask for, waiting so long (s) for the first of them."""
@@ -204,7 +191,7 @@ class Session:
                 self._do(message, browser)
             except GneError as error:
                 key = str(message.get("key", ""))
-                self._notice(self._words(error, self._controls.get(key)), browser, about=key)
+                self._notice(self._sliders.refused(error, key), browser, about=key)
             except Exception as error:  # no message may end a run
                 self._notice(f"This failed: {type(error).__name__}: {error}", browser)
         if asked:
@@ -250,83 +237,32 @@ class Session:
 
     def _restart(self) -> None:
         """Let :meth:`run` return; the next one begins from the start, with the present sliders."""
-        scenario = load_scenario(self._tables, self._changes)
+        scenario = self._sliders.next_scenario()
         try:
             scenario.system_objects()
         except InfeasibleStart as error:  # the run goes on
-            self._notice(f"It cannot begin so: {_rest(error, 'at the start')}; {self._set_back()}")
+            self._notice(self._sliders.refused_start(error))
             return
         self._next = scenario
 
-    def _set_back(self) -> str:
-        """Which sliders to set back, in words."""
-        moved = [
-            f"{each.system}, {each.label} to {each.value:.4g} (now {self._values[key]:.4g})"
-            for key, each in self._controls.items()
-            if self._values[key] != each.value
-        ]
-        return f"set back {', or '.join(moved)}"
-
-    def _words(self, error: GneError, control: Control | None) -> str:
-        """What is refused, in one sentence with the page's words."""
-        if control is None:
-            return str(error)
-        stays = f"it stays at {self._values[control.key]:.4g}"
-        return (
-            f"{control.system}, {control.label}: {_rest(error, 'at the present outputs')}; {stays}"
-        )
-
     def _set_speed(self, value: Any) -> None:
         if value is not None:
-            value = _number("speed", value)
+            value = finite("speed", value)
             if not 0 < value <= FASTEST:
                 raise InvalidInput("speed", value, f"it must be positive, at most {FASTEST:g}")
         self._pacer.speed = value
         self._pacer.restart(self.simulation.time)
 
     def _set(self, key: Any, value: Any) -> None:
-        """Change a number of the running simulation; a value that cannot be leaves all as it is."""
-        control = self._controls.get(str(key))
-        if control is None:
-            raise InvalidInput("key", key, "this scenario has no such slider")
+        """Change a number of the running simulation, or of the next one when that has ended."""
         try:
-            number = _number(key, value)
-            if number != self._values[control.key]:
-                self._change(control, number)
-                self._values[control.key] = number
+            acts = self._sliders.set(self.simulation, key, value)
         finally:
-            self.server.tell({"kind": "controls", "values": self._values})
-
-    def _change(self, control: Control, value: float) -> None:
-        tables = self._scenario.model_dump(mode="json", exclude_none=True)
-        changed, given = control.change(tables, value)
-        scenario = load_scenario(tables, {changed: given})
-        run = self.simulation.runs[control.system]
-        if run.inside and not self.simulation.ended:
-            what, own = f"{control.key} = {value!r}", ("clock", "systems", "simulation")
-            with scenario.naming(control.system), part_of("system", *own):
-                system = _changed(run, scenario, control, value)
-                self._try(system, control, value)
-                self.simulation.change(
-                    system, what, remade=scenario.remade, key=control.key, value=value,
-                    keys={changed: given},
-                )  # fmt: skip
+            self._tell_controls()
+        if acts:
             self._tell_interventions()
         else:
             self._notice("This holds from the next start on: its run has ended.", level="info")
-        self._scenario = scenario
-        self._changes[changed] = given
-
-    def _try(self, system: System, control: Control, value: float) -> None:
-        """Refuse a number with which the run, as far as a trial shows, would end early."""
-        clock = self.simulation.clock
-        left = clock.steps(clock.duration) - clock.steps(self.simulation.time)
-        found = self._trials.exit(system, clock, left)
-        if found is not None:
-            time, status = found
-            raise InvalidInput(
-                control.key, value, f"with it the run would end in {time:.3g} s as '{status}'"
-            )
 
     def _push(self, message: Mapping[str, Any]) -> None:
         name, agent, axis = message.get("system"), message.get("agent"), message.get("axis", 0)
@@ -338,12 +274,15 @@ class Session:
             raise InvalidInput("push", agent, f"agents are numbered 1 to {game.agents}")
         if not isinstance(axis, int) or not 0 <= axis < game.sizes[agent - 1]:
             raise InvalidInput("push", axis, f"agent {agent} has {game.sizes[agent - 1]} axes")
-        force = _number("push", message.get("force", about["force"]))
+        force = finite("push", message.get("force", about["force"]))
         channel = int(game.data.offsets[agent - 1]) + axis
         if self.simulation.ended:
             raise InvalidInput("push", name, "its run has ended; restart it")
         self.simulation.push(str(name), channel, force, about["duration"])
         self._tell_interventions()
+
+    def _tell_controls(self, browser: Browser | None = None) -> None:
+        self.server.tell({"kind": "controls", "values": self._sliders.values}, browser)
 
     def _tell_interventions(self, browser: Browser | None = None) -> None:
         done = self.simulation.interventions
@@ -353,11 +292,11 @@ class Session:
         scene = {
             "kind": "scene",
             **self._scene.meta(),
-            "controls": [control.meta() for control in self._controls.values()],
+            "controls": [control.meta() for control in self._sliders.controls.values()],
             "pushes": self._pushes,
         }
         self.server.welcome(browser, [pack(scene, {}), self._history(), self._frame()])
-        self.server.tell({"kind": "controls", "values": self._values}, browser)
+        self._tell_controls(browser)
         self._tell_interventions(browser)
 
     def _notice(
@@ -439,39 +378,3 @@ class Session:
             return outcome(self._ended.reports[name])
         run = self.simulation.runs[name]
         return status_now(run.system, run.loop.monitor)
-
-
-def _changed(run: SystemRun, scenario: Scenario, control: Control, value: float) -> System:
-    """A run's system from its present state on, with the number that a slider changes.
-
-    What the number is not of stays the same object: a game or law of the user's own is not read
-    again.
-    """
-    table, present = scenario.systems[control.system], run.loop.present()
-    if control.table == "game":
-        return table.build(control.system, scenario.simulation, present)
-    memory = present.memory[: len(run.system.memory)].copy()
-    here = replace(run.system, state=present.state, memory=memory)
-    if control.table == "barrier":
-        return replace(here, rho=value)
-    return replace(here, law=table.controller.build(here.game))
-
-
-def _number(key: Any, value: Any) -> float:
-    number = math.nan
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        with suppress(OverflowError):
-            number = float(value)
-    if not math.isfinite(number):
-        raise InvalidInput(str(key), str(value)[:40], "it must be a finite number")
-    return number
-
-
-def _rest(error: GneError, where: str) -> str:
-    """What an error says, without the key of the scenario's file; where a constraint is broken."""
-    if isinstance(error, InfeasibleStart):
-        return (
-            f"{where} constraint '{error.constraint}' would have g = {error.value:.4g},"
-            " which must be negative"
-        )
-    return error.about if isinstance(error, Refusal) else str(error)
