@@ -78,6 +78,48 @@ def test_time_and_values_are_zoomed_and_moved(shown):
     assert plot(shown, 0)["values"] == whole
 
 
+def touch(session, kind, *points):
+    fingers = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(points)]
+    session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+
+
+def stroke(session, *fingers):
+    """Fingers that go down, move and leave, each from one point to another."""
+    for kind, part in (("touchStart", 0.0), ("touchMove", 0.5), ("touchMove", 1.0)):
+        places = [(a + part * (c - a), b + part * (d - b)) for (a, b), (c, d) in fingers]
+        touch(session, kind, *places)
+    touch(session, "touchEnd")
+
+
+def test_fingers_go_to_a_time_pinch_move_and_scroll(shown):
+    hands = shown.context.new_cdp_session(shown)
+    hands.send("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+    shown.set_viewport_size({"width": 390, "height": 844})
+    until(shown, "window.gne.plots[0].width < 390")
+    figure(shown, 0).evaluate("figure => figure.scrollIntoView()")
+    box = figure(shown, 0).locator(".u-over").bounding_box()
+
+    def at(x, y=0.5):
+        return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+    stroke(hands, (at(0.5), at(0.25)))
+    until(shown, "Math.abs(window.gne.time() - 1) < 0.05")
+    stroke(hands, (at(0.4), at(0.3)), (at(0.6), at(0.7)))
+    begin, end = times(shown)
+    assert (end - begin, shown.evaluate("window.gne.time()")) == pytest.approx((2, 1), abs=0.1)
+    stroke(hands, (at(0.5, 1.05), at(0.25, 1.05)))  # on the axis of time
+    assert times(shown)[0] - begin == pytest.approx(0.5, abs=0.05)
+    low, high = plot(shown, 0)["values"]
+    scrolled = "document.getElementById('main').scrollTop"
+    before = shown.evaluate(scrolled)
+    stroke(hands, (at(-0.1, 0.3), at(-0.1, 0.8)))  # on that of values
+    assert plot(shown, 0)["values"][0] - low == pytest.approx(0.5 * (high - low), rel=0.1)
+    assert shown.evaluate(scrolled) == before
+    stroke(hands, (at(0.5, 0.9), at(0.5, 0.2)))  # over the lines the page scrolls
+    until(shown, f"before => {scrolled} > before", arg=before)
+    assert shown.evaluate("window.gne.time()") == pytest.approx(1, abs=0.05)
+
+
 def test_lines_are_switched_read_and_kept(shown, paper):
     data = paper["robots"]
     first = figure(shown, 0)
@@ -179,6 +221,9 @@ def test_a_moment_a_run_and_what_was_done_are_kept(page, recorded, tmp_path):
     server = serve(trajectory, "kept")
     opened(page, f"{server.url}#t=0.4")
     until(page, "window.gne.time() === 0.4")
+    page.evaluate("location.hash = 't=0.1.2'")  # no moment
+    until(page, "location.hash === '#t=0.1.2'")
+    assert page.evaluate("window.gne.time()") == 0.4
     page.locator("#keep summary").click()
     with page.expect_download() as loading:
         page.locator("#keep-run").click()

@@ -6,7 +6,7 @@ import { notify } from "./notices.js";
 
 /** The time that the page's address asks for, in s, or null. */
 export const momentAsked = () => {
-  const found = /^#t=([\d.]+)$/.exec(location.hash);
+  const found = /^#t=(\d+(?:\.\d+)?)$/.exec(location.hash);
   return found ? Number(found[1]) : null;
 };
 

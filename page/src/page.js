@@ -1,7 +1,7 @@
 // The page: puts a source of instants, the scene, plots and controls together.
 import { byId } from "./dom.js";
 import { Header, warn } from "./header.js";
-import { Keep } from "./keep.js";
+import { Keep, momentAsked } from "./keep.js";
 import { Live } from "./live.js";
 import { Overlay } from "./overlay.js";
 import { fetchReplay, fromBase64, unpack } from "./pack.js";
@@ -136,7 +136,7 @@ export class Page {
     this.playback = playback;
     this.plots.setSource(playback);
     this.markOutcome(playback);
-    playback.seek(playback.end);
+    playback.seek(momentAsked() ?? playback.end);
   }
 
   /** @param {Live} live */

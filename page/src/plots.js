@@ -9,6 +9,7 @@ import { number } from "./words.js";
 /** @import { Stretch } from "./window.js" */
 
 const AROUND = 0.04; // of the run, that is shown on both sides of a moment
+const PART = 0.35; // of the window's height, that a plot has where all are scrolled to
 
 /** @param {number} t */
 const niceSpan = (t) => {
@@ -157,18 +158,23 @@ export class Plots {
   resize() {
     if (!this.meta || !this.column.clientWidth) return;
     const width = this.column.clientWidth - 24;
-    const count = Math.max(this.plots.length, 1);
-    const extra = this.plots.reduce(
-      (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-      this.tools.offsetHeight,
-    );
-    const room = (this.column.clientHeight - extra - 16) / count;
-    const height = Math.floor(Math.min(Math.max(room, 112), 300));
+    const height = Math.floor(Math.min(Math.max(this.room(), 112), 300));
     const size = `${width} ${height}`;
     if (size === this.size) return;
     this.size = size;
     for (const plot of this.plots) plot.setSize(width, height);
     for (const plot of this.plots) plot.setTime(this.now);
+  }
+
+  /** Height of a chart in px, for as many as fit. */
+  room() {
+    const { column, plots, tools } = this;
+    if (getComputedStyle(column).overflowY === "visible") return PART * innerHeight; // it grows
+    const extra = plots.reduce(
+      (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
+      tools.offsetHeight,
+    );
+    return (column.clientHeight - extra - 16) / Math.max(plots.length, 1);
   }
 
   /** @param {Plot} plot whose chart is new */

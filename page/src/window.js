@@ -5,6 +5,7 @@ import { element } from "./dom.js";
 
 const NARROWEST = 1e-4; // of the whole, up to which time can be looked at
 export const STEP = 0.7; // a turn of the wheel, or a press of a button
+const SLOP = 4; // px, up to which a hand is where it was
 
 /** @typedef {[number, number]} Stretch from where to where */
 
@@ -94,7 +95,8 @@ export class Hands {
       this.doing = event.pointerType === "touch" ? "time" : "stretch";
     else this.doing = "seek";
     this.begun = x;
-    if (this.doing === "seek") this.seek(x);
+    // of a finger it is known later whether it goes to a time, scrolls, or is the first of two
+    if (this.doing === "seek" && event.pointerType !== "touch") this.seek(x);
   }
 
   /** @param {PointerEvent} event */
@@ -103,7 +105,8 @@ export class Hands {
     if (!before) return;
     const { x, y } = this.at(event);
     const { plots } = this.plot;
-    if (this.doing === "seek") this.seek(x);
+    const moved = event.pointerType !== "touch" || Math.abs(x - this.begun) > SLOP;
+    if (this.doing === "seek" && moved) this.seek(x);
     if (this.doing === "stretch") this.showMark(x);
     if (this.doing === "time") plots.pan(this.u.posToVal(before.x, "x") - this.u.posToVal(x, "x"));
     if (this.doing === "values") this.plot.panValues(before.y, y);
@@ -129,7 +132,8 @@ export class Hands {
     const stands = this.down.get(event.pointerId);
     this.down.delete(event.pointerId);
     this.mark.hidden = true;
-    if (this.doing === "stretch" && stands && Math.abs(stands.x - this.begun) > 4) {
+    if (this.doing === "seek" && stands && event.type === "pointerup") this.seek(stands.x);
+    if (this.doing === "stretch" && stands && Math.abs(stands.x - this.begun) > SLOP) {
       const ends = [this.begun, stands.x].map((x) => this.u.posToVal(x, "x"));
       this.plot.plots.show([Math.min(...ends), Math.max(...ends)]);
     }

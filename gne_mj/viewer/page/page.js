@@ -372,7 +372,7 @@
 
   // src/keep.js
   var momentAsked = () => {
-    const found = /^#t=([\d.]+)$/.exec(location.hash);
+    const found = /^#t=(\d+(?:\.\d+)?)$/.exec(location.hash);
     return found ? Number(found[1]) : null;
   };
   var copy = async (text, what, file) => {
@@ -6041,6 +6041,7 @@
   // src/window.js
   var NARROWEST = 1e-4;
   var STEP = 0.7;
+  var SLOP = 4;
   var scaled = ([from, to], around, factor) => [
     around - (around - from) * factor,
     around + (to - around) * factor
@@ -6106,7 +6107,7 @@
         this.doing = event.pointerType === "touch" ? "time" : "stretch";
       else this.doing = "seek";
       this.begun = x;
-      if (this.doing === "seek") this.seek(x);
+      if (this.doing === "seek" && event.pointerType !== "touch") this.seek(x);
     }
     /** @param {PointerEvent} event */
     drag(event) {
@@ -6114,7 +6115,8 @@
       if (!before) return;
       const { x, y } = this.at(event);
       const { plots } = this.plot;
-      if (this.doing === "seek") this.seek(x);
+      const moved = event.pointerType !== "touch" || Math.abs(x - this.begun) > SLOP;
+      if (this.doing === "seek" && moved) this.seek(x);
       if (this.doing === "stretch") this.showMark(x);
       if (this.doing === "time") plots.pan(this.u.posToVal(before.x, "x") - this.u.posToVal(x, "x"));
       if (this.doing === "values") this.plot.panValues(before.y, y);
@@ -6138,7 +6140,8 @@
       const stands = this.down.get(event.pointerId);
       this.down.delete(event.pointerId);
       this.mark.hidden = true;
-      if (this.doing === "stretch" && stands && Math.abs(stands.x - this.begun) > 4) {
+      if (this.doing === "seek" && stands && event.type === "pointerup") this.seek(stands.x);
+      if (this.doing === "stretch" && stands && Math.abs(stands.x - this.begun) > SLOP) {
         const ends = [this.begun, stands.x].map((x) => this.u.posToVal(x, "x"));
         this.plot.plots.show([Math.min(...ends), Math.max(...ends)]);
       }
@@ -6613,6 +6616,7 @@
 
   // src/plots.js
   var AROUND = 0.04;
+  var PART = 0.35;
   var niceSpan = (t) => {
     const ten = 10 ** Math.floor(Math.log10(t));
     return ten * ([1, 1.5, 2, 3, 5, 7.5].find((step) => step * ten >= t) ?? 10);
@@ -6739,18 +6743,22 @@
     resize() {
       if (!this.meta || !this.column.clientWidth) return;
       const width = this.column.clientWidth - 24;
-      const count = Math.max(this.plots.length, 1);
-      const extra = this.plots.reduce(
-        (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-        this.tools.offsetHeight
-      );
-      const room = (this.column.clientHeight - extra - 16) / count;
-      const height = Math.floor(Math.min(Math.max(room, 112), 300));
+      const height = Math.floor(Math.min(Math.max(this.room(), 112), 300));
       const size = `${width} ${height}`;
       if (size === this.size) return;
       this.size = size;
       for (const plot of this.plots) plot.setSize(width, height);
       for (const plot of this.plots) plot.setTime(this.now);
+    }
+    /** Height of a chart in px, for as many as fit. */
+    room() {
+      const { column, plots, tools } = this;
+      if (getComputedStyle(column).overflowY === "visible") return PART * innerHeight;
+      const extra = plots.reduce(
+        (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
+        tools.offsetHeight
+      );
+      return (column.clientHeight - extra - 16) / Math.max(plots.length, 1);
     }
     /** @param {Plot} plot whose chart is new */
     place(plot) {
@@ -8750,7 +8758,7 @@
       this.playback = playback;
       this.plots.setSource(playback);
       this.markOutcome(playback);
-      playback.seek(playback.end);
+      playback.seek(momentAsked() ?? playback.end);
     }
     /** @param {Live} live */
     leaveReplay(live) {
