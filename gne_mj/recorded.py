@@ -113,6 +113,7 @@ def recorded_system(
         faults=faults,
         seed=seed,
         separation=None if known["separation"] is None else Separation(*known["separation"]),
+        observer=float("load" in data),  # there was one; its gain nobody asks of results
     )
 
 

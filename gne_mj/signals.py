@@ -382,7 +382,7 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         "load", ("time", AXIS),
         lambda rows: rows.samples.memory[:, -rows.system.game.actions :],
         there=lambda system: system.observer > 0.0, unit=input_unit,
-        long_name="load as each agent estimates it",
+        long_name="load as each agent estimates it", page="line",
     ),
     Variable(
         "measurement", ("time", AXIS), lambda rows: rows.samples.measurement, there=_is_faulty,

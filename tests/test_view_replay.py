@@ -369,10 +369,12 @@ def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
             "moving": of_integrators(game={"gap_bound": [3.5, bound, 3.5]}),
             "kept": of_integrators(estimates="needed", **partial),
             "events": of_integrators(communication={"type": "event", "threshold": 0.01}, **partial),
+            "pushed": of_integrators(mode="implicit", observer=1.0)
+            | {"faults": [{"type": "push", "force": 2.0}]},
         },
     }))  # fmt: skip
     meta, found = unpack(replay_pack(trajectory))
-    moving, kept, events = meta["systems"]
+    moving, kept, events, pushed = meta["systems"]
     gap = next(each for each in moving["quantities"] if each["name"] == "gap")
     assert gap["moving_bounds"] == {"bound": "gap_bound", "lower_bound": "gap_lower_bound"}
     assert gap["bound"] is None
@@ -383,7 +385,7 @@ def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
     # each follower needs its predecessor's velocity, and no other
     assert kept["kept"] == {"by": [2, 3], "action": [0, 1]}
     assert found["kept/estimate"].shape == (len(found["time"]), 2)
-    assert meta["systems"][2]["kept"] is None
+    assert events["kept"] is None
     assert events["triggered"] is True
     assert events["message_period"] is None
     (messages,) = (each for each in events["quantities"] if each["name"] == "sent_message")
@@ -391,3 +393,5 @@ def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
     counted = found["events/quantity/sent_message"]
     assert np.all(np.diff(counted, axis=0) >= 0.0)
     assert np.sum(counted[-1]) == trajectory.reports["events"]["messages"]["sent"] > 0
+    assert [each["name"] for each in pushed["quantities"]] == ["gap", "constraint", "load"]
+    assert np.allclose(found["pushed/quantity/load"][-1], 2.0)
