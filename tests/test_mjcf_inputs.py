@@ -117,6 +117,7 @@ def test_a_force_at_a_body_is_that_of_its_motor(tmp_path, integrator, mode):
     [
         (Input(kind="body", name="hul"), "robot.xml has no such body; did you mean 'hull'"),
         (Input(("push", "trn"), (1.0, 1.0)), "got 'trn', but did you mean 'turn'"),
+        (Input(kind="body", name="world"), "in robot.xml the body stands still"),
     ],
 )
 def test_what_a_file_does_not_have(tmp_path, given, words):

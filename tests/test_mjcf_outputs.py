@@ -190,6 +190,10 @@ def test_a_head_with_a_lookahead_begins_where_it_is_told(tmp_path):
     angular = (RobotFile(path, Output("site", "head", True, axis=1), "turn"),) * 2
     with pytest.raises(InvalidInput, match=r"lookahead it must have a position"):
         MjcfPlant(MjcfRobots(mjcf_position, table, limit, robots=angular), 0.002)
+    path.write_text(SLED.replace(' type="slide"', ""))
+    plant = MjcfPlant(MjcfRobots(mjcf_position, table, limit, robots=robots), 0.002)
+    with pytest.raises(InvalidInput, match=r"site 'head', x.*no joint positions give it"):
+        plant.reset(state + 9.0)  # farther than it reaches
 
 
 def test_outputs_are_given_for_all_agents_or_each():

@@ -110,6 +110,8 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
             if index < 0:
                 names = names_in(model, "actuator", prefix)
                 raise InvalidInput("input", name, nearest(name, names))
+            if name == _effort(channel):
+                _check_moves(model, index, robot.input, robot.path)
             own = given.factors == (1.0,) and _measures(model, prefix, robot.output, index)
             ctrl = int(model.actuator_ctrladr[index])
             if ctrl not in clamps:
@@ -124,6 +126,15 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
     )
     _check_limits(found, clamps, agents)
     return found
+
+
+def _check_moves(model: mujoco.MjModel, index: int, given: Any, path: Path) -> None:
+    """Refuse a force at what stands in the world."""
+    if model.body_weldid[model.site_bodyid[model.actuator_trnid[index, 0]]] == 0:
+        raise InvalidInput(
+            "input", given.name, f"in {path.name} the {given.kind} stands still: name one that a"
+            " joint moves",
+        )  # fmt: skip
 
 
 def _measures(model: mujoco.MjModel, prefix: str, output: Any, actuator: int) -> bool:

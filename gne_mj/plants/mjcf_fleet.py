@@ -266,14 +266,25 @@ class MjcfPlant(FleetPlant):
         return slopes
 
     def _move_to(self, positions: NDArray[np.float64]) -> None:
-        """Move to these positions (m,) by Newton's method, each step the smallest that does."""
-        tau = self.agents.parameters[:, :1]
+        """Move to these positions (m,) by Newton's method, each step the smallest that does.
+
+        Raises:
+            InvalidInput: it does not find them.
+        """
+        tau, size = self.agents.parameters[:, :1], max(1.0, float(np.max(np.abs(positions))))
+        missed = positions - self.state[:, 1]
         for _ in range(NEWTON):
-            missed = positions - self.state[:, 1]
-            if np.max(np.abs(missed)) <= 1e-12 * max(1.0, float(np.max(np.abs(positions)))):
+            if np.max(np.abs(missed)) <= 1e-12 * size:
                 return
             move = np.linalg.lstsq(self._slopes() / tau, missed, rcond=None)[0]
             mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
+            missed = positions - self.state[:, 1]
+        if np.max(np.abs(missed)) > 1e-9 * size:
+            raise InvalidInput(
+                "agents.output",
+                str(self.agents.robots[int(np.argmax(np.abs(missed)))].output),
+                "near the file's reference pose no joint positions give it its initial position",
+            )
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
