@@ -3,7 +3,7 @@
 import argparse
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from draws import progress
 
 Row = dict[str, Any]
 RUNS_A_JOB = 10
+CRASHED = "crashed"  # the status of a draw that raised what it should not
 
 
 def parser(name: str, about: str | None, runs: int) -> argparse.ArgumentParser:
@@ -31,6 +32,20 @@ def _new_file(text: str) -> Path:
     if path.exists():
         raise argparse.ArgumentTypeError(f"{path} exists already; name another file")
     return path
+
+
+def crash(index: int, error: Exception, **more: Any) -> Row:
+    """The row of a draw that raised what it should not, with what else the campaign's rows have."""
+    message = f"{type(error).__name__}: {error}"
+    return {"index": index, "kind": "any", "status": CRASHED, "message": message, **more}
+
+
+def by_kind(rows: list[Row], kinds: Sequence[str]) -> Iterator[tuple[str, list[Row]]]:
+    """The rows of each kind, and of "all", that did not crash; kinds without any are left out."""
+    ran = [row for row in rows if row["status"] != CRASHED]
+    for kind in (*kinds, "all"):
+        if own := [row for row in ran if kind in (row["kind"], "all")]:
+            yield kind, own
 
 
 def campaign(

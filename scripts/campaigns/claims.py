@@ -5,7 +5,7 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import CRASHED, campaign, parser
 from checks import CHECKS, Check, run
 from wrong import build, draw
 
@@ -22,7 +22,7 @@ def main() -> int:
 def crashed(index: int, error: Exception) -> dict[str, Any]:
     """What is not expected is told as a contradiction."""
     crash = Check("nothing crashes", False, f"{type(error).__name__}: {error}")
-    row = {"index": index, "kind": "any", "mode": "any", "verdict": "crashed"}
+    row = {"index": index, "kind": "any", "mode": "any", "verdict": CRASHED}
     return row | _tally([crash])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import stiff
-from campaign import campaign, parser
+from campaign import CRASHED, campaign, crash, parser
 from checks import LEFT
 from kinds import KINDS, Draw, draw
 
@@ -24,7 +24,7 @@ METHODS = ((stiff.follow, 1e-11, 1e-10), (stiff.follow_by_radau, 1e-10, 1e-9))
 CRUDE = 1e-7  # relative tolerance where only the solution's end matters
 SURE = 1e-7  # greatest relative difference of the two where the solver is relied on
 AS_CONTINUOUS = "left, as in continuous time"
-REFUSED, CRASHED = "refused", "crashed"
+REFUSED = "refused"
 # Of the law without its barrier, step times greatest rate: below it RK4 can be asked for WANTED
 SMOOTH = 0.05
 
@@ -45,8 +45,7 @@ def main() -> int:
 
 def crashed(index: int, error: Exception) -> dict[str, Any]:
     """What is not expected counts as broken."""
-    row = {"index": index, "kind": "any", "integrator": "any", "divided": 0}
-    return row | {"status": CRASHED, "message": f"{type(error).__name__}: {error}"}
+    return crash(index, error, integrator="any", divided=0)
 
 
 def is_notable(row: dict[str, Any]) -> bool:

@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import by_kind, campaign, crash, parser
 from kinds import log_uniform
-from networks import CRASHED, crashed, random_graph
+from networks import random_graph
 
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 from gne_mj.errors import InvalidInput
@@ -38,7 +38,7 @@ KINDS = ("robots, full", "robots, partial", "integrators, partial", "robots, imp
 def main() -> int:
     """Run them all; 1 if one has broken a promise."""
     options = parser("scripts/check-membership", __doc__, 500).parse_args()
-    return campaign(options, one, crashed, report, lambda row: bool(broken(row)))
+    return campaign(options, one, crash, report, lambda row: bool(broken(row)))
 
 
 def drawn_changes(rng: np.random.Generator, outputs: np.ndarray, reach: np.ndarray) -> Any:
@@ -169,7 +169,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
 def broken(row: dict[str, Any]) -> list[str]:
     """Which promises a run has broken."""
     if row["status"] not in ENDED:
-        return [row["status"]]
+        return [row.get("message", row["status"])]
     found = [name for name in ("violated", "unfounded", "miscounted") if row[name]]
     if row["kind"] in KINDS[:3]:  # of the others V is not claimed
         found += [name for name in ("claimed", "monotone") if not row[name]]
@@ -183,11 +183,7 @@ def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
         " V not claimed | V rose | greatest rise over V(0) |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    ran = [row for row in rows if not row["status"].startswith(CRASHED)]
-    for kind in (*KINDS, "all"):
-        own = [row for row in ran if kind in (row["kind"], "all")]
-        if not own:
-            continue
+    for kind, own in by_kind(rows, KINDS):
         of_v = [row for row in own if row["kind"] in KINDS[:3]]
         cells = (
             kind, len(own), sum(row["changes"] for row in own),

@@ -9,14 +9,14 @@ import sys
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import CRASHED, campaign, crash, parser
 
 from gne_mj.scenario import load_scenario
 
 KINDS = ("integrator, continuous", "integrator, implicit", "pi-cascade, continuous",
          "integrator, continuous, fed forward", "integrator, implicit, fed forward")  # fmt: skip
 DURATION, STEP, SAMPLE = 3.0, 0.01, 0.1  # s
-CRASHED, PAST = "crashed", "bound_moved_past"
+PAST = "bound_moved_past"
 Row = dict[str, Any]
 
 
@@ -28,8 +28,7 @@ def main() -> int:
 
 def crashed(index: int, error: Exception) -> Row:
     """What is not expected counts as broken."""
-    return {"index": index, "kind": KINDS[index % len(KINDS)], "status": CRASHED,
-            "why": f"{type(error).__name__}: {error}"}  # fmt: skip
+    return crash(index, error) | {"kind": KINDS[index % len(KINDS)]}
 
 
 def one(seed: int, index: int) -> Row:
@@ -83,7 +82,7 @@ def report(rows: list[Row]) -> tuple[list[str], int]:
         )
     for row in rows:
         if broken(row):
-            lines.append(f"{row['index']}: {', '.join(broken(row))} {row.get('why', '')}")
+            lines.append(f"{row['index']}: {', '.join(broken(row))} {row.get('message', '')}")
     return lines, sum(bool(broken(row)) for row in rows)
 
 

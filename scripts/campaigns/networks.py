@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import by_kind, campaign, crash, parser
 from kinds import log_uniform
 
 from gne_mj.changing_graph import SwitchingGraph, switching
@@ -27,18 +27,12 @@ from gne_mj.theory import Theorem
 
 DURATION, UNIT = 5.0, 2e-3  # s; graphs change after multiples of the unit
 KINDS = ("robots", "integrators")
-CRASHED = "crashed"
 
 
 def main() -> int:
     """Run them all; 1 if one has broken a promise."""
     options = parser("scripts/check-networks", __doc__, 1000).parse_args()
-    return campaign(options, one, crashed, report, lambda row: bool(broken(row)))
-
-
-def crashed(index: int, error: Exception) -> dict[str, Any]:
-    """The row of a draw that raised what it should not."""
-    return {"index": index, "kind": "any", "status": f"{CRASHED}: {error!r}"}
+    return campaign(options, one, crash, report, lambda row: bool(broken(row)))
 
 
 def random_graph(rng: np.random.Generator, count: int) -> Graph:
@@ -108,7 +102,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
 def broken(row: dict[str, Any]) -> list[str]:
     """Which promises a run has broken."""
     if row["status"] not in SUCCESSES:
-        return [row["status"]]
+        return [row.get("message", row["status"])]
     return [name for name in ("claimed", "monotone") if not row[name]]
 
 
@@ -119,11 +113,7 @@ def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
         " greatest rise over V(0) |",
         "|---|---|---|---|---|---|---|",
     ]
-    ran = [row for row in rows if not row["status"].startswith(CRASHED)]
-    for kind in (*KINDS, "all"):
-        own = [row for row in ran if kind in (row["kind"], "all")]
-        if not own:
-            continue
+    for kind, own in by_kind(rows, KINDS):
         changes = [row["changes"] for row in own]
         cells = (
             kind, len(own), f"{np.median(changes):.0f}, {max(changes)}",

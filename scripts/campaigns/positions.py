@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import CRASHED, campaign, crash, parser
 from draws import towards_bound
 from kinds import log_uniform
 
@@ -33,7 +33,7 @@ LENGTH = 0.54  # m, of a robot in the lane: what a platoon's spacings must excee
 DISTANCE, REACH = 0.6, 1.2  # m, of robots that keep apart
 TRIES = 40  # draws of a start at which they are so
 KINDS, MODES = ("platoon", "formation", "formation, apart"), ("continuous", "implicit")
-CRASHED, GIVEN_UP = "crashed", EXITS[watch.STEP_TOO_SMALL]
+GIVEN_UP = EXITS[watch.STEP_TOO_SMALL]
 
 
 @dataclass
@@ -57,8 +57,7 @@ def main() -> int:
 
 def crashed(index: int, error: Exception) -> dict[str, Any]:
     """What is not expected counts as broken."""
-    status = f"{CRASHED}: {type(error).__name__}: {error}"
-    return {"index": index, "kind": "any", "mode": "any", "status": status, "observed": 0}
+    return crash(index, error, mode="any", observed=0)
 
 
 def platoon(rng: np.random.Generator) -> Place:
@@ -211,7 +210,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
 
 def broken(row: dict[str, Any]) -> list[str]:
     """Which promises a run has broken."""
-    if row["status"].startswith(CRASHED):
+    if row["status"] == CRASHED:
         return [CRASHED]
     names = ("outside", "told_outside", "outputs_outside", "contacts")
     found = [name for name in names if row[name]]
@@ -225,7 +224,7 @@ def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
         " outputs outside | contacts | step too small |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    ran = [row for row in rows if not row["status"].startswith(CRASHED)]
+    ran = [row for row in rows if row["status"] != CRASHED]
     for kind, mode in [*((kind, mode) for kind in KINDS for mode in MODES), ("all", "all")]:
         own = [
             row for row in ran if kind in (row["kind"], "all") and mode in (row["mode"], "all")

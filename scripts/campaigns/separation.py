@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import CRASHED, by_kind, campaign, crash, parser
 from kinds import log_uniform
 
 from gne_mj.controllers import FullInformation
@@ -30,7 +30,6 @@ from gne_mj.system import Clock, System
 DISTANCE, TAU, RHO, ARRIVED = 0.6, 0.5, 0.05, 1e-2
 LONGEST = 90.0  # s
 KINDS = ("circle of 8", "circle of 16", "anywhere, 8", "anywhere, 16", "herd of 30")
-CRASHED = "crashed"
 
 
 @dataclass
@@ -76,8 +75,7 @@ def main() -> int:
 
 def crashed(index: int, error: Exception) -> dict[str, Any]:
     """What is not expected counts as broken."""
-    status = f"{CRASHED}: {type(error).__name__}: {error}"
-    return {"index": index, "kind": "any", "status": status, "arrived": False}
+    return crash(index, error, arrived=False)
 
 
 def scattered(rng: np.random.Generator, count: int, radius: float, apart: float) -> np.ndarray:
@@ -230,7 +228,7 @@ def judged(index: int, draw: Draw) -> dict[str, Any]:
 
 def broken(row: dict[str, Any]) -> list[str]:
     """Which promises a run has broken."""
-    if row["status"].startswith(CRASHED):
+    if row["status"] == CRASHED:
         return [CRASHED]
     found = [name for name in ("too_near", "contacts", "outside") if row[name]]
     found += [] if row["status"] == "inside" else [row["status"]]
@@ -245,11 +243,7 @@ def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
         " median, last arrival (s) |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    ran = [row for row in rows if not row["status"].startswith(CRASHED)]
-    for kind in (*KINDS, "all"):
-        own = [row for row in ran if kind in (row["kind"], "all")]
-        if not own:
-            continue
+    for kind, own in by_kind(rows, KINDS):
         times = [row["time"] for row in own if row["arrived"]] or [np.nan]
         held = sum("held by" in row.get("message", "") for row in own)
         cells = (
@@ -259,6 +253,7 @@ def report(rows: list[dict[str, Any]]) -> tuple[list[str], int]:
             f"{np.median(times):.1f}, {max(times):.1f}",
         )  # fmt: skip
         lines.append("| " + " | ".join(map(str, cells)) + " |")
+    ran = [row for row in rows if row["status"] != CRASHED]
     slow = sorted((row for row in ran if row["arrived"]), key=lambda row: -row["time"])[:3]
     lines += ["", *(f"late: {row}" for row in slow)]
     lines += [f"held: {row}" for row in ran if not row["arrived"]][:20]

@@ -11,7 +11,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from campaign import campaign, parser
+from campaign import campaign, crash, parser
 
 from gne_mj.errors import InfeasibleStart, InvalidInput
 from gne_mj.scenario import load_scenario
@@ -33,8 +33,8 @@ def main() -> int:
 
 def crashed(index: int, error: Exception) -> Row:
     """What is not expected counts as broken."""
-    return {"index": index, "kind": "any", "promised": "", "status": "crashed", "with": [],
-            "against": [f"{type(error).__name__}: {error}"]}  # fmt: skip
+    row = crash(index, error)
+    return row | {"promised": "", "with": [], "against": [row["message"]]}
 
 
 def one(seed: int, index: int) -> Row:
