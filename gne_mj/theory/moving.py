@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from gne_mj.motion import motion_of
-from gne_mj.plants import flexible_robot, integrator, pi_cascade, position_robot
+from gne_mj.plants import flexible_robot, integrator, mixed, pi_cascade, position_robot
 from gne_mj.system import Clock, System, mode_of
 from gne_mj.theory.assumption import ASSUMED, FAILS, MET, Assumption, provided
 from gne_mj.theory.commanded_input import limited
 from gne_mj.theory.constants import BOUNDED, EXACT, Slopes
 from gne_mj.theory.convexity import convex_constraints
 
-# Outputs that inputs push, all else that moves them being bounded while they are
-PUSHED = (integrator, pi_cascade, flexible_robot, position_robot)
+# Outputs that inputs push, all else that moves them being bounded while they are; mixed fleets are
+# of the first three
+PUSHED = (integrator, pi_cascade, flexible_robot, mixed, position_robot)
 LOOKED_AT = 100  # times of a run, besides those at which a rate jumps
 
 
