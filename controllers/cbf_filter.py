@@ -22,25 +22,21 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import rate as rate
 from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.plant_model import output_rates
-from gne_mj.controllers.programs import (
-    OWN,
-    ProgramLaw,
-    give,
-    gradient_play,
-    linearised,
-    solver_in,
-)
+from gne_mj.controllers.programs import ProgramLaw, give, gradient_play, linearised, solver_in
+from gne_mj.controllers.settings import COUNT
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
 from gne_mj.native import kernel, released, reserved
 from gne_mj.quadratic_program import QUADRATIC, clear, program_in, program_length, solve
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
+
+ALPHA = COUNT
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,23 +54,15 @@ class CbfFilter(ProgramLaw):
         " what their equations say; where it rests may be no equilibrium"
     )
     knows_plant: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("alpha",)
     gain: float = 1.0
     alpha: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_positive(self, "alpha")
-        super().__post_init__()
-
-    @property
-    def own(self) -> tuple[float, ...]:
-        """alpha."""
-        return (self.alpha,)
 
 
 @kernel
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,); not a number where the program has no solution."""
-    m, p, alpha, limit = len(u), len(problem.data.tightening), problem.settings[OWN], problem.limit
+    m, p, numbers, limit = len(u), len(problem.data.tightening), problem.settings, problem.limit
     length = program_length(m, p, m, 0)
     room = reserved(length + 3 * m)
     program, goal = program_in(room, 0, m, p, m, 0), room[length : length + m]
@@ -85,7 +73,7 @@ def action(game, problem, y, weights, memory, work, u):
     values = program.upper[m:]
     linearised(problem, y, values, program.matrix)
     for k in range(p):  # the unknown is u - goal
-        bound = -alpha * values[k]
+        bound = -numbers[ALPHA] * values[k]
         for a in range(m):
             slope = program.matrix[k, a]
             bound -= slope * (drift[a] + push[a] * goal[a])

@@ -16,26 +16,24 @@ slow against the plant's own loop, and constraints hold in the limit.
 The law's memory: l (p,), r (m,).
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj import game_functions as games
-from gne_mj.controllers.law import Law, MemoryPart, check_positive
-from gne_mj.controllers.multipliers import PERIOD, held_for, multipliers
-from gne_mj.controllers.propagation import Propagator
+from gne_mj.controllers.law import Law, MemoryPart
+from gne_mj.controllers.multipliers import PERIOD, MultiplierLaw, ascend
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.settings import COUNT, GAIN
-from gne_mj.controllers.table import LawTable
+from gne_mj.controllers.table import HeldTable
 from gne_mj.game_model import Game
-from gne_mj.graph import GraphData
 from gne_mj.native import kernel
-from gne_mj.registry import LAWS, MODES
+from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
 
 SEEKING, DUAL_GAIN = COUNT, COUNT + 1
@@ -43,7 +41,7 @@ SET_POINT = MemoryPart("set_point", "outputs that each agent is led to")
 
 
 @dataclass(frozen=True, eq=False)
-class FeedbackSeeking(Law):
+class FeedbackSeeking(MultiplierLaw):
     """Set-points that a sampled algorithm moves by measured outputs.
 
     Args:
@@ -58,40 +56,16 @@ class FeedbackSeeking(Law):
         "inputs keep to the actuators' limits, constraints hold in the limit if it is slow against"
         " the agents' own loops; of what comes before nothing is proven"
     )
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("seeking", "dual_gain")
+    memory_parts: ClassVar[tuple[MemoryPart, ...]] = (SET_POINT,)
     constraints: int
     gain: float = 2.0
     seeking: float = 0.3
     dual_gain: float = 0.3
 
-    def __post_init__(self) -> None:
-        check_positive(self, "gain", "seeking", "dual_gain")
-        vars(self).update(memory_parts=(multipliers(self.constraints), SET_POINT))
-
-    @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, [self.seeking, self.dual_gain])
-
-    def initial_memory(
-        self,
-        y: NDArray[np.float64],
-        estimate: ArrayLike | None = None,
-        filtered: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
+    def first_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """l = 0 and r = y; see the base class."""
-        super().initial_memory(y, estimate, filtered)
-        return np.concatenate([np.zeros(self.constraints), y])
-
-    def propagator(self, period: float, lists: GraphData | None = None) -> Propagator:
-        """See the base class."""
-        return held_for(period)
+        return np.append(super().first_memory(y), y)
 
 
 @kernel
@@ -117,26 +91,17 @@ def propagate(problem, y, memory, scratch):
             reach = problem.limit[a] / numbers[GAIN]
             wanted = memory[p + a] - period * numbers[SEEKING] * slope
             memory[p + a] = min(max(wanted, y[a] - reach), y[a] + reach)
-    for k in range(p):
-        value = games.constraint(data, k, y) + data.tightening[k]
-        memory[k] = max(memory[k] + period * numbers[DUAL_GAIN] * value, 0.0)
-
-
-@kernel
-def storage(problem, memory):
-    """Nothing is claimed of V."""
-    return 0.0
+    ascend(problem, numbers[DUAL_GAIN], y, memory)
 
 
 @LAWS.register
-class FeedbackSeekingController(LawTable):
+class FeedbackSeekingController(HeldTable):
     """Online feedback equilibrium seeking, a rival for mode sampled"""
 
     information: Literal["feedback-seeking"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
         {"gain": (1.0, 3.0, 10.0), "seeking": (0.3, 1.0), "dual_gain": (0.1, 0.3, 1.0, 3.0)}
     )
-    mode: Annotated[str, MODES] = Field("sampled", description="only 'sampled': once a period")
     gain: float = Field(2.0, gt=0, description="k of each agent's own loop")
     seeking: Annotated[float, Unit("1/s")] = Field(
         0.3, gt=0, description="gamma of the set-points' steps"

@@ -11,7 +11,6 @@ import sys
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers import plain_law
@@ -34,11 +33,8 @@ class FilteredLaw(PlainLaw):
         """This module."""
         return sys.modules[__name__]
 
-    def initial_memory(
-        self, y: Array, estimate: ArrayLike | None = None, filtered: ArrayLike | None = None
-    ) -> Array:
+    def first_memory(self, y: Array) -> Array:
         """What is pulled at first."""
-        super().initial_memory(y, estimate, filtered)
         return self.asked(np.nan, y)
 
 

@@ -95,8 +95,7 @@ class FullyDistributed(Law):
     def settings(self, rho: float) -> NDArray[np.float64]:
         """See the base class."""
         numbers = super().settings(rho)
-        numbers[GAIN], numbers[EPSILON] = self.gain, self.epsilon
-        numbers[FAST_WEIGHT] = self.fast_weight
+        numbers[EPSILON], numbers[FAST_WEIGHT] = self.epsilon, self.fast_weight
         return numbers
 
     @property

@@ -9,22 +9,20 @@ generalized Nash equilibrium problems, arXiv 1811.10674); with it constraints th
 by w l_l / s < w there. A static law.
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import rate as rate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.quadratic_penalty import excess
-from gne_mj.controllers.settings import COUNT, GAIN
+from gne_mj.controllers.quadratic_penalty import excess, priced
+from gne_mj.controllers.rival import Rival
+from gne_mj.controllers.settings import COUNT
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
 from gne_mj.native import kernel
@@ -35,7 +33,7 @@ STRENGTH, WIDTH = COUNT, COUNT + 1
 
 
 @dataclass(frozen=True, eq=False)
-class L1Penalty(Law):
+class L1Penalty(Rival):
     """Gradient play with an l1 penalty, smoothed.
 
     Args:
@@ -49,41 +47,23 @@ class L1Penalty(Law):
         "it rests where binding constraints are violated by less than its width, if its strength is"
         " above every multiplier; of what comes before nothing is proven"
     )
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("strength", "width")
     gain: float = 1.0
     strength: float = 10.0
     width: float = 0.1
 
-    def __post_init__(self) -> None:
-        check_positive(self, "gain", "strength", "width")
 
-    @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, [self.strength, self.width])
+@kernel
+def price(game, problem, k, y):
+    """s p(g_k)."""
+    numbers = problem.settings
+    return numbers[STRENGTH] * min(excess(game, problem.data, k, y) / numbers[WIDTH], 1.0)
 
 
 @kernel
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,) from y (m,); the barrier's weights are not read."""
-    data, numbers = problem.data, problem.settings
-    at = data.offsets
-    for i in range(len(at) - 1):
-        for a in range(at[i], at[i + 1]):
-            total = game.cost_gradient(data.parameters, i, a, y)
-            for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
-                k = data.own_index[entry]
-                price = numbers[STRENGTH] * min(excess(game, data, k, y) / numbers[WIDTH], 1.0)
-                if price > 0.0:
-                    total += price * game.constraint_gradient(data.parameters, k, a, y)
-            u[a] = -numbers[GAIN] * total
-    return -1
+    return priced(price, game, problem, y, u)
 
 
 @LAWS.register

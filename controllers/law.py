@@ -186,7 +186,7 @@ class Law(ABC):
         """The law's numbers for native code (see :mod:`gne_mj.controllers.settings`)."""
         numbers = np.ones(settings.COUNT)
         numbers[settings.RHO] = rho
-        numbers[settings.RATE] = self.estimate_rate
+        numbers[settings.GAIN], numbers[settings.RATE] = self.gain, self.estimate_rate
         numbers[settings.LINKS] = 0.0
         numbers[settings.OBSERVER] = 0.0
         numbers[settings.BESIDES] = self.sent_besides
@@ -212,6 +212,14 @@ class Law(ABC):
             raise InvalidInput("estimate", "given", f"the {self.information} law has no estimates")
         if filtered is not None:
             raise InvalidInput("filtered", "given", f"the {self.information} law has no z")
+        return self.first_memory(y)
+
+    def first_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The memory at the start of a law without estimates and z: none, of most.
+
+        Args:
+            y: initial profile (m,).
+        """
         return np.zeros(0)
 
     def among(self, there: NDArray[np.bool_]) -> "Law":

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.controllers.law import Law
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.settings import COUNT
 from gne_mj.errors import InvalidInput, UserCodeError, written
 from gne_mj.game_model import Game
@@ -102,11 +103,8 @@ class PlainLaw(Law):
             )
         return value
 
-    def initial_memory(
-        self, y: Array, estimate: ArrayLike | None = None, filtered: ArrayLike | None = None
-    ) -> Array:
+    def first_memory(self, y: Array) -> Array:
         """See the base class."""
-        super().initial_memory(y, estimate, filtered)
         if self._memory is None:
             return np.zeros(0)
         try:
@@ -165,9 +163,3 @@ def rate(problem, y, memory, out):
 @kernel
 def propagate(problem, y, memory, scratch):
     """No exact propagation of an unknown memory: such laws run in mode continuous."""
-
-
-@kernel
-def storage(problem, memory):
-    """Nothing is claimed."""
-    return 0.0

@@ -22,10 +22,9 @@ The law's memory: N rows of estimates, N rows of l^i, N rows of z^i, and room fo
 0. Where messages can be lost, l^i and z^i are lost with the estimates.
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -43,8 +42,10 @@ from gne_mj.controllers.affine_bounds import (
 from gne_mj.controllers.estimates import besides_at, estimate_rates, move_estimates, prepare
 from gne_mj.controllers.law import ESTIMATES, Law, MemoryPart, check_positive, initial_estimates
 from gne_mj.controllers.multipliers import PERIOD, held_for
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.partial_information import heard
 from gne_mj.controllers.propagation import Propagator
+from gne_mj.controllers.rival import Rival
 from gne_mj.controllers.settings import COUNT, COUPLING, GAIN, RATE
 from gne_mj.controllers.table import NetworkTable
 from gne_mj.game_model import Game
@@ -56,7 +57,7 @@ DUAL_GAIN, BOUNDS = COUNT, COUNT + 1
 
 
 @dataclass(frozen=True, eq=False)
-class PrimalDualPartial(Law):
+class PrimalDualPartial(Rival):
     """Primal-dual gradient play on estimates, each agent with multipliers of its own.
 
     Args:
@@ -72,7 +73,7 @@ class PrimalDualPartial(Law):
         "constraints hold in the limit, if the coupling is strong enough; of what comes before"
         " nothing is proven"
     )
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("dual_gain",)
     graph: Graph = field()  # hides the base class's default
     bounds: AffineBounds = field()
     gain: float = 1.0
@@ -80,7 +81,8 @@ class PrimalDualPartial(Law):
     dual_gain: float = 1.0
 
     def __post_init__(self) -> None:
-        check_positive(self, "gain", "coupling", "dual_gain")
+        check_positive(self, "coupling")
+        super().__post_init__()
         shape = (self.graph.agents, len(self.bounds.b))
         dims = ("holding_agent", "bound")
         multipliers = MemoryPart(
@@ -92,20 +94,15 @@ class PrimalDualPartial(Law):
         )
 
     @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    @property
     def estimate_rate(self) -> float:
         """c."""
         return self.coupling
 
     def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
+        """See the base class, and the bounds behind these."""
         numbers = super().settings(rho)
-        numbers[GAIN], numbers[COUPLING] = self.gain, self.coupling
-        return np.concatenate([numbers, [self.dual_gain], self.bounds.numbers])
+        numbers[COUPLING] = self.coupling
+        return np.append(numbers, self.bounds.numbers)
 
     def initial_memory(
         self,
@@ -194,12 +191,6 @@ def propagate(problem, y, memory, scratch):
         memory[held] = memory[held + 2 * size]
         memory[held + 2 * size] = 0.0
     move_estimates(problem, y, memory, scratch)
-
-
-@kernel
-def storage(problem, memory):
-    """Nothing is claimed of V."""
-    return 0.0
 
 
 @LAWS.register

@@ -17,25 +17,21 @@ below 0, Euler's method is the projected one, and the flow is [.]^+ up to times 
 The law's memory: l (p,).
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from gne_mj import game_functions as games
 from gne_mj.barrier import weighted_gradient
-from gne_mj.controllers.law import Law, check_positive
-from gne_mj.controllers.multipliers import PERIOD, held_for, multipliers, rising
-from gne_mj.controllers.propagation import Propagator
+from gne_mj.controllers.law import Law
+from gne_mj.controllers.multipliers import MultiplierLaw, ascend, rising
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.settings import COUNT, GAIN
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
-from gne_mj.graph import GraphData
 from gne_mj.native import kernel
 from gne_mj.registry import LAWS
 
@@ -43,7 +39,7 @@ DUAL_GAIN = COUNT
 
 
 @dataclass(frozen=True, eq=False)
-class PrimalDual(Law):
+class PrimalDual(MultiplierLaw):
     """Primal-dual gradient play with shared multipliers.
 
     Args:
@@ -54,43 +50,10 @@ class PrimalDual(Law):
 
     information: ClassVar[str] = "primal-dual"
     promise: ClassVar[str] = "constraints hold in the limit, of what comes before nothing is proven"
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("dual_gain",)
     constraints: int
     gain: float = 1.0
     dual_gain: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_positive(self, "gain", "dual_gain")
-        vars(self).update(memory_parts=(multipliers(self.constraints),))
-
-    @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, self.dual_gain)
-
-    def initial_memory(
-        self,
-        y: NDArray[np.float64],
-        estimate: ArrayLike | None = None,
-        filtered: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
-        """l = 0; see the base class."""
-        super().initial_memory(y, estimate, filtered)
-        return np.zeros(self.constraints)
-
-    def propagator(self, period: float, lists: GraphData | None = None) -> Propagator:
-        """See the base class."""
-        return held_for(period)
-
-    def step_propagator(self, timestep: float) -> Propagator:
-        """See the base class."""
-        return held_for(timestep)
 
 
 @kernel
@@ -117,16 +80,7 @@ def rate(problem, y, memory, out):
 @kernel
 def propagate(problem, y, memory, scratch):
     """Move the multipliers over one control period with y held."""
-    data, gain = problem.data, problem.settings[DUAL_GAIN]
-    for k in range(len(data.tightening)):
-        value = games.constraint(data, k, y) + data.tightening[k]
-        memory[k] = max(memory[k] + problem.propagator.numbers[PERIOD] * gain * value, 0.0)
-
-
-@kernel
-def storage(problem, memory):
-    """Nothing is claimed of V."""
-    return 0.0
+    ascend(problem, problem.settings[DUAL_GAIN], y, memory)
 
 
 @LAWS.register

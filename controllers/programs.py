@@ -4,54 +4,30 @@ All of them look for the input nearest to that of gradient play, -k F(y), among 
 constraints in some sense. None has a barrier.
 """
 
-import sys
-from abc import abstractmethod
-from types import ModuleType
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import game_functions as games
 from gne_mj import quadratic_program
-from gne_mj.controllers.law import Law, check_positive
-from gne_mj.controllers.settings import COUNT, GAIN
+from gne_mj.controllers.rival import Rival
+from gne_mj.controllers.settings import GAIN
 from gne_mj.controllers.settings import RELAXED as BOUNDS_SOFT
 from gne_mj.native import kernel
-from gne_mj.quadratic_program import RELAXED
+from gne_mj.quadratic_program import QUADRATIC, RELAXED, UNBOUNDED, solve
 
-# Entries of the settings behind the laws' numbers: DAQP's address, and the law's own
-SOLVER, OWN = COUNT, COUNT + 1
+SOLVER = -1  # entry of the settings, behind the law's own numbers: DAQP's address
 
 
-class ProgramLaw(Law):
-    """A law that solves a quadratic program; a subclass is a frozen dataclass in a kernels' module.
-
-    Attributes:
-        gain: k.
-    """
-
-    acts_outside: ClassVar[bool] = True
+class ProgramLaw(Rival):
+    """A rival that solves a quadratic program."""
 
     def __post_init__(self) -> None:
-        check_positive(self, "gain")
+        super().__post_init__()
         quadratic_program.solver()
 
-    @property
-    @abstractmethod
-    def own(self) -> tuple[float, ...]:
-        """Its own numbers besides k."""
-
-    @property
-    def kernels(self) -> ModuleType:
-        """The module that it is defined in."""
-        return sys.modules[type(self).__module__]
-
     def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, [quadratic_program.solver(), *self.own])
+        """See the base class, and DAQP's address behind these."""
+        return np.append(super().settings(rho), quadratic_program.solver())
 
 
 @kernel
@@ -81,6 +57,17 @@ def linearised(problem, y, values, jacobian):
 def solver_in(problem):
     """DAQP's address."""
     return np.int64(problem.settings[SOLVER])
+
+
+@kernel
+def nearest_direction(problem, program, goal, u):
+    """Fill u (m,) with the xi nearest to goal (m,) with A xi <= upper, which is overwritten; not a
+    number where there is none. What an action returns."""
+    for k in range(len(program.upper)):  # the unknown is xi - goal
+        if program.upper[k] < UNBOUNDED:
+            for a in range(len(goal)):
+                program.upper[k] -= program.matrix[k, a] * goal[a]
+    return give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
 
 
 @kernel

@@ -31,37 +31,31 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from gne_mj.controllers.held_program import nearest
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.multipliers import PERIOD, held_for
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import rate as rate
 from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.programs import (
-    OWN,
     ProgramLaw,
-    give,
     gradient_play,
     linearised,
-    solver_in,
+    nearest_direction,
     told,
 )
 from gne_mj.controllers.propagation import Propagator
+from gne_mj.controllers.settings import COUNT
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
 from gne_mj.graph import GraphData
 from gne_mj.native import kernel, released, reserved
-from gne_mj.quadratic_program import (
-    QUADRATIC,
-    UNBOUNDED,
-    clear,
-    program_in,
-    program_length,
-    solve,
-)
+from gne_mj.quadratic_program import UNBOUNDED, clear, program_in, program_length
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
 
 TOUCHES = 1e-9  # a constraint binds from here, in its own unit, since rounding must not free it
+
+RECOVERY = COUNT
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +72,9 @@ class ProjectedGradient(ProgramLaw):
         "of integrators the set is kept, but for what a step takes to meet a bound, and outputs"
         " tend to a variational equilibrium for strictly monotone F; of others nothing is proven"
     )
+    own: ClassVar[tuple[str, ...]] = ("recovery",)
     gain: float = 1.0
     recovery: float = 10.0
-
-    def __post_init__(self) -> None:
-        check_positive(self, "recovery")
-        super().__post_init__()
-
-    @property
-    def own(self) -> tuple[float, ...]:
-        """r."""
-        return (self.recovery,)
 
     def propagator(self, period: float, lists: GraphData | None = None) -> Propagator:
         """How long an input is held; see the base class."""
@@ -116,19 +102,15 @@ def action(game, problem, y, weights, memory, work, u):
 def along(problem, y, goal, u):
     """Fill u (m,) with the direction nearest to goal (m,) that leads not outside; what an
     action returns."""
-    m, p, recovery = len(u), len(problem.data.tightening), problem.settings[OWN]
+    m, p, recovery = len(u), len(problem.data.tightening), problem.settings[RECOVERY]
     room = reserved(program_length(m, p, 0, 0))
     program = program_in(room, 0, m, p, 0, 0)
     clear(program)
     linearised(problem, y, program.upper, program.matrix)
-    for k in range(p):  # the unknown is xi - goal
-        value, bound = program.upper[k], UNBOUNDED
-        if value >= -TOUCHES:
-            bound = -recovery * max(value, 0.0)
-            for a in range(m):
-                bound -= program.matrix[k, a] * goal[a]
-        program.upper[k] = bound
-    left = give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
+    for k in range(p):
+        value = program.upper[k]
+        program.upper[k] = -recovery * max(value, 0.0) if value >= -TOUCHES else UNBOUNDED
+    left = nearest_direction(problem, program, goal, u)
     released(room)
     return left
 

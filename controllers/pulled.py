@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gne_mj.barrier import weighted_gradient
 from gne_mj.controllers.law import Law
@@ -36,14 +36,8 @@ class Pulled(Law):
         """This module."""
         return sys.modules[__name__]
 
-    def initial_memory(
-        self,
-        y: NDArray[np.float64],
-        estimate: ArrayLike | None = None,
-        filtered: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
+    def first_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Nothing is pulled at first."""
-        super().initial_memory(y, estimate, filtered)
         return np.zeros(len(y))
 
 

@@ -6,20 +6,18 @@ Minimization Techniques, 1968). Constraints that bind are violated by l*_l / s t
 it rests. A static law.
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import rate as rate
 from gne_mj.controllers.no_memory import storage as storage
+from gne_mj.controllers.rival import Rival
 from gne_mj.controllers.settings import COUNT, GAIN
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
@@ -30,7 +28,7 @@ STRENGTH = COUNT
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticPenalty(Law):
+class QuadraticPenalty(Rival):
     """Gradient play with a quadratic penalty.
 
     Args:
@@ -43,23 +41,9 @@ class QuadraticPenalty(Law):
         "it rests where binding constraints are violated, by O(1/strength); of what comes before"
         " nothing is proven"
     )
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("strength",)
     gain: float = 1.0
     strength: float = 10.0
-
-    def __post_init__(self) -> None:
-        check_positive(self, "gain", "strength")
-
-    @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, self.strength)
 
 
 @kernel
@@ -69,20 +53,32 @@ def excess(game, data, k, y):
 
 
 @kernel
-def action(game, problem, y, weights, memory, work, u):
-    """Fill u (m,) from y (m,); the barrier's weights are not read."""
-    data, numbers = problem.data, problem.settings
+def priced(price, game, problem, y, u):
+    """Fill u (m,) with -k (F + sum_l p_l dg_l); p_l = price(game, problem, l, y)."""
+    data = problem.data
     at = data.offsets
     for i in range(len(at) - 1):
         for a in range(at[i], at[i + 1]):
             total = game.cost_gradient(data.parameters, i, a, y)
             for entry in range(data.own_pointer[i], data.own_pointer[i + 1]):
                 k = data.own_index[entry]
-                price = numbers[STRENGTH] * excess(game, data, k, y)
-                if price > 0.0:
-                    total += price * game.constraint_gradient(data.parameters, k, a, y)
-            u[a] = -numbers[GAIN] * total
+                paid = price(game, problem, k, y)
+                if paid > 0.0:
+                    total += paid * game.constraint_gradient(data.parameters, k, a, y)
+            u[a] = -problem.settings[GAIN] * total
     return -1
+
+
+@kernel
+def price(game, problem, k, y):
+    """s max(0, g_k)."""
+    return problem.settings[STRENGTH] * excess(game, problem.data, k, y)
+
+
+@kernel
+def action(game, problem, y, weights, memory, work, u):
+    """Fill u (m,) from y (m,); the barrier's weights are not read."""
+    return priced(price, game, problem, y, u)
 
 
 @LAWS.register

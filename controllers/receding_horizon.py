@@ -16,21 +16,23 @@ F + J_g^T l = 0 at each. That the closed loop comes to rest, and keeps the set, 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from gne_mj.controllers.horizon import first_input
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.programs import OWN, ProgramLaw, told
-from gne_mj.controllers.table import LawTable
+from gne_mj.controllers.programs import ProgramLaw, told
+from gne_mj.controllers.settings import COUNT
+from gne_mj.controllers.table import HeldTable
 from gne_mj.errors import InvalidInput
 from gne_mj.game_model import Game
 from gne_mj.native import kernel
-from gne_mj.registry import LAWS, MODES
+from gne_mj.registry import LAWS
 
+KNOTS, PERIODS, EFFORT = range(COUNT, COUNT + 3)
 MOST_KNOTS = 100
 
 
@@ -49,40 +51,34 @@ class RecedingHorizon(ProgramLaw):
         "plans keep bounds at their knots where that can be; of the closed loop nothing is proven"
     )
     knows_plant: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("knots", "periods", "effort")
     knots: int = 8
     periods: int = 1
     effort: float = 0.1
 
     def __post_init__(self) -> None:
-        check_positive(self, "effort")
         for key, most in (("knots", MOST_KNOTS), ("periods", 10**6)):
             if not 1 <= getattr(self, key) <= most:
                 raise InvalidInput(key, getattr(self, key), f"it must be from 1 to {most}")
         super().__post_init__()
-
-    @property
-    def own(self) -> tuple[float, ...]:
-        """Knots, periods of each, and effort."""
-        return (float(self.knots), float(self.periods), self.effort)
 
 
 @kernel
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,); not a number where there is no plan."""
     numbers = problem.settings
-    shape = int(numbers[OWN]), int(numbers[OWN + 1])
-    return told(first_input(problem, work, y, shape, numbers[OWN + 2], u), u)
+    shape = int(numbers[KNOTS]), int(numbers[PERIODS])
+    return told(first_input(problem, work, y, shape, numbers[EFFORT], u), u)
 
 
 @LAWS.register
-class RecedingHorizonController(LawTable):
+class RecedingHorizonController(HeldTable):
     """The first input of an open-loop Nash equilibrium over a horizon, a rival"""
 
     information: Literal["receding-horizon"]
     tuned: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType(
         {"effort": (0.01, 0.1, 1.0), "knots": (4, 8, 16), "periods": (1, 5)}
     )
-    mode: Annotated[str, MODES] = Field("sampled", description="only 'sampled': once a period")
     knots: int = Field(8, ge=1, le=MOST_KNOTS, description="how many inputs a plan has")
     periods: int = Field(1, ge=1, le=10**6, description="how many control periods each is held")
     effort: float = Field(0.1, gt=0, description="what inputs cost: effort |u_i|^2 / 2 a knot")

@@ -16,25 +16,23 @@ J_g^T, or shorter.
 The law's memory: v (p,), and room for a direction (m,), which is 0.
 """
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gne_mj import game_functions as games
 from gne_mj.barrier import weighted_gradient
-from gne_mj.controllers.law import Law, check_positive
-from gne_mj.controllers.multipliers import PERIOD, held_for, multipliers, rising
-from gne_mj.controllers.propagation import Propagator
+from gne_mj.controllers.law import Law
+from gne_mj.controllers.multipliers import PERIOD, MultiplierLaw, rising
+from gne_mj.controllers.no_memory import storage as storage
 from gne_mj.controllers.settings import COUNT, GAIN
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
-from gne_mj.graph import GraphData
 from gne_mj.native import kernel
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
@@ -44,7 +42,7 @@ MOST_STEPS = 1000.0  # in a control period; they become no longer where more wer
 
 
 @dataclass(frozen=True, eq=False)
-class RecursiveSafeFlow(Law):
+class RecursiveSafeFlow(MultiplierLaw):
     """The recursive safe monotone flow.
 
     Args:
@@ -59,44 +57,15 @@ class RecursiveSafeFlow(Law):
         "of integrators, for a small time constant, the set is nearly kept and the equilibrium"
         " reached; of others only where it rests is known"
     )
-    acts_outside: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ("alpha", "time_constant")
     constraints: int
     gain: float = 1.0
     alpha: float = 1.0
     time_constant: float = 1.0
 
-    def __post_init__(self) -> None:
-        check_positive(self, "gain", "alpha", "time_constant")
-        vars(self).update(memory_parts=(multipliers(self.constraints),))
-
-    @property
-    def kernels(self) -> ModuleType:
-        """This module."""
-        return sys.modules[__name__]
-
-    def settings(self, rho: float) -> NDArray[np.float64]:
-        """See the base class; rho is not read."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return np.append(numbers, [self.alpha, self.time_constant])
-
-    def initial_memory(
-        self,
-        y: NDArray[np.float64],
-        estimate: ArrayLike | None = None,
-        filtered: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
-        """v = 0; see the base class."""
-        super().initial_memory(y, estimate, filtered)
+    def first_memory(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See the base class."""
         return np.zeros(self.constraints + len(y))
-
-    def propagator(self, period: float, lists: GraphData | None = None) -> Propagator:
-        """See the base class."""
-        return held_for(period)
-
-    def step_propagator(self, timestep: float) -> Propagator:
-        """See the base class."""
-        return held_for(timestep)
 
 
 @kernel
@@ -176,12 +145,6 @@ def propagate(problem, y, memory, scratch):
             memory[k] = max(memory[k] + step * ascent(problem, k, y, u), 0.0)
     for a in range(len(y)):
         u[a] = 0.0
-
-
-@kernel
-def storage(problem, memory):
-    """Nothing is claimed of V."""
-    return 0.0
 
 
 @LAWS.register

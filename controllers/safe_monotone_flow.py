@@ -16,24 +16,20 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from gne_mj.controllers.law import Law, check_positive
+from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import rate as rate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.programs import (
-    OWN,
-    ProgramLaw,
-    give,
-    gradient_play,
-    linearised,
-    solver_in,
-)
+from gne_mj.controllers.programs import ProgramLaw, gradient_play, linearised, nearest_direction
+from gne_mj.controllers.settings import COUNT
 from gne_mj.controllers.table import LawTable
 from gne_mj.game_model import Game
 from gne_mj.native import kernel, released, reserved
-from gne_mj.quadratic_program import QUADRATIC, clear, program_in, program_length, solve
+from gne_mj.quadratic_program import clear, program_in, program_length
 from gne_mj.registry import LAWS
 from gne_mj.toml_table import Unit
+
+ALPHA = COUNT
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,35 +46,24 @@ class SafeMonotoneFlow(ProgramLaw):
         "of integrators in continuous time the set is kept and approached from outside, and outputs"
         " tend to a variational equilibrium; of other agents nothing is proven"
     )
+    own: ClassVar[tuple[str, ...]] = ("alpha",)
     gain: float = 1.0
     alpha: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_positive(self, "alpha")
-        super().__post_init__()
-
-    @property
-    def own(self) -> tuple[float, ...]:
-        """alpha."""
-        return (self.alpha,)
 
 
 @kernel
 def action(game, problem, y, weights, memory, work, u):
     """Fill u (m,); not a number where the program has no solution."""
-    m, p, alpha = len(u), len(problem.data.tightening), problem.settings[OWN]
+    m, p = len(u), len(problem.data.tightening)
     length = program_length(m, p, 0, 0)
     room = reserved(length + m)
     program, goal = program_in(room, 0, m, p, 0, 0), room[length:]
     clear(program)
     gradient_play(problem, y, goal)
     linearised(problem, y, program.upper, program.matrix)
-    for k in range(p):  # the unknown is xi - goal
-        bound = -alpha * program.upper[k]
-        for a in range(m):
-            bound -= program.matrix[k, a] * goal[a]
-        program.upper[k] = bound
-    left = give(program, solve(solver_in(problem), program, QUADRATIC), goal, u)
+    for k in range(p):
+        program.upper[k] *= -problem.settings[ALPHA]
+    left = nearest_direction(problem, program, goal, u)
     released(room)
     return left
 

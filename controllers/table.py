@@ -57,6 +57,12 @@ class LawTable(Table):
         """The law."""
 
 
+class HeldTable(LawTable):
+    """A law that acts once a control period."""
+
+    mode: Annotated[str, MODES] = Field("sampled", description="only 'sampled': once a period")
+
+
 GraphKey = Literal["line", "ring", "star", "complete", "printed", "caption"] | list[tuple[int, int]]
 
 

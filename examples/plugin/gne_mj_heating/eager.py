@@ -27,12 +27,6 @@ class Eager(Law):
         """This module."""
         return sys.modules[__name__]
 
-    def settings(self, rho):
-        """See the base class."""
-        numbers = super().settings(rho)
-        numbers[GAIN] = self.gain
-        return numbers
-
 
 @kernel
 def action(game, problem, y, weights, memory, work, u):
