@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.equilibrium import Equilibrium, measured_epsilon
-from gne_mj.errors import SolverError
+from gne_mj.errors import GneError
 from gne_mj.game_model import Game
 
 Array = NDArray[np.float64]
@@ -81,7 +81,8 @@ def epsilon_at(game: Game, y: Array) -> float | None:
     """What an agent could gain at most by deviating alone from a profile (m,), as measured.
 
     That is in the set itself; of a profile that is not strictly inside, in the set whose violated
-    bounds are wider by what it violates them by. None where a best response is not found.
+    bounds are wider by what it violates them by. None where a best response is not found, or the
+    game cannot be computed where it is looked for.
 
     Args:
         game: without tightening.
@@ -92,6 +93,7 @@ def epsilon_at(game: Game, y: Array) -> float | None:
     if np.any(wider > 0.0):
         game = game.widened(wider)
     try:
-        return float(np.max(measured_epsilon(game, y)))
-    except SolverError:
+        found = float(np.max(measured_epsilon(game, y)))
+    except GneError:
         return None
+    return found if np.isfinite(found) else None

@@ -161,4 +161,8 @@ def test_a_small_arena(tmp_path):
     assert arena.run_case("cournot", "rough", tmp_path, 1, 1, "full") == "done before"
     results = page.collect(tmp_path)
     assert [*results["cases"]] == ["cournot/rough"]
-    assert [law["inside"] for law in results["cases"]["cournot/rough"]["laws"]] == [1, 1]
+    (case,) = results["cases"].values()
+    assert [law["inside"] for law in case["laws"]] == [1, 1]
+    curves = json.loads((tmp_path / "cournot" / "rough" / page.CURVE).read_text(encoding="utf-8"))
+    case["laws"][1] |= {"inside": 0, "of the bound, worst": 0.02}
+    page.draw(curves, case, tmp_path / "drawn.png")

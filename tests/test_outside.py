@@ -156,3 +156,15 @@ def test_what_agents_could_gain_where_a_run_ends():
     assert_allclose(epsilon_at(bounded, np.array([0.5, 0.0])), 0.5 * (1.5**2 - 1.0), rtol=1e-6)
     assert_allclose(epsilon_at(bounded, np.array([1.2, 0.0])), 0.5 * 0.3**2, rtol=1e-6)
     assert_allclose(epsilon_at(bounded, np.array([1.0, 0.3])), 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("weight", [0.0, 1e-3])
+def test_a_gain_that_cannot_be_computed_is_not_known(weight):
+    """Within wider bounds is a place at which the cost's logarithm has no value."""
+
+    def cost(i, y, p):
+        return y[0] - p.weight * np.log(y[0] + 1.2) if i == 0 else 0.5 * y[1] ** 2
+
+    bounded = game(2, cost, lambda y, p: [(y[0] - y[1]) ** 2 <= 1.0, y[1] >= 0.0], weight=weight)
+    assert epsilon_at(bounded, np.array([0.5, 0.0])) == pytest.approx(1.5, rel=2e-3)
+    assert epsilon_at(bounded, np.array([2.0, 0.0])) is None

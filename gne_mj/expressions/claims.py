@@ -82,7 +82,7 @@ class Claims:
             signs = [-1 if node.op == "neg" or (node.op == "-" and k) else 1
                      for k in range(len(inner))]  # fmt: skip
             bent = {c if c is None else c * s for c, s in zip(inner, signs, strict=True)} - {0}
-            return None if len(bent) > 1 else bent.pop()
+            return None if len(bent) > 1 else next(iter(bent), 0)
         if node.op in "*/" and not node.args[1].varies:
             return _scaled(inner[0], node.tape.value(node.args[1]))
         if node.op == "*" and not node.args[0].varies:

@@ -16,7 +16,7 @@ PAGE = DOCS / "arena.md"
 BEGIN, END = "<!-- arena: made by scripts/arena --page -->", "<!-- arena: end -->"
 OURS = ("full", "partial", "distributed")
 FIGURE = ("desired", "ideal")  # whose violation over time the README shows
-CURVE = "violation.json"  # of a case: each law's median violation over time, and the worst
+CURVE = "violation.json"  # of a case: the greatest violation of each law's runs over time
 SETTLING, ERROR = "settling (s), median", "final error, median"
 OVERVIEW = (
     "cases",
@@ -44,10 +44,9 @@ def keep_curves(data: "xarray.Dataset", folder: Path) -> None:
     for law in data["law"].to_numpy():
         values = data["violation"].sel(law=law).to_numpy()
         gone = np.all(np.isnan(values), axis=0)
-        kept = np.where(np.isnan(values), 0.0, values)
+        worst = np.max(np.where(np.isnan(values), 0.0, values), axis=0)
         found["laws"][str(law)] = {
-            name: [None if nobody else float(v) for nobody, v in zip(gone, curve, strict=True)]
-            for name, curve in (("median", np.median(kept, 0)), ("worst", np.max(kept, 0)))
+            "worst": [None if nobody else float(v) for nobody, v in zip(gone, worst, strict=True)]
         }
     (folder / CURVE).write_text(json.dumps(found), encoding="utf-8")
 
@@ -171,7 +170,7 @@ def draw(curves: dict[str, Any], case: dict[str, Any], file: Path) -> None:
     """
     from gne_mj.plots.style import line_style, styled, subplots
 
-    by_worst = sorted(case["laws"], key=lambda law: -law["of the bound, worst"])
+    by_worst = sorted(case["laws"], key=lambda law: -(law["of the bound, worst"] or 0.0))
     left = [law for law in by_worst if law["inside"] < law["runs"]]
     never = sorted(
         (law["law"] for law in case["laws"] if law not in left), key=lambda law: not _is_ours(law)
@@ -182,7 +181,7 @@ def draw(curves: dict[str, Any], case: dict[str, Any], file: Path) -> None:
         axes = grid[0, 0]
         for number, law in enumerate(left):
             worst = np.array(curves["laws"][law["law"]]["worst"], dtype=float)
-            label = f"{law['law']} ({100 * law['of the bound, worst']:.3g}%)"
+            label = f"{law['law']} ({_cell('of the bound, worst', law)})"
             axes.plot(time, worst, label=label, **line_style(number))
         axes.axhline(0.0, color="black", linewidth=2.6)
         axes.axhspan(-least, 0.0, color="green", alpha=0.12, linewidth=0)
