@@ -118,7 +118,7 @@ class Fleets:
 
     @cached_property
     def _pool(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(len(self._parts))
+        return ThreadPoolExecutor(len(self._parts) - 1)  # besides the thread that asks
 
     def place(self, row: int, state: ArrayLike) -> None:
         """Let a fleet start anew at time 0 from (m, states), nothing acting; :meth:`look` next."""
@@ -161,10 +161,12 @@ class Fleets:
             self._advance(self._tools[number], data, self._limit, rows, first, last, steps)
 
         with callbacks(passive=self._passive):
-            if len(self._parts) == 1:
+            others = [self._pool.submit(part, number) for number in range(1, len(self._parts))]
+            try:
                 part(0)
-            else:
-                list(self._pool.map(part, range(len(self._parts))))
+            finally:  # none may step on without the callbacks
+                for each in others:
+                    each.result()
         raise_pending()
         for row in np.flatnonzero((rows.found != INSIDE) & (rows.moves == 1)).tolist():
             if self.exits[row] is None:
