@@ -56,7 +56,8 @@ class Episodes:
         self.fleets = setting.fleets(count, cores() if threads is None else threads)
         self.view = View(setting.system.game, self.fleets.plants[0], setting.information)
         self.bounds = self.view.bounds(bound)
-        self._done = np.full(count, -1)  # periods; -1: it has not begun
+        self._done = np.zeros(count, dtype=np.int64)
+        self._not_begun = set(range(count))
 
     def begin(self, row: int, rng: np.random.Generator) -> None:
         """Let an episode start anew; what is random of its start comes from ``rng``."""
@@ -67,6 +68,7 @@ class Episodes:
         fleets.look()
         check_begun(fleets, row)
         self._done[row] = 0
+        self._not_begun.discard(row)
 
     def step(self, actions: ArrayLike, going: NDArray[np.bool_] | None = None) -> Taken:
         """Hold these actions (E, m) for a control period.
@@ -114,5 +116,5 @@ class Episodes:
         return drawn(mode, self.setting.system, self.fleets, row)
 
     def _check_begun(self) -> None:
-        if np.any(self._done < 0):
+        if self._not_begun:
             raise ResetNeeded("call reset() first: an episode has not begun")

@@ -71,6 +71,9 @@ class View:
 
     def __init__(self, game: Game, plant: FleetPlant, told: Information) -> None:
         self.game, self._told = game, told
+        shapes = [(each, game.entries(each)) for each in game.quantities]
+        # of each quantity which of its entries there are
+        self._there = [(each, own, each.there(own) if own else ...) for each, own in shapes]
         m, states, p = game.actions, plant.agents.states, game.constraints_count
         joints = joints_of(plant)
         at = [0, *accumulate([m * states, m, p, sum(map(len, joints))])]
@@ -124,12 +127,7 @@ class View:
 
     def _derived(self, y: Array) -> list[tuple[str, Array]]:
         """What the game derives from its actions y (E, m), without entries that are not there."""
-        game, found = self.game, []
-        for each in game.quantities:
-            entries = game.entries(each)
-            values = each.at(y, entries)
-            found.append((each.name, values[:, each.there(entries)] if entries else values))
-        return found
+        return [(each.name, each.at(y, own)[:, there]) for each, own, there in self._there]
 
     def bounds(self, bound: float) -> tuple[Array, Array]:
         """(lower, upper) bounds of the table's columns: those of outputs that the game declares.
