@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,9 @@ def test_what_is_kept_is_on_the_page_and_read_again(script, measured, tmp_path):
     (kept,) = (tmp_path / "benchmarks").iterdir()
     assert kept.name == "fast-cpu-2-cores-1.2.json"
     assert [row["ours"] for row in history.read(kept).rows] == ["3"]
+    history.keep(replace(found, versions={"gne-mj": "1.2", "peer": "7"}), tmp_path)
+    history.keep(found.with_rows("some", [{**found.rows[0], "ours": "3"}]), tmp_path)
+    assert history.read(kept).versions == {"gne-mj": "1.2", "peer": "7"}
     lines = page.read_text().split("\n")
     assert lines[:4] == ["# B", "", "Words.", ""]
     assert lines[4].startswith("Medians of 20 turns")

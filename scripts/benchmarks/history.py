@@ -70,11 +70,15 @@ def read(path: Path) -> Measured:
 
 
 def keep(measured: Measured, docs: Path) -> None:
-    """Put these rows in place of the same groups' of this machine and version, and on the page."""
+    """Put these rows in place of the same groups' of this machine and version, and on the page.
+
+    Peers that no group of these asked for keep the versions that their rows were measured with.
+    """
     path = docs / "benchmarks" / f"{measured.name}.json"
     path.parent.mkdir(exist_ok=True)
     whole = read(path) if path.exists() else replace(measured, rows=[])
-    whole = replace(whole, versions=measured.versions, turns=measured.turns)
+    versions = {**whole.versions, **measured.versions}
+    whole = replace(whole, versions=versions, turns=measured.turns)
     for group in dict.fromkeys(row["group"] for row in measured.rows):
         whole = whole.with_rows(group, [row for row in measured.rows if row["group"] == group])
     _write_json(whole, path)
