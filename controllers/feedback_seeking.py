@@ -10,8 +10,9 @@ Lagrangian, once a control period T, and what it moves are set-points r:
 
 The plant with the loop u = k (r - y) rests at y = r, for the paper's agents rest with u = 0 at any
 y: the sensitivity of its steady state is 1. R are the set-points that ask of no actuator more than
-its limit, |k (r - y)| <= limit. It rests at the variational equilibrium; to get there it must be
-slow against the plant's own loop, and constraints hold in the limit.
+its limit at these outputs, |k (r - y)| <= limit; a period later y is another one. It rests at the
+variational equilibrium; to get there it must be slow against the plant's own loop, and constraints
+hold in the limit.
 
 The law's memory: l (p,), r (m,).
 """
@@ -53,8 +54,8 @@ class FeedbackSeeking(MultiplierLaw):
 
     information: ClassVar[str] = "feedback-seeking"
     promise: ClassVar[str] = (
-        "inputs keep to the actuators' limits, constraints hold in the limit if it is slow against"
-        " the agents' own loops; of what comes before nothing is proven"
+        "constraints hold in the limit if it is slow against the agents' own loops; of what comes"
+        " before nothing is proven"
     )
     own: ClassVar[tuple[str, ...]] = ("seeking", "dual_gain")
     memory_parts: ClassVar[tuple[MemoryPart, ...]] = (SET_POINT,)
