@@ -77,5 +77,7 @@ def check_network(system: SystemData, clock: Clock) -> None:
 
 def _rounded_down(value: float) -> float:
     """To three digits: what a message names as the largest must itself be accepted."""
+    if not value > 0:
+        return 0.0
     unit = 10.0 ** (np.floor(np.log10(value)) - 2)
     return float(np.floor(value / unit) * unit)
