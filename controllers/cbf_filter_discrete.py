@@ -51,6 +51,7 @@ class DiscreteCbfFilter(ProgramLaw):
         " what their equations say; where it rests may be no equilibrium"
     )
     knows_plant: ClassVar[bool] = True
+    of_period: ClassVar[bool] = True
     own: ClassVar[tuple[str, ...]] = ("alpha",)
     gain: float = 1.0
     alpha: float = 0.1

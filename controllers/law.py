@@ -44,6 +44,7 @@ from gne_mj.controllers.kept import EVERYTHING, Kept, KeptData
 from gne_mj.controllers.propagation import Propagator, no_propagator, propagator
 from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput, named
+from gne_mj.game_model import Game
 from gne_mj.graph import Graph, GraphData
 
 _NOBODY = GraphData(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64))
@@ -102,6 +103,7 @@ class Law(ABC):
         acts_outside: whether the law has an action where constraints are violated, as one without
             a barrier: with ``simulation.on_exit = "continue"`` its runs go on there.
         knows_plant: whether it asks for the agents' own equations and their whole state.
+        of_period: whether an input that is held depends on for how long that is.
     """
 
     information: ClassVar[str] = "custom"
@@ -122,6 +124,7 @@ class Law(ABC):
     guarded: ClassVar[bool] = False
     acts_outside: ClassVar[bool] = False
     knows_plant: ClassVar[bool] = False
+    of_period: ClassVar[bool] = False
 
     @property
     def theorem(self) -> LawTheorem | None:
@@ -265,6 +268,10 @@ class Law(ABC):
             if self.kept is not None:
                 return self.kept.propagator(self.estimate_rate * period)
             return propagator(lists or self.graph.data, self.estimate_rate * period)
+
+    def room(self, game: Game) -> float:
+        """How many numbers an evaluation of it works on, where these are many."""
+        return 0.0
 
     def step_propagator(self, timestep: float) -> Propagator:
         """What ``rate`` needs to know of the timestep in s, mode continuous: nothing, of most laws.

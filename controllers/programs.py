@@ -12,8 +12,9 @@ from gne_mj import quadratic_program
 from gne_mj.controllers.rival import Rival
 from gne_mj.controllers.settings import GAIN
 from gne_mj.controllers.settings import RELAXED as BOUNDS_SOFT
+from gne_mj.game_model import Game
 from gne_mj.native import kernel
-from gne_mj.quadratic_program import QUADRATIC, RELAXED, UNBOUNDED, solve
+from gne_mj.quadratic_program import QUADRATIC, RELAXED, UNBOUNDED, program_length, solve
 
 SOLVER = -1  # entry of the settings, behind the law's own numbers: DAQP's address
 
@@ -28,6 +29,15 @@ class ProgramLaw(Rival):
     def settings(self, rho: float) -> NDArray[np.float64]:
         """See the base class, and DAQP's address behind these."""
         return np.append(super().settings(rho), quadratic_program.solver())
+
+    def room(self, game: Game) -> float:
+        """A program of all inputs; see the base class."""
+        return room_of(game.actions, game.constraints_count)
+
+
+def room_of(unknown: int, rows: int) -> float:
+    """How many numbers a program takes, and DAQP for as much again."""
+    return 2.0 * program_length(unknown, rows, unknown, 1)
 
 
 @kernel

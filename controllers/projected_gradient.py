@@ -72,6 +72,7 @@ class ProjectedGradient(ProgramLaw):
         "of integrators the set is kept, but for what a step takes to meet a bound, and outputs"
         " tend to a variational equilibrium for strictly monotone F; of others nothing is proven"
     )
+    of_period: ClassVar[bool] = True
     own: ClassVar[tuple[str, ...]] = ("recovery",)
     gain: float = 1.0
     recovery: float = 10.0

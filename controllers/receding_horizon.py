@@ -24,7 +24,7 @@ from gne_mj.controllers.horizon import first_input
 from gne_mj.controllers.law import Law
 from gne_mj.controllers.no_memory import propagate as propagate
 from gne_mj.controllers.no_memory import storage as storage
-from gne_mj.controllers.programs import ProgramLaw, told
+from gne_mj.controllers.programs import ProgramLaw, room_of, told
 from gne_mj.controllers.settings import COUNT
 from gne_mj.controllers.table import HeldTable
 from gne_mj.errors import InvalidInput
@@ -51,6 +51,7 @@ class RecedingHorizon(ProgramLaw):
         "plans keep bounds at their knots where that can be; of the closed loop nothing is proven"
     )
     knows_plant: ClassVar[bool] = True
+    of_period: ClassVar[bool] = True
     own: ClassVar[tuple[str, ...]] = ("knots", "periods", "effort")
     knots: int = 8
     periods: int = 1
@@ -58,9 +59,14 @@ class RecedingHorizon(ProgramLaw):
 
     def __post_init__(self) -> None:
         for key, most in (("knots", MOST_KNOTS), ("periods", 10**6)):
-            if not 1 <= getattr(self, key) <= most:
-                raise InvalidInput(key, getattr(self, key), f"it must be from 1 to {most}")
+            value = getattr(self, key)
+            if not (1 <= value <= most and value == int(value)):
+                raise InvalidInput(key, value, f"it must be a whole number from 1 to {most}")
         super().__post_init__()
+
+    def room(self, game: Game) -> float:
+        """A program of all inputs and slacks of a plan; see the base class."""
+        return room_of(self.knots * (game.actions + 1), self.knots * game.constraints_count)
 
 
 @kernel

@@ -300,3 +300,19 @@ def test_laws_of_periods_are_for_held_modes_and_numbers_are_looked_at():
             law(alpha=0.0)
         with pytest.raises(InvalidInput, match="gain"):
             law(gain=-1.0)
+    with pytest.raises(InvalidInput, match=r"knots: got 2.5, .* a whole number from 1 to 100"):
+        RecedingHorizon(knots=2.5)
+
+
+def test_plans_that_fill_the_memory_are_refused():
+    """90 agents, 100 knots: a square matrix of 9100 unknowns has 83 million numbers."""
+    made = RandomGame(0, agents=90, constraints=4)
+    with pytest.raises(InvalidInput, match=r"agents.count: got 90, but what the receding-horizon"):
+        system_of(made, RecedingHorizon(100), integrators(90), np.zeros(90), mode="sampled")
+
+
+def test_what_a_law_asks_for_at_the_start_is_not_told_where_periods_matter():
+    made = RandomGame(0, agents=N, constraints=4)
+    for mode, told in (("continuous", True), ("sampled", False)):
+        one = system_of(made, ProjectedGradient(), integrators(N), np.zeros(N), mode=mode)
+        assert np.all(np.isfinite(law_at_start(one))) == told

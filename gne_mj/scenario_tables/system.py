@@ -33,7 +33,7 @@ from gne_mj.scenario_tables.faults import FaultTable, MarginTable
 from gne_mj.separation import Separation, SeparationTable
 from gne_mj.starts import interior_profile
 from gne_mj.system import System, mode_of
-from gne_mj.system.checks import check_estimates
+from gne_mj.system.checks import check_law_room
 from gne_mj.system.data import GUARDED
 from gne_mj.theory.periods import least_rho
 from gne_mj.toml_table import ACTION, INPUT, Fills, PerAction, Sizes, Table, Unit, per_action
@@ -193,7 +193,7 @@ class SystemTable(Table):
             raise InvalidInput(
                 "margin", "given", "it is for mode 'implicit', where a margin is a promise"
             )
-        check_estimates(game, law)
+        check_law_room(game, law)
         if at is None:
             state, memory = self._start(game, agents, law)
         else:

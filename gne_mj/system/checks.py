@@ -35,8 +35,11 @@ RTOL = 1e-12, 1e-2  # errors in a step that adaptive integrators can be asked fo
 ESTIMATES = 8
 
 
-def check_estimates(game: Game, law: Law) -> None:
-    """Refuse laws whose agents' estimates, and what a loop makes of them, fill the memory."""
+def check_law_room(game: Game, law: Law) -> None:
+    """Refuse laws that fill the memory: with estimates, loops' copies included, or programs."""
+    check_room(
+        "agents.count", game.agents, law.room(game), f"what the {law.information} law solves"
+    )
     if law.graph is not None:
         kept = game.agents * game.actions if law.kept is None else law.kept.size
         size = ESTIMATES * kept

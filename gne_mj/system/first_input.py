@@ -14,6 +14,7 @@ from gne_mj.loops.layout import LoopClock as Steps
 from gne_mj.loops.layout import Setup, problem_and_parameter_block
 from gne_mj.plain import raise_pending
 from gne_mj.system.clock import Clock
+from gne_mj.system.modes import mode_of
 from gne_mj.system.system import System
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ def law_at_start(system: System) -> Array:
     Faults of sensors are left out. Not a number where the law has no action, or where that depends
     on how long a control period is.
     """
-    if system.law.knows_plant and not hasattr(system.law.kernels, "rate"):
+    if system.law.of_period and mode_of(system).held:
         return np.full(system.game.actions, np.nan)
     game, problem, memory = system.game, problem_at_start(system), system.loop_memory.copy()
     setup = Setup(problem, system.agents.equilibrium(system.start), Steps(1.0, 1, 0, 0))

@@ -69,7 +69,7 @@ class System(Assembly):
         checks.check_parts(self)
         checks.check_start(self)
         refuse(self.game, self.start)
-        checks.check_estimates(self.game, self.law)
+        checks.check_law_room(self.game, self.law)
         expected = self.law.initial_memory(self.start)
         if not len(self.memory):
             object.__setattr__(self, "memory", expected)
