@@ -51,7 +51,7 @@ class Variable:
         dimensions: "time" first if it is sampled, "run" first if it is a figure of runs; AXIS
             stands for one entry for each action.
         source: the values, from :class:`Rows` or, of a figure, from
-            :class:`gne_mj.batch_variables.Runs`; their shape is that of the dimensions.
+            :class:`gne_mj.batch_runs.Runs`; their shape is that of the dimensions.
         there: whether a system has it.
         unit, long_name: for every reader; None writes no such attribute, "" an empty one.
         symbol: its formula in TeX, likewise.

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj import run_metrics
-from gne_mj.batch_variables import Runs, declared_figures
+from gne_mj.batch_runs import Runs
+from gne_mj.batch_variables import declared_figures
 from gne_mj.batches.plan import Combination
 from gne_mj.errors import InfeasibleStart
 from gne_mj.loops.batch import Outcome, Span
