@@ -279,6 +279,23 @@ def test_systems_that_end_early_stay_and_their_lines_stop():
     assert meta["outcome"]["robots"]["exit_time"] == pytest.approx(ended, abs=0.51)
 
 
+def test_systems_in_lanes_stand_beside_each_other_and_one_that_went_outside_is_told():
+    """Two laws from one start: what is drawn of both, and how the second one's run ended."""
+    tables = json.loads(load_scenario("desired-velocity").model_dump_json(exclude_none=True))
+    (robots,) = tables["systems"].values()
+    rival = {**robots, "controller": {"information": "primal-dual", "dual_gain": 10.0}}
+    tables["systems"] = {"ours": robots, "rival": rival}
+    changes = {"simulation.on_exit": "continue", "simulation.duration": 0.5}
+    meta, found = unpack(replay_pack(gne_mj.run(tables, changes)))
+    poses = poses_of(found)
+    lanes = [poses[:, system["anchors"], 1] for system in meta["systems"]]
+    assert np.all(lanes[0] == 0.0)
+    assert np.all(lanes[1] == -1.2)
+    told = meta["outcome"]["rival"]
+    assert told["status"] == "went_outside"
+    assert 0.0 < told["exit_time"] < 0.5
+
+
 def test_long_trajectories_are_thinned_and_keep_their_end(monkeypatch):
     monkeypatch.setattr("gne_mj.viewer.replay.SAMPLES", 7)
     trajectory = gne_mj.run("velocity-sync", {**SHORT, "plant.engine": "ode"})

@@ -66,6 +66,16 @@ class Fleet:
         found[:, at.appendage_q] = position - extension
         return found
 
+    @cached_property
+    def lane(self) -> tuple[float, float] | None:
+        """The least and greatest y in m of agents that move along x alone; None of others."""
+        if self.plant.agents.dimension > 1:
+            return None
+        data = mujoco.MjData(self.plant.model)
+        mujoco.mj_kinematics(self.plant.model, data)
+        y = data.xpos[self._bodies, 1]
+        return float(np.min(y)), float(np.max(y))
+
     @property
     def places(self) -> dict[str, Any]:
         """Where the page finds each agent's body, see ``ShownSystem.meta``."""

@@ -103,13 +103,15 @@ def _text(trajectory: Trajectory) -> str | None:
 def outcome(report: dict[str, Any]) -> dict[str, Any]:
     """How a system's run ended, from its report."""
     worst, left = report["worst_constraint"], report["exit"]
+    outside = report.get("outside")  # which older results do not have
+    first = None if outside is None or not outside["exits"] else outside["first"]
     return {
         "status": report["status"],
         "message": report["message"],
         "margin": None if worst is None else worst["margin"],
         "margin_name": None if worst is None else worst["name"],
         "margin_time": None if worst is None else worst["time"],
-        "exit_time": None if left is None else left["time"],
+        "exit_time": first if left is None else left["time"],
         "exit_agents": [] if left is None else left.get("agents", []),
     }
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from gne_mj.viewer.mirror import POSITION, QUATERNION
 from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
 
+APART = 1.2  # m between the lanes of systems that are drawn beside each other
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
 
 
@@ -23,6 +24,7 @@ class Scene:
 
     def __init__(self, shown_systems: Sequence[ShownSystem], title: str, duration: float) -> None:
         self.shown_systems, self.title, self.duration = shown_systems, title, duration
+        self._shifts = _beside(shown_systems)
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the scene; see :mod:`gne_mj.viewer`."""
@@ -53,11 +55,13 @@ class Scene:
     def poses(self, values: Mapping[str, Values]) -> NDArray[np.float64]:
         """(T, K, 8) of all items at samples, from the variables of each system by its name."""
         found = []
-        for shown_system in self.shown_systems:
+        for shown_system, shift in zip(self.shown_systems, self._shifts, strict=True):
             if shown_system.fleet is not None:
                 mirror = shown_system.fleet.mirror
                 rows = shown_system.fleet.qpos(values[shown_system.system.name])
-                found.append(np.stack([_hidden(mirror.poses(row)) for row in rows]))
+                poses = np.stack([_hidden(mirror.poses(row)) for row in rows])
+                poses[..., 1] += shift
+                found.append(poses)
         if not found:
             samples = len(next(iter(values.values()))["action"])
             return np.zeros((samples, 0, 8))
@@ -69,6 +73,18 @@ class Scene:
         for shown_system in self.shown_systems:
             found |= shown_system.arrays(values[shown_system.system.name])
         return found
+
+
+def _beside(shown_systems: Sequence[ShownSystem]) -> list[float]:
+    """How far in m along y each system is moved: lanes do not lie upon each other."""
+    shifts, taken = [], None
+    for shown_system in shown_systems:
+        lane = None if shown_system.fleet is None else shown_system.fleet.lane
+        shift = 0.0 if lane is None or taken is None else taken - APART - lane[1]
+        shifts.append(shift)
+        if lane is not None:
+            taken = lane[0] + shift
+    return shifts
 
 
 def _hidden(poses: NDArray[np.float64]) -> NDArray[np.float64]:

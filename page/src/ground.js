@@ -66,7 +66,7 @@ export class Ground {
    * @param {number[]} target
    * @param {number} distance
    * @param {number} floor
-   * @param {number | null} lane
+   * @param {number[] | null} lane its least and greatest y
    */
   place(target, distance, floor, lane) {
     const u = this.uniforms;
@@ -81,7 +81,8 @@ export class Ground {
     u.size.value = 2 * reach + major;
     [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
     u.middle.value.set(target[0] - origin[0], target[1] - origin[1]);
-    u.laneWidth.value = lane === null ? 0 : 0.75;
-    u.lane.value = (lane ?? 0) - origin[1];
+    const [low, high] = lane ?? [0, 0];
+    u.laneWidth.value = lane === null ? 0 : 0.75 + (high - low) / 2;
+    u.lane.value = (low + high) / 2 - origin[1];
   }
 }

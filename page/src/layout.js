@@ -107,11 +107,14 @@ export class Layout {
       }
   }
 
-  /** The y of robots in a row, or null. */
+  /** The least and greatest y of robots in rows, one for each fleet, or null. */
   get lane() {
     if (!this.box) return null;
-    const { low, high } = this.box;
-    return high[1] - low[1] < 0.3 ? (low[1] + high[1]) / 2 : null;
+    for (const system of this.fleets) {
+      const across = system.anchors.map((anchor) => this.poses[8 * anchor + 1]);
+      if (Math.max(...across) - Math.min(...across) >= 0.3) return null;
+    }
+    return [this.box.low[1], this.box.high[1]];
   }
 
   get planar() {

@@ -49,7 +49,7 @@ export const status = (word) => {
   /** @type {keyof typeof SYMBOLS} */
   let kind = "unknown";
   if (/^(converged|completed)$/.test(word)) kind = "ok";
-  else if (/left|diverged|too_small/.test(word)) kind = "bad";
+  else if (/left|outside|diverged|too_small/.test(word)) kind = "bad";
   else if (word === "running") kind = "going";
   return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
 };

@@ -168,7 +168,7 @@
   var status = (word) => {
     let kind = "unknown";
     if (/^(converged|completed)$/.test(word)) kind = "ok";
-    else if (/left|diverged|too_small/.test(word)) kind = "bad";
+    else if (/left|outside|diverged|too_small/.test(word)) kind = "bad";
     else if (word === "running") kind = "going";
     return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
   };
@@ -7563,7 +7563,7 @@
      * @param {number[]} target
      * @param {number} distance
      * @param {number} floor
-     * @param {number | null} lane
+     * @param {number[] | null} lane its least and greatest y
      */
     place(target, distance, floor2, lane) {
       const u = this.uniforms;
@@ -7578,8 +7578,9 @@
       u.size.value = 2 * reach + major;
       [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
       u.middle.value.set(target[0] - origin[0], target[1] - origin[1]);
-      u.laneWidth.value = lane === null ? 0 : 0.75;
-      u.lane.value = (lane ?? 0) - origin[1];
+      const [low, high] = lane ?? [0, 0];
+      u.laneWidth.value = lane === null ? 0 : 0.75 + (high - low) / 2;
+      u.lane.value = (low + high) / 2 - origin[1];
     }
   };
 
@@ -7676,11 +7677,14 @@
           if (poses[p + 7] !== 0 && out > this.spill) this.spill = out;
         }
     }
-    /** The y of robots in a row, or null. */
+    /** The least and greatest y of robots in rows, one for each fleet, or null. */
     get lane() {
       if (!this.box) return null;
-      const { low, high } = this.box;
-      return high[1] - low[1] < 0.3 ? (low[1] + high[1]) / 2 : null;
+      for (const system of this.fleets) {
+        const across = system.anchors.map((anchor) => this.poses[8 * anchor + 1]);
+        if (Math.max(...across) - Math.min(...across) >= 0.3) return null;
+      }
+      return [this.box.low[1], this.box.high[1]];
     }
     get planar() {
       return this.lane === null ? 1 : 0;
