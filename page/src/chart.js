@@ -9,6 +9,7 @@ import { number, withUnit } from "./words.js";
 export const MOST_CHIPS = 14; // lines, up to which each has a chip with its value
 const FONT = "12px system-ui, sans-serif";
 const LABEL = 13; // px of a bound's label
+const UNIT = 18; // px of the unit beside an axis
 
 /**
  * @param {Plot} plot
@@ -65,11 +66,11 @@ const axesOf = (unit, log) => {
     },
     {
       ...axis,
-      size: 50,
+      size: unit ? 50 : 50 + UNIT, // so that time is at the same place in all plots
       gap: 3,
       space: 24,
       label: unit || undefined,
-      labelSize: 18,
+      labelSize: UNIT,
       labelGap: 0,
       labelFont: FONT,
       // of powers of ten those that uPlot leaves in

@@ -95,14 +95,16 @@ export class Overlay {
     context.textBaseline = "top";
     context.fillStyle = colour("muted");
     const step = ground.major > 10 ? ground.major : 5;
+    const wide = this.canvas.clientWidth;
     for (
       let x = Math.floor((low[0] - 2 * step) / step) * step;
       x <= high[0] + 2 * step;
       x += step
     ) {
       const p = camera.project([x, y, layout.floor]);
-      if (!p || !this.free({ x: p.x - 26, y: p.y, w: 52, h: 18 })) continue;
-      this.taken.push({ x: p.x - 26, y: p.y, w: 52, h: 18 });
+      const box = p && { x: p.x - 26, y: p.y, w: 52, h: 18 };
+      if (!box || box.x < 0 || box.x + box.w > wide || !this.free(box)) continue;
+      this.taken.push(box);
       this.haloed(`${number(x, 6)} m`, p.x, p.y + 4);
     }
   }

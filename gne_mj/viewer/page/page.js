@@ -1092,10 +1092,12 @@
       context.textBaseline = "top";
       context.fillStyle = colour("muted");
       const step = ground.major > 10 ? ground.major : 5;
+      const wide = this.canvas.clientWidth;
       for (let x = Math.floor((low[0] - 2 * step) / step) * step; x <= high[0] + 2 * step; x += step) {
         const p = camera.project([x, y, layout.floor]);
-        if (!p || !this.free({ x: p.x - 26, y: p.y, w: 52, h: 18 })) continue;
-        this.taken.push({ x: p.x - 26, y: p.y, w: 52, h: 18 });
+        const box = p && { x: p.x - 26, y: p.y, w: 52, h: 18 };
+        if (!box || box.x < 0 || box.x + box.w > wide || !this.free(box)) continue;
+        this.taken.push(box);
         this.haloed(`${number(x, 6)} m`, p.x, p.y + 4);
       }
     }
@@ -5852,6 +5854,7 @@
   var MOST_CHIPS = 14;
   var FONT = "12px system-ui, sans-serif";
   var LABEL = 13;
+  var UNIT = 18;
   var optionsOf = (plot, width, height) => ({
     width,
     height,
@@ -5900,11 +5903,12 @@
       },
       {
         ...axis,
-        size: 50,
+        size: unit ? 50 : 50 + UNIT,
+        // so that time is at the same place in all plots
         gap: 3,
         space: 24,
         label: unit || void 0,
-        labelSize: 18,
+        labelSize: UNIT,
         labelGap: 0,
         labelFont: FONT,
         // of powers of ten those that uPlot leaves in
