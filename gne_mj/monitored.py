@@ -23,7 +23,7 @@ from gne_mj.system.first_input import limits_at
 
 def _worst(system: System, monitor: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each constraint's greatest value and when in s, (p,) each, that at an exit included."""
-    worst, when = run_metrics.worst_constraints(watch.together([monitor]))
+    worst, when = run_metrics.worst_constraints(np.array([monitor]))
     return worst[0], when[0]
 
 

@@ -119,12 +119,13 @@ def worst_constraints(monitors: Any) -> tuple[NDArray[np.float64], NDArray[np.fl
 
     Of a run in which nothing was observed it is minus infinity.
     """
-    worst, when = monitors.worst.copy(), monitors.worst_time.copy()
-    worst[monitors.started == 0.0] = -np.inf
-    for run in np.flatnonzero(monitors.exit == watch.LEFT_SET).tolist():
-        index, value = int(monitors.exit_constraint[run]), monitors.exit_value[run]
+    # by item, which costs a part of what attributes of such arrays do: pages ask at every frame
+    worst, when = monitors["worst"].copy(), monitors["worst_time"].copy()
+    worst[monitors["started"] == 0.0] = -np.inf
+    for run in np.flatnonzero(monitors["exit"] == watch.LEFT_SET).tolist():
+        index, value = int(monitors["exit_constraint"][run]), monitors["exit_value"][run]
         if value > worst[run, index]:
-            worst[run, index], when[run, index] = value, monitors.exit_time[run]
+            worst[run, index], when[run, index] = value, monitors["exit_time"][run]
     return worst, when
 
 

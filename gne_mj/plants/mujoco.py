@@ -185,6 +185,7 @@ class MujocoPlant(FleetPlant):
         kernels: the module that says how a loop reads and drives the fleet.
         model, data: MuJoCo's own. Step them through this class or a simulation: without its
             callbacks the springs lack their atan term.
+        joints: (2, m) main masses' and appendages' entries of qpos, and of qvel.
     """
 
     def __init__(
@@ -237,8 +238,7 @@ class MujocoPlant(FleetPlant):
         self.places.main_v = [joint.dofadr[0] for joint in main]
         self.places.appendage_v = [joint.dofadr[0] for joint in appendage]
         self.places.actuator = [self.model.actuator(name).id for name in names("force")]
-        # (2, m) main masses' and appendages' entries of qpos and of qvel
-        self._joints = flat[:, :2].T.copy(), flat[:, 2:4].T.copy()
+        self.joints = flat[:, :2].T.copy(), flat[:, 2:4].T.copy()
         model = self.model
         workspace = ARCTANGENTS + self.agents.channels
         self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
@@ -305,17 +305,16 @@ class MujocoPlant(FleetPlant):
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, states), a copy."""
-        at, qpos, qvel = self.places, self.data.qpos, self.data.qvel
-        position = qpos[at.main_q]
-        extension = position - qpos[at.appendage_q]
-        columns = (extension, qvel[at.main_v], qvel[at.appendage_v], position)
-        return np.stack(columns, axis=-1)
+        qpos, qvel = self.joints
+        position, appendage = self.data.qpos[qpos]
+        rows = (position - appendage, *self.data.qvel[qvel], position)
+        return np.array(rows).T.copy()
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class."""
         state = np.asarray(state, dtype=np.float64)
         mujoco.mj_resetData(self.model, self.data)
-        position, (qpos, qvel) = state[:, 3], self._joints
+        position, (qpos, qvel) = state[:, 3], self.joints
         self.data.qpos[qpos] = position, position - state[:, 0]
         self.data.qvel[qvel] = state[:, 1], state[:, 2]
 

@@ -101,7 +101,7 @@ class PositionPlant(MujocoPlant):
 
     def go_to_time(self, time: float) -> None:
         """See the base class: robots are where the reference is then."""
-        qpos, _ = self._joints
+        qpos, _ = self.joints
         self.data.qpos[qpos] += self._reference * (time - self.data.time)
         super().go_to_time(time)
 

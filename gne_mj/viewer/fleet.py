@@ -59,11 +59,12 @@ class Fleet:
                     f"the run has recorded {recorded.shape[1]}: the robots' files have changed",
                 )
             return recorded
-        state, at = values["state"], self.plant.places
+        assert isinstance(self.plant, MujocoPlant)
+        state, (main, appendage) = values["state"], self.plant.joints[0]
         extension, position = state[:, :, 0], values.get("place", state[:, :, 3])
         found = np.zeros((len(state), self.plant.model.nq))
-        found[:, at.main_q] = position
-        found[:, at.appendage_q] = position - extension
+        found[:, main] = position
+        found[:, appendage] = position - extension
         return found
 
     @cached_property

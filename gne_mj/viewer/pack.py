@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAGIC = b"GNE1"
+_encoded = json.JSONEncoder(allow_nan=False).encode
 _DTYPES = {"f8": "<f8", "f4": "<f4", "i4": "<i4", "u1": "u1"}
 
 
@@ -67,7 +68,7 @@ def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled:
         )
         pieces.append(piece + bytes(_aligned(len(piece)) - len(piece)))
         offset += len(pieces[-1])
-    header = json.dumps({"meta": meta, "arrays": entries}, allow_nan=False).encode()
+    header = _encoded({"meta": meta, "arrays": entries}).encode()
     head = MAGIC + len(header).to_bytes(4, "little") + header
     return b"".join([head, bytes(_aligned(len(head)) - len(head)), *pieces])
 

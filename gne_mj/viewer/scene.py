@@ -59,7 +59,7 @@ class Scene:
             if shown_system.fleet is not None:
                 mirror = shown_system.fleet.mirror
                 rows = shown_system.fleet.qpos(values[shown_system.system.name])
-                poses = np.stack([_hidden(mirror.poses(row)) for row in rows])
+                poses = np.array([_hidden(mirror.poses(row)) for row in rows])
                 poses[..., 1] += shift
                 found.append(poses)
         if not found:
