@@ -240,6 +240,7 @@ def test_the_positions_formulas_are_the_games(draw):
         assert np.all(place.values(place.middle[None]) < 0)
 
 
+@pytest.mark.slow
 def test_random_platoons_and_formations_keep_their_positions(monkeypatch):
     monkeypatch.setattr(positions, "CLOSEST", 1e-2)
     rows = [positions.one(6, index) for index in (0, 1, 2, 3, 13, 23)]

@@ -1,5 +1,7 @@
 """An environment of a system, or of a scenario's."""
 
+from __future__ import annotations  # short signatures
+
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
