@@ -153,9 +153,10 @@ def test_a_mutant_changes_the_keys_of_what_it_can_be_in(operators, tmp_path):
     found = operators.mutants(file, (tree.base / file).read_bytes())
     tree.put(next(mutant for mutant in found if mutant.native), tmp_path / "work")
     (full, _), (partial, _) = _keys(copies, tree.base)
-    assert _keys(copies, tmp_path / "work")[0] == (full, "False")
-    assert _keys(copies, tmp_path / "work")[1] != (partial, "False")
-    assert _keys(copies, tmp_path / "work")[1][1] == "True"
+    other_full, other_partial = _keys(copies, tmp_path / "work")
+    assert other_full == (full, "False")
+    assert other_partial != (partial, "False")
+    assert other_partial[1] == "True"
 
 
 def _keys(copies, folder):

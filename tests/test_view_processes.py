@@ -102,9 +102,15 @@ def test_a_live_page_ends_with_its_command(start, number):
 
 @pytest.mark.parametrize(
     ("ending", "code"),
-    [("", 0), ("raise RuntimeError('of its own')", 1), ("sys.exit(3)", 3), ("os._exit(4)", 4),
-     ("os.kill(os.getpid(), signal.SIGTERM)", -15), ("os.kill(os.getpid(), signal.SIGKILL)", -9)],
-)  # fmt: skip
+    [
+        ("", 0),
+        ("os._exit(4)", 4),
+        ("os.kill(os.getpid(), signal.SIGKILL)", -9),
+        pytest.param("raise RuntimeError('of its own')", 1, marks=pytest.mark.slow),
+        pytest.param("sys.exit(3)", 3, marks=pytest.mark.slow),
+        pytest.param("os.kill(os.getpid(), signal.SIGTERM)", -15, marks=pytest.mark.slow),
+    ],
+)
 def test_a_replay_ends_with_its_program(start, ending, code):
     process, url = start([sys.executable, "-c", OWN + ending])
     assert b"settings" in urlopen(url, timeout=5).read()
