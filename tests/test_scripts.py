@@ -1,0 +1,18 @@
+"""The commands in scripts/: each makes the environment that it needs."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SCRIPTS = [path for path in (ROOT / "scripts").iterdir() if path.is_file()]
+LOCKS = {path.stem for path in (ROOT / "locks").glob("*.txt")}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_what_it_installs_is_locked(script):
+    """An environment of no name ended scripts/arena before it began."""
+    for line in re.findall(r"^make_environment\b.*", script.read_text(), re.MULTILINE):
+        if "{" not in line:
+            assert line.split()[1:2] and set(line.split()[1:]) <= LOCKS, line
