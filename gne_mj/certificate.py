@@ -41,7 +41,8 @@ class Certificate:
             (:func:`gne_mj.tracking.report`); None of others.
         epsilon: what agents could gain at the penalised equilibrium, against
             :func:`gne_mj.epsilon.epsilon_bounds`, and where the run ended.
-        settling_time: after which max |y - y*| stays within 2% of its start, at sample times.
+        settling_time: after which max |y - y*| stays within 2% of its start, at sample times; where
+            agents leave and join, of what it was when the last of them did.
         lyapunov: V over the run (V^{x*}, and under partial information the estimates' part),
             whether it is known (not of MJCF robots, nor without a y*), and whether the theory
             claims that it never rises (:class:`gne_mj.theory.Theorem`), for the set-up and as long
@@ -156,7 +157,7 @@ def certify_run(
         equilibrium=present.spread(_equilibrium(present.system, present.action, present.time)),
         tracking=tracking.report(system, time, action, clock, _spoilt(monitor, intervened)),
         epsilon=_epsilon(present.system, time[-1], present.action[-1]),
-        settling_time=_settling_time(time, distance),
+        settling_time=_settling_time(present.time, distance[-len(present.time) :]),
         lyapunov=_lyapunov(present, monitor, intervened),
         actuators=monitored.actuators(system, monitor),
         positions=monitored.positions(system, monitor),

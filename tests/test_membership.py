@@ -99,6 +99,17 @@ def test_every_interval_is_the_game_of_those_present():
     assert_allclose(data["equilibrium"].values[-1], [3, 3, 3, 3, np.nan])
 
 
+def test_settling_is_of_the_last_change():
+    """To the penalised and to the variational equilibrium alike."""
+    run = gne_mj.run(scenario([{"time": 1.0, "leaves": [5]}], **{"simulation.duration": 9.0}))
+    data, report = run.data.sel(time=slice(1.0001, None)), run.reports["robots"]
+    apart = np.max(np.abs(data["action"] - data["equilibrium"]).values[:, :4], axis=1)
+    settled = data["time"].values[np.flatnonzero(apart > 0.02 * apart[0])[-1] + 1]
+    assert report["settling_time"] == pytest.approx(settled, abs=0.11)
+    to_variational = report["equilibrium"]["settling_time_to_variational"]
+    assert to_variational == pytest.approx(settled, abs=0.11)
+
+
 def test_who_is_not_strictly_inside_is_not_admitted():
     changes = [
         {"time": 0.2, "leaves": [3]},
