@@ -74,6 +74,8 @@ class Certificate:
         steps, end_time, wall_time: integration steps taken, pieces of divided ones counted;
             simulated and real time.
         step_time: real time that a step took; None if there was none.
+        not_reached: of a run that came to its end without settling, why, each with ``reason``,
+            ``agents``, ``text`` and ``figures`` (:mod:`gne_mj.not_reached`); None of others.
     """
 
     status: str
@@ -100,6 +102,7 @@ class Certificate:
     end_time: float
     wall_time: float
     step_time: float | None
+    not_reached: list[dict[str, Any]] | None = None
 
     @property
     def holds(self) -> bool:

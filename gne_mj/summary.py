@@ -1,5 +1,6 @@
 """A report in words, for terminals and notebooks."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 UNKNOWN = "not known: no penalised equilibrium was found"
@@ -16,6 +17,9 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
         "peak input": f"{actuators['peak']:.4g} (agent {actuators['peak_agent']} at"
         f" {actuators['peak_time']:.4g} s), RMS up to {max(actuators['rms']):.4g}",
     }
+    why = report.get("not_reached")  # which older results do not have
+    if why is not None:
+        rows["y* not reached"] = not_reached(why)
     seen = report.get("outside")  # which older results do not have
     if seen is not None and seen["goes_on"] and seen["exits"]:
         rows["outside"] = _outside(seen)
@@ -54,6 +58,13 @@ def summary(report: dict[str, Any]) -> dict[str, str]:
             f" {bounds_text(epsilon)}"
         )
     return rows
+
+
+def not_reached(found: Sequence[Mapping[str, Any]]) -> str:
+    """What :mod:`gne_mj.not_reached` saw, in words."""
+    if not found:
+        return "none of what is looked for was seen: limits, loads, stops, slip, time"
+    return "; ".join(each["text"] for each in found)
 
 
 def _outside(seen: dict[str, Any]) -> str:

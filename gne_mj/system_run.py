@@ -2,12 +2,13 @@
 
 import time as real_time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj import not_reached
 from gne_mj.certificate import Certificate, certify_run
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput
@@ -227,6 +228,13 @@ class SystemRun:
             membership=self.loop.membership,
             clock=self.clock,
         )
+        if certificate.status == "completed":
+            why = not_reached.report(
+                self.system, time, samples.state[:, :, self.system.agents.kind.OUTPUT],
+                samples.input, duration=self.clock.duration, tolerance=tolerance,
+                plant=getattr(self.loop, "plant", None),
+            )  # fmt: skip
+            certificate = replace(certificate, not_reached=why)
         return parts, certificate
 
     def _forget_last(self) -> None:

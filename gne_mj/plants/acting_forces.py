@@ -1,0 +1,108 @@
+"""What besides its inputs acts on a fleet in MuJoCo, and the inputs that hold it against that.
+
+A force f of MuJoCo's (gravity, springs, damping, fluid, dry friction) is measured by what it does
+to the outputs: they are looked at after some steps with f taken off, and without. Divided by how
+far inputs move them meanwhile that is the input that balances f, what is in between included.
+"""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from gne_mj.plants.callbacks import quiet
+from gne_mj.plants.fleet_plant import FleetPlant
+
+Array = NDArray[np.float64]
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_DRY = (
+    int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
+    int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
+)
+SHARE = 0.01  # of all: what is less is not told
+
+
+def saved(plant: FleetPlant) -> Array:
+    """All that a fleet starts from, for :func:`restore`."""
+    state = np.empty(mujoco.mj_stateSize(plant.model, _STATE))
+    mujoco.mj_getState(plant.model, plant.data, state, _STATE)
+    return state
+
+
+def restore(plant: FleetPlant, state: Array) -> None:
+    """Let it be as it was when that was saved."""
+    mujoco.mj_setState(plant.model, plant.data, state, _STATE)
+
+
+def response(plant: FleetPlant, state: Array, u: Array, steps: int) -> Array:
+    """Outputs (m,) so many steps after a state, under inputs u (m,) held."""
+    restore(plant, state)
+    plant.step(u, steps)
+    return plant.output
+
+
+def slopes(plant: FleetPlant, state: Array, u: Array, change: Array, steps: int) -> Array:
+    """(N, d, d) how each agent's outputs have risen so many steps later with its inputs.
+
+    By differences of ``change`` (m,) to either side of u; other agents' inputs change meanwhile, so
+    that those are to be apart.
+    """
+    d = plant.agents.dimension
+    found = np.empty((plant.agents.count, d, d))
+    for axis in range(d):
+        part = np.where(np.arange(len(u)) % d == axis, change, 0.0)
+        up, down = (response(plant, state, u + sign * part, steps) for sign in (1.0, -1.0))
+        found[:, :, axis] = ((up - down).reshape(-1, d)) / (2.0 * change[axis::d, None])
+    return found
+
+
+def forces(plant: FleetPlant) -> dict[str, Array]:
+    """(nv,) each, as MuJoCo has them at the present state, by what they are."""
+    model, data = plant.model, plant.data
+    with quiet():
+        mujoco.mj_forward(model, data)
+    weight = np.array(data.qfrc_gravcomp)
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        for body in range(1, model.nbody):
+            pull = model.body_mass[body] * model.opt.gravity
+            mujoco.mj_applyFT(model, data, pull, np.zeros(3), data.xipos[body], body, weight)
+    dry = np.zeros(model.nv)
+    if data.nefc:
+        rubs = np.where(np.isin(data.efc_type, _DRY), data.efc_force, 0.0)
+        mujoco.mj_mulJacTVec(model, data, dry, rubs)
+    return {
+        "gravity": weight, "springs": np.array(data.qfrc_spring),
+        "damping": np.array(data.qfrc_damper), "fluid": np.array(data.qfrc_fluid),
+        "dry friction": dry,
+    }  # fmt: skip
+
+
+def holding(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:
+    """The inputs (m,) that balance each of :func:`forces` at the present state.
+
+    Args:
+        plant: it is left elsewhere.
+        u: (m,) the inputs meanwhile, about which is looked.
+        steps: how many; the fewer, the less the forces change meanwhile.
+    """
+    state, acting = saved(plant), forces(plant)
+    rise = slopes(plant, state, u, 1e-3 * np.maximum(np.abs(u), 1.0), steps)
+    still = response(plant, state, u, steps)
+    found = {}
+    for name, force in acting.items():
+        restore(plant, state)
+        plant.data.qfrc_applied[:] -= force
+        plant.step(u, steps)
+        moved = (plant.output - still).reshape(len(rise), -1, 1)
+        found[name] = (np.linalg.pinv(rise) @ moved).ravel()
+    return found
+
+
+def told(parts: dict[str, float], unit: str = "") -> str:
+    """Inputs by what they hold, the greatest first, in words; empty if there are none."""
+    whole = max((abs(value) for value in parts.values()), default=0.0)
+    shown = [
+        f"{value:.3g}{f' {unit}' if unit else ''} {name}"
+        for name, value in sorted(parts.items(), key=lambda item: -abs(item[1]))
+        if abs(value) > SHARE * whole and abs(value) > 1e-9
+    ]
+    return ", ".join(shown)
