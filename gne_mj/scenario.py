@@ -14,6 +14,7 @@ from gne_mj.bounds import check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game_model import Game
 from gne_mj.games.table import functions_in
+from gne_mj.plants.mjcf_source import is_named
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.scenario_tables.changes import change, complaint, full_key, plain, validated
 from gne_mj.scenario_tables.interventions import tables_of
@@ -166,6 +167,8 @@ def _resolve_in(table: Any, folder: Path) -> None:
 
 
 def _absolute(folder: Path, name: str) -> str:
+    if is_named(name):
+        return name
     try:
         return str((folder / name).resolve())
     except (ValueError, OSError):  # no file can be called so: whoever reads it will say so

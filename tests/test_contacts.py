@@ -170,3 +170,45 @@ def test_refusals_and_what_is_promised():
 def test_offsets_are_checked_and_the_counter_is_one():
     assert contact_offsets().size % 8 == 0
     assert counter() is counter()
+
+
+BALL = """<mujoco><option gravity="0 0 0"/><worldbody>
+  <body name="ball"><joint name="x" type="slide"/><geom name="ball" size="0.3" mass="1"/></body>
+  </worldbody><actuator><motor name="push" joint="x"/></actuator></mujoco>"""
+
+
+def crossing(file):
+    """Two balls on one line that want to change places, as a user's own robots."""
+    game = {"type": "platoon", "least_spacing": -3.0, "desired_spacing": -1.0,
+            "greatest_spacing": 3.0, "leader_range": [-5.0, 5.0]}  # fmt: skip
+    agents = {"type": "mjcf-robot", "count": 2, "file": str(file), "output": "x", "input": "push",
+              "lookahead": 0.5, "local_damping": 4.0}  # fmt: skip
+    return {
+        "simulation": {"duration": 1.0, "timestep": H, "control_period": H, "integrator": "euler"},
+        "recording": {"period": H},
+        "systems": {"balls": {
+            "game": game, "agents": agents, "controller": {"mode": "implicit"},
+            "plant": {"engine": "mujoco"}, "initial": {"action": [0.5, -0.5]},
+        }},
+    }  # fmt: skip
+
+
+def test_contacts_of_ones_own_robots_are_counted_where_they_can_touch(tmp_path):
+    file = tmp_path / "ball.xml"
+    file.write_text(BALL)
+    run = gm.run(crossing(file))
+    data, told = run["balls"], run.reports["balls"]["contacts"]
+    # of two balls in one line the distance of their centres tells
+    apart = np.abs(data["position"].values[:, 0] - data["position"].values[:, 1]) - 0.6
+    assert told["count"] == told["steps"] == np.sum(apart < 0.0) > 10
+    assert told["agents"] == [1, 2]
+    assert told["depth"] == pytest.approx(-np.min(apart), abs=1e-12)
+    alone = crossing(file)
+    alone["systems"]["balls"]["agents"]["contacts"] = "none"
+    assert gm.run(alone).reports["balls"]["contacts"] is None
+
+
+def test_a_shipped_robots_file_is_named_and_a_wrong_name_is_told(tmp_path):
+    tables = crossing("gne_mj:carr.xml")
+    with pytest.raises(InvalidInput, match=r"file: got 'gne_mj:carr.xml'.*did you mean 'car.xml'"):
+        load_scenario(tables).system_objects()

@@ -22,6 +22,7 @@ from gne_mj.batches.sweep import Sweep
 from gne_mj.bounds import MOST_RECORDED, MOST_RUNS, check_room
 from gne_mj.equilibrium import middle
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
+from gne_mj.plants.mjcf_source import located
 from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.starts import random_starts, separated_starts
 from gne_mj.system import Clock, System
@@ -397,7 +398,7 @@ def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:
             given = table.get("file", []) if isinstance(table, dict) else []
             for name in [given] if isinstance(given, str) else given:
                 try:
-                    found[name] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
+                    found[name] = hashlib.sha256(located(name).read_bytes()).hexdigest()
                 except OSError as error:
                     where = f"scenario.systems.{system}.{key}.file"
                     why = f"it cannot be read: {error.strerror}"

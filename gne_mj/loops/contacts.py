@@ -12,9 +12,10 @@ from numba import types
 from gne_mj.loops.monitor import MonitorNumbers
 from gne_mj.native import callback, kernel, source_key
 from gne_mj.numbers import names_of, numbers_in
-from gne_mj.parameter_block import floats_at, integers
-from gne_mj.plants.mujoco import OWNERS, SIZES
+from gne_mj.parameter_block import floats_at
+from gne_mj.plants.mujoco import sizes_in
 from gne_mj.plants.native_contacts import contact_offsets, contacts, distance, geoms
+from gne_mj.plants.native_mujoco import word
 
 _monitor_in = numbers_in(MonitorNumbers)
 _LENGTH_OF_MONITOR = len(names_of(MonitorNumbers))
@@ -29,7 +30,7 @@ def observe(at, owners, data, monitor, time):
 
     Args:
         at: where contacts lie.
-        owners: (geoms,) the agent that each belongs to, from 0; -1 for the world's.
+        owners: address of (geoms,) the agent that each belongs to, from 0; -1 for the world's.
         data: address of mjData.
         monitor: numbers, changed.
         time: in s.
@@ -41,7 +42,7 @@ def observe(at, owners, data, monitor, time):
         first, second = geoms(at, data, k)
         if first < 0 or second < 0:
             continue
-        one, other = owners[first], owners[second]
+        one, other = word(owners, first), word(owners, second)
         if one < 0 or other < 0 or one == other:
             continue
         if monitor.contacts == 0.0 and found == 0:
@@ -62,7 +63,7 @@ def counter() -> Any:
     def count(block, data, monitor, time):
         _ = source
         numbers = _monitor_in(floats_at(monitor, _LENGTH_OF_MONITOR), 0)
-        observe(at, integers(block, SIZES)[OWNERS:], data, numbers, time)
+        observe(at, sizes_in(block).owners, data, numbers, time)
         return np.int64(0)
 
     return callback(types.int64(types.int64, types.int64, types.int64, types.float64), count)

@@ -9,6 +9,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.mjcf_robot import RobotFile
@@ -38,6 +39,16 @@ def owners_of(model: mujoco.MjModel, robots: Sequence[tuple[int, int]]) -> list[
     (world,) = np.nonzero(model.geom_bodyid == 0)
     of_geom[world[len(world) - geoms.sum() :]] = np.repeat(np.arange(len(robots)), geoms)
     return [{owner} if owner >= 0 else set() for owner in of_geom.tolist()]
+
+
+def counted_owners(model: mujoco.MjModel, owners: Sequence[set[int]]) -> NDArray[np.int64]:
+    """(geoms,) the agent, from 0, whose contacts with other agents a geom's are; -1 of none's.
+
+    What stands in the world is no agent's, whosever file brought it.
+    """
+    moves = model.body_weldid[model.geom_bodyid] != 0
+    found = [min(of) if of and moving else -1 for of, moving in zip(owners, moves, strict=True)]
+    return np.array(found, dtype=np.int64)
 
 
 def share_floors(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:

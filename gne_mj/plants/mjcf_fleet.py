@@ -17,7 +17,14 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
-from gne_mj.plants.mjcf_contacts import check_apart, let_touch, owners_of, share_floors, sizes_of
+from gne_mj.plants.mjcf_contacts import (
+    check_apart,
+    counted_owners,
+    let_touch,
+    owners_of,
+    share_floors,
+    sizes_of,
+)
 from gne_mj.plants.mjcf_drive import add_effort, driving
 from gne_mj.plants.mjcf_prediction import (
     FRAME_FUNCTIONS,
@@ -126,9 +133,10 @@ class MjcfPlant(FleetPlant):
         self.places = by_name(flat, dtype_in(ChannelPlace))
         model = self.model
         self._twin = mujoco.MjData(model)  # where mode implicit predicts
+        self._geom_owners = counted_owners(model, self._owners)
         self.sizes = Sizes(
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
-            model.na - memory,
+            model.na - memory, self._geom_owners.ctypes.data,
         )  # fmt: skip
         functions = [step_address(name) for name in self._refreshing] or [0, 0, 0]
         prediction = Prediction(

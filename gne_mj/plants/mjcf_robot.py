@@ -20,6 +20,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.lookahead import LookaheadKeys
 from gne_mj.plants.mjcf_input import Input, InputTable, inputs_of
 from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
+from gne_mj.plants.mjcf_source import located
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
 from gne_mj.toml_table import Fills, Sizes, Unit, dimension_of
@@ -116,7 +117,7 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
     engine: ClassVar[str] = "mujoco"
     type: Literal["mjcf-robot"]
     file: Annotated[str | list[str], Fills("path")] = Field(
-        description="MJCF file, one for all or one each"
+        description="MJCF file, one for all or one each; gne_mj:car.xml is a shipped one"
     )
     output: str | OutputTable | list[str | OutputTable] | list[list[str | OutputTable]] = Field(
         description="joint or velocity sensor that is y_i, or of y = q + tau v; or a table that"
@@ -150,7 +151,9 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         outputs = channels_of(self.output, self.count, axes)
         inputs = inputs_of(self.input, self.count, axes)
         channels = zip(np.repeat(files, axes), outputs, inputs, strict=True)
-        robots = tuple(RobotFile(Path(path), output, input) for path, output, input in channels)
+        robots = tuple(
+            RobotFile(located(str(path)), output, input) for path, output, input in channels
+        )
         kind, numbers = sys.modules[__name__], np.zeros((len(robots), 0))
         if self.positions:
             tau = np.full(len(robots), self.lookahead)
@@ -165,4 +168,5 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         return MjcfRobots(
             kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions,
             spacing=SPACING if self.spacing is None else self.spacing, touching=self.contacts,
+            contacts=self.contacts in ("all", "agents"),
         )  # fmt: skip

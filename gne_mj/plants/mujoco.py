@@ -56,11 +56,11 @@ class Sizes(NamedTuple):
     na: int
     workspace: int  # a loop's, in userdata
     memory: int  # in act
+    owners: int  # address of the agent that each geom belongs to, from 0, -1 of none; or 0
 
 
 PLACE = len(names_of(RobotPlace))
 sizes_in, _place_in = in_numbers(Sizes, SIZES), numbers_in(RobotPlace)
-OWNERS = len(Sizes._fields)  # behind them in SIZES, the agent that each geom belongs to
 
 # A fleet's userdata: mark and table, then the springs' arctangents at the last evaluation
 ARCTANGENTS = USERDATA_HEADER
@@ -241,13 +241,16 @@ class MujocoPlant(FleetPlant):
         self.joints = flat[:, :2].T.copy(), flat[:, 2:4].T.copy()
         model = self.model
         workspace = ARCTANGENTS + self.agents.channels
-        self.sizes = Sizes(model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0)
-        sizes = np.array([*self.sizes, *self._owners()], dtype=np.int64)
-        return [flat, self._forces(self.agents), sizes]
+        self._geom_owners = self._owners()
+        self.sizes = Sizes(
+            model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0,
+            self._geom_owners.ctypes.data,
+        )  # fmt: skip
+        return [flat, self._forces(self.agents), np.array(self.sizes, dtype=np.int64)]
 
     def _owners(self) -> NDArray[np.int64]:
         """(geoms,) which agent each that collides belongs to, from 0; -1 for all others."""
-        model, found = self.model, np.full(self.model.ngeom, -1)
+        model, found = self.model, np.full(self.model.ngeom, -1, dtype=np.int64)
         if self.agents.contacts:
             hulls = [model.geom(f"robot_{i + 1}/{HULL}").id for i in range(self.agents.count)]
             found[hulls] = np.arange(self.agents.count)
