@@ -62,8 +62,8 @@ def holding(
     if system.separation is None or status != "completed":
         return []
     (still,) = at_rest(time, action[None], duration, tolerance)
-    # at rest positions are where outputs are
-    return system.separation.holding(action[-1], action[-1], system.rho) if still else []
+    points = action[-1].reshape(system.game.agents, -1)  # at rest positions are outputs
+    return system.separation.holding(points, points, system.rho) if still else []
 
 
 def held_text(pairs: Pairs) -> str:
@@ -94,11 +94,12 @@ def exit_text(system: System, monitor: Any, pair: tuple[int, int], at: str) -> s
     assert system.separation is not None
     who, value = pairs_text([pair]), float(monitor.exit_value)
     least = system.separation.distance
+    between = "line" if system.agents.dimension == 2 else "plane"
     if monitor.exit == watch.STEP_TOO_SMALL:
         return f"1/{PIECES} of the timestep is still too long to keep {who} apart {at}"
     if value < least:
         return f"the positions of {who} were {value:.6g} m apart {at}, less than {least:g} m"
     return (
-        f"where {who} are, {value:.6g} m apart, and where they are going no line keeps {least:g} m"
-        f" between them {at}: their inputs were not those that keep them apart"
+        f"where {who} are, {value:.6g} m apart, and where they are going no {between} keeps"
+        f" {least:g} m between them {at}: their inputs were not those that keep them apart"
     )

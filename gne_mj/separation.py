@@ -1,7 +1,7 @@
-"""How agents keep apart in the plane: at least a distance between any two positions.
+"""How agents in the plane or in space keep apart: a least distance between any two positions.
 
-That is not convex, and no constraint of a game. It is kept by half-planes that turn
-(:mod:`gne_mj.loops.separation`, docs/positions.md).
+That is not convex, and no constraint of a game. It is kept by half-planes (in space half-spaces)
+that turn (:mod:`gne_mj.loops.separation`, docs/positions.md). Points are arrays (N, 2) or (N, 3).
 """
 
 from dataclasses import dataclass
@@ -28,8 +28,8 @@ class Separation:
         distance: r in m, positive.
         reach: in m, more than the distance; only pairs that are nearer than this are looked at and
             push each other.
-        turn: how far half-planes are turned at most, in rad from 0 to 1.5, all the same way, so
-            that agents which meet head on pass.
+        turn: how far half-planes are turned at most, in rad from 0 to 1.5, all the same way about
+            the vertical, so that agents which meet head on pass.
 
     Raises:
         InvalidInput: a number that is not so.
@@ -59,8 +59,8 @@ class Separation:
         """The two agents, from 0, that are nearest on their ways, and how near in m.
 
         Args:
-            position: q (m,) in m.
-            output: y (m,) in m.
+            position: q (N, axes) in m.
+            output: y (N, axes) in m.
         """
         i, j, size = _distances(position, output)
         at = int(np.argmin(size))
@@ -69,23 +69,25 @@ class Separation:
     def pushes(
         self, position: NDArray[np.float64], output: NDArray[np.float64], rho: float
     ) -> dict[tuple[int, int], NDArray[np.float64]]:
-        """What pairs of agents, from 0, that are near push the first one with, each (2,).
+        """What pairs of agents, from 0, that are near push the first one with, each (axes,).
 
         The second one feels the opposite.
 
         Args:
-            position: q (m,) in m.
-            output: y (m,) in m.
+            position: q (N, axes) in m.
+            output: y (N, axes) in m.
             rho: the penalty.
         """
         i, j, size = _distances(position, output)
-        q, y, rule, found = position.reshape(-1, 2), output.reshape(-1, 2), Rule(*self.numbers), {}
+        axes, found = position.shape[1], {}
+        rule = Rule(self.distance, self.reach, self.turn, (0.0,) * axes)
+        q, y = _in_space(position), _in_space(output)
         for k in np.flatnonzero((size < self.reach) & (size > self.distance)):
             first, second = int(i[k]), int(j[k])
             ahead = y[first] - y[second]
-            x, z, _ = half_plane(rule, *(q[first] - q[second]), *ahead)
-            slack = x * ahead[0] + z * ahead[1] - self.distance
-            found[first, second] = push(rho, slack, self.reach - self.distance) * np.array([x, z])
+            n = np.array(half_plane(rule, tuple(q[first] - q[second]), tuple(ahead))[0])
+            most = self.reach - self.distance
+            found[first, second] = push(rho, n @ ahead - self.distance, most) * n[:axes]
         return found
 
     def holding(
@@ -93,22 +95,22 @@ class Separation:
     ) -> list[tuple[int, int]]:
         """The pairs of agents, from 0, that push each other, the hardest first.
 
-        Those that push less than 1% of the hardest are left out.
+        Those that push less than 1% of the hardest are left out. Arguments are those of
+        :meth:`pushes`.
         """
         pushes = self.pushes(position, output, rho)
-        sizes = {pair: float(np.hypot(*push)) for pair, push in pushes.items()}
+        sizes = {pair: float(np.linalg.norm(push)) for pair, push in pushes.items()}
         least = HOLDS * max(sizes.values(), default=0.0)
         return sorted((pair for pair in sizes if sizes[pair] > least), key=lambda p: -sizes[p])
 
 
-def nearest_distances(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(T, N) in m how far each agent is from the one nearest to it, of positions (T, m) in m.
+def nearest_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, N) in m how far each agent is from the one nearest to it, of positions (T, N, axes) in m.
 
     Infinite of one agent alone; not a number where a position is none.
     """
     from scipy.spatial import cKDTree  # late: few runs need it
 
-    points = positions.reshape(len(positions), -1, 2)
     found = np.full(points.shape[:2], np.nan)
     for row in np.flatnonzero(np.all(np.isfinite(points), axis=(1, 2))):
         found[row] = cKDTree(points[row]).query(points[row], k=2)[0][:, 1]
@@ -119,16 +121,21 @@ def _distances(
     position: NDArray[np.float64], output: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """All pairs of agents, and how near each is on its way from positions to outputs, in m."""
-    q, y = position.reshape(-1, 2), output.reshape(-1, 2)
-    i, j = np.triu_indices(len(q), 1)
-    start, way = q[i] - q[j], (y[i] - y[j]) - (q[i] - q[j])
+    i, j = np.triu_indices(len(position), 1)
+    start = position[i] - position[j]
+    way = (output[i] - output[j]) - start
     length = np.maximum(np.sum(way**2, axis=1), np.finfo(float).tiny)
     share = np.clip(-np.sum(start * way, axis=1) / length, 0.0, 1.0)
     return i, j, np.linalg.norm(start + share[:, None] * way, axis=1)
 
 
+def _in_space(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) of points (N, axes), as native code has them."""
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
 class SeparationTable(Table):
-    """Agents in the plane keep at least a distance from each other."""
+    """Agents in the plane or in space keep at least a distance from each other."""
 
     distance: Annotated[float, Unit("m")] = Field(
         gt=0, description="r, between the positions of any two agents"
@@ -140,7 +147,10 @@ class SeparationTable(Table):
         " left out",
     )
     turn: Annotated[float, Unit("rad")] = Field(
-        TURN, ge=0, le=MOST_TURN, description="how far half-planes turn, so that agents pass"
+        TURN,
+        ge=0,
+        le=MOST_TURN,
+        description="how far half-planes (half-spaces) turn, so that agents pass",
     )
 
     def build(self) -> Separation:

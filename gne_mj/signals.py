@@ -294,7 +294,8 @@ def _is_faulty(system: SystemData) -> bool:
 
 # In the order of a dataset; a function yields what game, agent type or law declare of themselves
 def _nearest_distance(rows: Rows) -> Array:
-    return nearest_distances(rows.samples.state[:, :, followed_position(rows.system.agents.kind)])
+    positions = rows.samples.state[:, :, followed_position(rows.system.agents.kind)]
+    return nearest_distances(positions.reshape(len(positions), rows.system.game.agents, -1))
 
 
 def _network_changes(system: SystemData) -> bool:

@@ -72,7 +72,8 @@ def separated_starts(
     for seed in seeds:
         for number in range(TRIES):
             (y,) = random_starts(game, middle, [(seed, number)], spread)
-            if separation.nearest(y, y)[2] > separation.distance:
+            points = y.reshape(game.agents, -1)
+            if separation.nearest(points, points)[2] > separation.distance:
                 break
         else:
             raise InvalidInput(

@@ -1,9 +1,12 @@
-"""Agents that keep apart, in plain and slow Python: an oracle for half-planes and pushes."""
+"""Agents that keep apart, in plain and slow Python: an oracle for half-planes and pushes.
+
+Points have 2 or 3 entries."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import root
+from scipy.spatial.transform import Rotation
 
 
 def nearest_point(a, b):
@@ -13,14 +16,29 @@ def nearest_point(a, b):
     return a + share * way
 
 
+def lifted(point):
+    return np.array([*point, 0.0][:3])
+
+
+def turning_axis(p):
+    """What p turns about: the vertical's part that is across it; where it is upright, x's."""
+    p = lifted(p)
+    for direction in np.eye(3)[[2, 0]]:
+        across = direction - (direction @ p) * p
+        if np.hypot(*p[:2]) > 1e-9 or direction[0]:
+            return across / np.linalg.norm(across)
+    raise AssertionError
+
+
 def half_plane(r, turn, a, b):
     """n by bisection: the nearest point's direction, turned while half of the margin is left."""
     p = nearest_point(a, b)
     size = np.linalg.norm(p)
 
+    axis = turning_axis(p / size)
+
     def turned(angle):
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s], [s, c]]) @ p / size
+        return (Rotation.from_rotvec(angle * axis).as_matrix() @ lifted(p / size))[: len(p)]
 
     def good(angle):
         n, least = turned(angle), r + 0.5 * (size - r)
@@ -37,9 +55,9 @@ def half_plane(r, turn, a, b):
 
 @dataclass
 class Swap:
-    """Rigid-law robots that each want a place: J_i = w |y_i - place_i|^2, in a disc about 0."""
+    """Rigid-law robots that want places: J_i = w |y_i - place_i|^2, in a disc or ball about 0."""
 
-    place: np.ndarray  # (N, 2)
+    place: np.ndarray  # (N, 2) or (N, 3)
     radius: float
     rho: float
     r: float
@@ -49,7 +67,7 @@ class Swap:
 
     def pairs(self, q, y):
         """Those that are near, with their half-planes."""
-        q, y = q.reshape(-1, 2), y.reshape(-1, 2)
+        q, y = q.reshape(self.place.shape), y.reshape(self.place.shape)
         found = []
         for i in range(len(q)):
             for j in range(i + 1, len(q)):
@@ -60,7 +78,7 @@ class Swap:
 
     def energy(self, y, pairs):
         """Whose gradient, the other way, is the law: costs, the disc's barrier and the pairs'."""
-        points, most = y.reshape(-1, 2), self.reach - self.r
+        points, most = y.reshape(self.place.shape), self.reach - self.r
         total = self.weight * np.sum((points - self.place) ** 2)
         total = total - self.rho * np.sum(np.log(self.radius**2 - np.sum(points**2, axis=1)))
         for i, j, n in pairs:

@@ -30,7 +30,8 @@ from gne_mj.summary import summary
 from gne_mj.theory import certify
 
 R, REACH, TURN = 0.6, 1.5, 0.5
-RULE = native.Rule(R, REACH, TURN)
+RULE = {axes: native.Rule(R, REACH, TURN, (0.0,) * axes) for axes in (2, 3)}
+AXES = st.sampled_from([2, 3])
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -45,152 +46,207 @@ def system_of(**changes):
     return swap(**changes).system_objects()[0]
 
 
-def near_of(agents):
+BALLOON = """<mujoco><option gravity="0 0 0"/><worldbody><body name="balloon">
+  <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+  <joint name="z" type="slide"/><geom size="0.3" mass="2"/></body></worldbody>
+  <actuator><motor name="east" joint="x"/><motor name="north" joint="y"/>
+  <motor name="up" joint="z"/></actuator></mujoco>"""
+CUBE = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
+
+
+@pytest.fixture(scope="session")
+def balloon(tmp_path_factory):
+    """The MJCF of a robot that its forces move in space."""
+    path = tmp_path_factory.mktemp("air") / "balloon.xml"
+    path.write_text(BALLOON)
+    return path
+
+
+def in_the_air(path, place=-CUBE, **changes):
+    """Eight balloons at the corners of a cube, each of which wants its place, within a ball."""
+    count = len(place)
+    game = {
+        "type": "expressions", "dimension": 3, "action_name": "position", "action_unit": "m",
+        "cost": "((y[i] - place[i])**2).sum()", "constraints": {"ball": "(y[i]**2).sum() <= 16.0"},
+        "parameters": {"place": place.tolist()},
+    }  # fmt: skip
+    agents = {
+        "type": "mjcf-robot", "file": str(path), "count": count, "output": ["x", "y", "z"],
+        "input": ["east", "north", "up"], "lookahead": 0.5, "local_damping": 6.0,
+    }  # fmt: skip
+    start = (-place).tolist()
+    tables = {"game": game, "agents": agents, "initial": {"action": start}, **changes}
+    return load_scenario("swap", tables)
+
+
+def near_of(agents, axes):
     """Room for pairs."""
-    return fresh(native.Neighbours, agents=agents)
+    return fresh(native.Neighbours, agents=agents, axes=axes)
 
 
-def drawn(rng, agents):
-    """Places and outputs, some outputs far ahead, some agents close together."""
-    spread = rng.choice([0.5, 3.0, 30.0])
-    q = rng.uniform(-spread, spread, 2 * agents)
-    return q, q + rng.normal(0, rng.choice([0.0, 0.3, 5.0]), 2 * agents)
+def vector(point):
+    """A point (axes,) as native code has it."""
+    return (*point, 0.0)[:3]
 
 
-def apart_by(rng):
-    """q_i - q_j and y_i - y_j of two agents that a line can keep apart, often just so."""
+def drawn(rng, agents, axes):
+    """Places and outputs (agents, axes), some outputs far ahead, some agents close together."""
+    spread, shape = rng.choice([0.5, 3.0, 30.0]), (agents, axes)
+    q = rng.uniform(-spread, spread, shape)
+    return q, q + rng.normal(0, rng.choice([0.0, 0.3, 5.0]), shape)
+
+
+def apart_by(rng, axes):
+    """q_i - q_j and y_i - y_j of two agents that a plane can keep apart, often just so."""
     while True:
-        a, b = rng.normal(0, rng.choice([0.8, 3.0]), (2, 2))
+        a, b = rng.normal(0, rng.choice([0.8, 3.0]), (2, axes))
+        if axes == 3 and rng.random() < 0.2:  # straight above each other, or nearly
+            a[:2], b[:2] = rng.choice([0.0, 1e-12, 1e-5]) * rng.normal(0, 1, (2, 2))
         size = np.linalg.norm(nearest_point(a, b))
         if size > 1e-3:
             scale = R * (1.0 + 10.0 ** rng.uniform(-9, 0.5)) / size
             return scale * a, scale * b
 
 
-def cloud(rng, agents):
-    """Points more than R apart, shape (2 agents,)."""
+def cloud(rng, agents, axes=2):
+    """Points more than R apart, shape (agents, axes)."""
     points = []
     while len(points) < agents:
-        point = rng.uniform(-2.5, 2.5, 2)
+        point = rng.uniform(-2.5, 2.5, axes)
         if all(np.linalg.norm(point - other) > 1.02 * R for other in points):
             points.append(point)
-    return np.array(points).ravel()
+    return np.array(points)
 
 
 # --------------------------------------------------------------------- half-planes, neighbours
 
 
-@given(seed=seeds)
-def test_half_planes_are_those_of_plain_python_and_leave_half_of_the_margin(seed):
+@given(seed=seeds, axes=AXES)
+def test_half_planes_are_those_of_plain_python_and_leave_half_of_the_margin(seed, axes):
     rng = np.random.default_rng(seed)
-    a, b = apart_by(rng)
+    a, b = apart_by(rng, axes)
     turn = rng.choice([0.0, 0.5, 1.5])
-    x, y, size = native.half_plane(native.Rule(R, REACH, turn), *a, *b)
-    n, margin = np.array([x, y]), size - R
-    assert np.hypot(x, y) == pytest.approx(1.0)
+    rule = native.Rule(R, REACH, turn, (0.0,) * axes)
+    n, size = native.half_plane(rule, vector(a), vector(b))
+    assert n[axes:] == (0.0,) * (3 - axes)
+    n, margin = np.array(n[:axes]), size - R
+    assert np.linalg.norm(n) == pytest.approx(1.0)
     assert min(n @ a, n @ b) - R >= 0.5 * margin * (1.0 - 1e-6) - 1e-15
     np.testing.assert_allclose(n, half_plane(R, turn, a, b), atol=1e-6)
     if turn == 0.0:  # nothing is farther from both
-        angles = np.linspace(-np.pi, np.pi, 721)
-        others = np.column_stack([np.cos(angles), np.sin(angles)])
+        others = rng.normal(0, 1, (1000, axes))
+        others /= np.linalg.norm(others, axis=1, keepdims=True)
         assert min(n @ a, n @ b) >= np.max(np.minimum(others @ a, others @ b)) - 1e-12
-    back = native.half_plane(native.Rule(R, REACH, turn), *-a, *-b)
-    np.testing.assert_allclose(back[:2], -n, atol=1e-12)  # the same line, seen by the other
+    back, _ = native.half_plane(rule, vector(-a), vector(-b))
+    np.testing.assert_allclose(back[:axes], -n, atol=1e-12)  # the same line, seen by the other
 
 
-@given(seed=seeds)
-def test_the_old_half_plane_stays_allowed_so_that_there_is_a_next_one(seed):
+@given(seed=seeds, axes=AXES)
+def test_the_old_half_plane_stays_allowed_so_that_there_is_a_next_one(seed, axes):
     """Whatever y+ is inside it, and q+ on the way from q to y+."""
     rng = np.random.default_rng(seed)
-    a, b = apart_by(rng)
-    x, y, _ = native.half_plane(RULE, *a, *b)
-    n = np.array([x, y])
+    a, b = apart_by(rng, axes)
+    n = np.array(native.half_plane(RULE[axes], vector(a), vector(b))[0][:axes])
     for _ in range(10):
-        b = b + rng.normal(0, rng.choice([0.01, 1.0]), 2)
+        b = b + rng.normal(0, rng.choice([0.01, 1.0]), axes)
         b = b + max(0.0, R * (1.0 + 1e-9) - n @ b) * n  # inside, on the edge if it was not
         a = a + rng.uniform(0, 1) * (b - a)
         assert min(n @ a, n @ b) > R
-        x, y, size = native.half_plane(RULE, *a, *b)
-        n = np.array([x, y])
+        n, size = native.half_plane(RULE[axes], vector(a), vector(b))
+        n = np.array(n[:axes])
         assert size > R
         assert min(n @ a, n @ b) > R
 
 
-@given(seed=seeds)
+def test_in_space_half_planes_turn_as_in_the_plane_that_lies_level_in_it():
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        a, b = apart_by(rng, 2)
+        flat, _ = native.half_plane(RULE[2], vector(a), vector(b))
+        spatial, _ = native.half_plane(RULE[3], (*a, 0.0), (*b, 0.0))
+        np.testing.assert_allclose(spatial, flat, atol=1e-14)
+        lifted, _ = native.half_plane(RULE[3], (*a, 1e-13), (*b, 1e-13))
+        np.testing.assert_allclose(lifted, flat, atol=1e-11)
+
+
+@given(seed=seeds, axes=AXES)
 @settings(max_examples=60)
-def test_cells_find_the_pairs_that_all_pairs_show(seed):
+def test_cells_find_the_pairs_that_all_pairs_show(seed, axes):
     rng = np.random.default_rng(seed)
     agents = int(rng.integers(2, 40))
-    q, y = drawn(rng, agents)
+    q, y = drawn(rng, agents, axes)
     if rng.random() < 0.1:
-        q[0] = 1e30
-    near = near_of(agents)
-    cells.find(near, q, y, REACH, 0.0)
+        q[0, 0] = 1e30
+    near = near_of(agents, axes)
+    cells.find((0.0,) * axes, near, q.ravel(), y.ravel(), REACH, 0.0)
     count = int(near.numbers.pairs)
     found = set(zip(near.first[:count].tolist(), near.second[:count].tolist(), strict=True))
     assert len(found) == count
-    points, ahead = q.reshape(-1, 2), y.reshape(-1, 2)
     expected = {
         (i, j)
         for i in range(agents)
         for j in range(i + 1, agents)
-        if np.linalg.norm(nearest_point(points[i] - points[j], ahead[i] - ahead[j])) < REACH
+        if np.linalg.norm(nearest_point(q[i] - q[j], y[i] - y[j])) < REACH
     }
     assert found == expected
 
 
-@given(seed=seeds)
+@given(seed=seeds, axes=AXES)
 @settings(max_examples=60)
-def test_pairs_that_are_not_near_cannot_come_too_near_within_a_period(seed):
+def test_pairs_that_are_not_near_cannot_come_too_near_within_a_period(seed, axes):
     """Wherever outputs go, every pair that is not in the list stays half way from the reach."""
     rng = np.random.default_rng(seed)
     agents = int(rng.integers(2, 15))
-    near = near_of(agents)
-    near.place[:] = cloud(rng, agents)
-    near.output[:] = near.place + rng.normal(0, 0.05, 2 * agents)
-    cells.find(near, near.place, near.output, REACH, 0.0)
+    near, rule = near_of(agents, axes), RULE[axes]
+    q = cloud(rng, agents, axes)
+    now = q + rng.normal(0, 0.05, q.shape)
+    near.place[:], near.output[:] = q.ravel(), now.ravel()
+    cells.find(rule.origin, near, near.place, near.output, REACH, 0.0)
     near.numbers.renewed = near.numbers.pairs
-    y = near.output + rng.normal(0, rng.choice([0.03, 1.0, 5.0]), 2 * agents)
+    y = now + rng.normal(0, rng.choice([0.03, 1.0, 5.0]), q.shape)
     before = near.numbers.pairs
-    added = apart.add_pairs(RULE, near, y)
+    added = apart.add_pairs(rule, near, y.ravel())
     assert added == (near.numbers.pairs > before)
-    assert not apart.add_pairs(RULE, near, y)
+    assert not apart.add_pairs(rule, near, y.ravel())
     count = int(near.numbers.pairs)
     known = set(zip(near.first[:count].tolist(), near.second[:count].tolist(), strict=True))
     assert len(known) == count
-    q, ahead = near.place.reshape(-1, 2), y.reshape(-1, 2)
     for i in range(agents):
         for j in range(i + 1, agents):
             if (i, j) not in known:
-                way = nearest_point(q[i] - q[j], ahead[i] - ahead[j])
+                way = nearest_point(q[i] - q[j], y[i] - y[j])
                 assert np.linalg.norm(way) >= 0.5 * (R + REACH)
 
 
-@given(seed=seeds)
+@given(seed=seeds, axes=AXES)
 @settings(max_examples=20, deadline=None)
-def test_rows_of_the_equation_are_the_slopes_of_its_differences(seed):
+def test_rows_of_the_equation_are_the_slopes_of_its_differences(balloon, seed, axes):
     """Of pairs in the barrier, in whatever order the matrix has its rows."""
     rng, h = np.random.default_rng(seed), 1e-7
-    parts = parts_of(system_of(), clock(0.01))
+    parts = parts_of(
+        system_of() if axes == 2 else in_the_air(balloon).system_objects()[0], clock(0.01)
+    )
+    m, rule = 8 * axes, RULE[axes]
     scratch, solver = parts.loop.work, parts.solver
-    near = native.neighbours_in(scratch.separation, parts.problem)
-    q = cloud(rng, 8)
-    near.place[:], near.output[:] = q, q + rng.normal(0, 0.005, 16)
-    cells.find(near, near.place, near.output, REACH, 0.0)
-    assert native.renew(RULE, near, 0, parts.monitor, 0.0)
-    solver.base[:], solver.stiff[:], solver.numbers.rho = q, rng.uniform(50, 200, 16), 0.05
-    at, order = np.zeros(16, dtype=np.int64), parts.problem.order
-    apart.put_in_line(near, at, True)
-    b = int(apart.half_band(parts.problem, near, at))
+    near = native.neighbours_in(scratch.separation, parts.problem, rule.origin)
+    q = cloud(rng, 8, axes)
+    y = q + rng.normal(0, 0.005, q.shape)
+    near.place[:], near.output[:] = q.ravel(), y.ravel()
+    cells.find(rule.origin, near, near.place, near.output, REACH, 0.0)
+    assert native.renew(rule, near, 0, parts.monitor, 0.0)
+    solver.base[:], solver.stiff[:], solver.numbers.rho = q.ravel(), rng.uniform(50, 200, m), 0.05
+    at, order = np.zeros(m, dtype=np.int64), parts.problem.order
+    apart.put_in_line(near, rule.origin, at, True)
+    b = int(apart.half_band(parts.problem, near, rule.origin, at))
     ordered = parts.problem._replace(order=order._replace(position=at, band=np.array([b, 0])))
-    kept = apart.Kept(np.zeros(0), near, RULE)
+    kept = apart.Kept(np.zeros(0), near, rule)
 
     def residual(trial):
         solver.trial[:] = trial
         assert apart.residual(ordered, 0, 8, kept, scratch, solver)
         return solver.residual.copy()
 
-    y, m = near.output.copy(), 16
+    y = y.ravel()
     steps = h * np.eye(m)
     expected = np.array([(residual(y + s) - residual(y - s)) / (2 * h) for s in steps]).T
     residual(y)
@@ -203,11 +259,14 @@ def test_rows_of_the_equation_are_the_slopes_of_its_differences(seed):
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5 * np.max(np.abs(expected)))
     step = rng.normal(0, 1e-3, m)
     length = apart.local_length(ordered, 0, 8, kept, step[np.argsort(at)], solver)
-    moved = step.reshape(-1, 2)
+    moved, normals = (
+        step.reshape(8, axes),
+        np.column_stack([near.along, near.across, *[near.up] * (axes - 2)]),
+    )
     used = [
         abs(n @ (moved[int(i)] - moved[int(j)])) / s
         for i, j, n, s in zip(
-            near.first, near.second, np.column_stack([near.along, near.across]), near.slack,
+            near.first, near.second, normals, near.slack,
             strict=True,
         )
         if s > 0 and (i, j) != (0, 0)
@@ -235,14 +294,14 @@ def test_the_pushes_slope_is_that_of_its_differences(seed):
 def four(rng):
     """Four robots in each other's way, and their oracle."""
     q = cloud(rng, 4)
-    y, place = q + rng.normal(0, 0.02, 8), -q
+    y, place = q + rng.normal(0, 0.02, (4, 2)), -q
     table = {
-        "game__desired_place": place.reshape(-1, 2).tolist(),
+        "game__desired_place": place.tolist(),
         "agents__count": 4,
         "agents__main_mass": [1.0, 2.0, 0.7, 1.0],
-        "initial": {"action": y.reshape(-1, 2).tolist(), "position": q.reshape(-1, 2).tolist()},
+        "initial": {"action": y.tolist(), "position": q.tolist()},
     }
-    return table, Swap(place.reshape(-1, 2), 4.0, 0.05, R, REACH, TURN)
+    return table, Swap(place, 4.0, 0.05, R, REACH, TURN)
 
 
 @pytest.mark.parametrize("engine", ["ode", "mujoco"])
@@ -301,6 +360,52 @@ def test_continuous_time_is_the_one_of_plain_python():
         k4 = rate(x + h * k3, pairs)
         x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         np.testing.assert_allclose(row.T, x, atol=1e-7)
+
+
+def test_in_space_mode_implicit_is_the_one_of_plain_python(balloon):
+    """Rigid agents of 2 kg, moved by Euler's steps of MuJoCo's, on their way through the middle."""
+    rng, h, M, d, tau = np.random.default_rng(1), 0.01, 2.0, 6.0, 0.5
+    q = cloud(rng, 6, 3)
+    y = q + rng.normal(0, 0.02, q.shape)
+    oracle = Swap(-q, 4.0, 0.05, R, REACH, TURN)
+    start = {"action": y.tolist(), "position": q.tolist()}
+    (system,) = in_the_air(balloon, -q, initial=start).system_objects()
+    states, _, _, loop = run_loop(system, h, 60)
+    q, y, near = q.ravel(), y.ravel(), 0
+    for row in states[1:]:
+        pairs = oracle.pairs(q, y)
+        near = max(near, len(pairs))
+        v = (y - q) / tau
+        y = oracle.implicit(q + (h + tau) * (v - h * d * v / M), h / M * (tau + h), y, pairs)
+        q = q + h * (y - q) / (tau + h)
+        np.testing.assert_allclose(row.T, [y, q], atol=2e-6)
+    assert near >= 3
+    assert loop.monitor.least_distance < REACH
+
+
+def test_in_space_agents_keep_apart_arrive_and_touch_nothing(balloon):
+    """Through the middle of a cube, where they are in each other's way."""
+    scenario = in_the_air(balloon)
+    run = scenario.simulation_object().run()
+    report, data = run.reports["robots"], run["robots"]
+    assert report["status"] == "converged"
+    assert R <= report["separation"]["least_distance"] < 0.65
+    points = data["position"].values.reshape(len(data["time"]), 8, 3)
+    i, j = np.triu_indices(8, 1)
+    nearest = np.linalg.norm(points[:, i] - points[:, j], axis=2).min()
+    assert nearest >= report["separation"]["least_distance"]
+    assert np.min(data["nearest_distance"]) == pytest.approx(nearest)
+    found = certify(scenario.system_objects()[0], scenario.clock())
+    assert "half-spaces turn" in str(found)
+
+
+def test_balloons_that_hold_each_other_straight_above_pass(balloon):
+    """One wants up where the other one wants down: nothing but the turn moves them aside."""
+    place = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]])
+    run = in_the_air(balloon, place).simulation_object().run()
+    assert run.status == "converged"
+    stuck = in_the_air(balloon, place, **{"separation.turn": 0.0}).simulation_object().run()
+    assert stuck.reports["robots"]["separation"]["held_by"] == [[1, 2]]
 
 
 def least_distance(states):
@@ -437,7 +542,7 @@ def test_what_it_is_not_for_is_refused(changes, words):
 
 def test_agents_on_a_lane_and_those_of_velocities_are_refused():
     for name in ("platoon", "planar-sync"):
-        with pytest.raises(InvalidInput, match=r"separation: .*in the plane"):
+        with pytest.raises(InvalidInput, match=r"separation: .*in the plane or in space"):
             load_scenario(name, {"separation": {"distance": 0.1}}).system_objects()
 
 

@@ -20,7 +20,8 @@ from gne_mj.loops.feedback import Order, Problem
 from gne_mj.loops.newton import OUTSIDE, newton
 from gne_mj.loops.separation import (
     add_pushes,
-    half_plane,
+    draw,
+    farthest_move,
     neighbours_in,
     push,
     rule_of,
@@ -44,13 +45,10 @@ class Kept(NamedTuple):
 @kernel
 def solve(problem, memory, work, solver):
     """Fill solver.y from solver.base and solver.slope; returns how that ended."""
-    near, rule, agents = (
-        neighbours_in(work.separation, problem),
-        rule_of(problem),
-        len(problem.data.offsets) - 1,
-    )
+    near, rule = neighbours_in(work.separation, problem, work.origin), rule_of(problem, work.origin)
+    agents = len(problem.data.offsets) - 1
     while True:
-        ordered = in_order(problem, near, solver)
+        ordered = in_order(problem, rule, near, solver)
         ended = newton(_EQUATION, ordered, 0, agents, True, Kept(memory, near, rule), work, solver)
         if ended == OUTSIDE or not add_pairs(rule, near, solver.y):
             return ended
@@ -63,39 +61,31 @@ def add_pairs(rule, near, y):
     That is half way from the reach to the least distance. Agents that were not near are not even
     there as long as none of them has moved by a quarter of the way.
     """
-    place, output, fast = near.place, near.output, False
     quarter = 0.25 * (rule.reach - rule.distance)
-    for a in range(0, len(y), 2):
-        across, up = y[a] - output[a], y[a + 1] - output[a + 1]
-        fast |= across * across + up * up > quarter * quarter
     count = int(near.numbers.pairs)
-    if not fast:
+    if not farthest_move(rule, near, y)[0] > quarter:
         return False
-    cells.find(near, place, y, rule.distance + 2.0 * quarter, rule.reach)
+    cells.find(rule.origin, near, near.place, y, rule.distance + 2.0 * quarter, rule.reach)
     for k in range(count, int(near.numbers.pairs)):
-        i, j = 2 * int(near.first[k]), 2 * int(near.second[k])
-        near.along[k], near.across[k], _ = half_plane(
-            rule, place[i] - place[j], place[i + 1] - place[j + 1],
-            output[i] - output[j], output[i + 1] - output[j + 1],
-        )  # fmt: skip
+        draw(rule, near, k)
     return near.numbers.pairs > count
 
 
 @kernel
-def in_order(problem, near, solver):
+def in_order(problem, rule, near, solver):
     """The problem with the order of Newton's matrix for the pairs that are near."""
-    numbers, m, mark = near.numbers, len(near.place), 0.0
+    numbers, m, mark, d = near.numbers, len(near.place), 0.0, len(rule.origin)
     position = integers_at(address_in(near.position), m)
     band = integers_at(address_in(near.band), 2)
     changed = band[0] == 0 or numbers.before != numbers.pairs
     for k in range(int(numbers.pairs)):
-        i, j = 2 * int(near.first[k]), 2 * int(near.second[k])
+        i, j = d * int(near.first[k]), d * int(near.second[k])
         mark += (i + 1.0) * m + j
-        changed |= abs(position[i] - position[j]) >= band[0]
+        changed |= abs(position[i] - position[j]) + d - 1 > band[0]
     if changed or numbers.mark != mark:
         numbers.before, numbers.mark = numbers.pairs, mark
-        put_in_line(near, position, band[0] == 0)
-        band[0] = half_band(problem, near, position)
+        put_in_line(near, rule.origin, position, band[0] == 0)
+        band[0] = half_band(problem, near, rule.origin, position)
         solver.numbers.uses = 0.0  # of factors in another order
     order = problem.order
     return Problem(
@@ -108,54 +98,69 @@ def in_order(problem, near, solver):
 
 
 @kernel
-def put_in_line(near, position, first):
-    """Sort agents along the line on which their outputs are spread the most; fill their rows."""
-    line, y = near.line, near.output
+def put_in_line(near, origin, position, first):
+    """Sort agents along the line on which their outputs are spread the most; fill their rows.
+
+    That is level, or upright.
+    """
+    line, y, d = near.line, near.output, len(origin)
     n = len(line)
-    along, up = 0.0, 0.0
-    for i in range(n):
-        along, up = along + y[2 * i] / n, up + y[2 * i + 1] / n
-        if first:
+    if first:
+        for i in range(n):
             line[i] = i
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for i in range(n):
-        a, b = y[2 * i] - along, y[2 * i + 1] - up
-        xx, xy, yy = xx + a * a, xy + a * b, yy + b * b
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    c, s = np.cos(angle), np.sin(angle)
+    along = direction(origin, y, n)
     for k in range(1, n):  # few have changed places since the last time
         agent, at = int(line[k]), k
-        value = c * y[2 * agent] + s * y[2 * agent + 1]
+        value = cells.dot(along, cells.middle(origin, y, y, agent))
         while at > 0:
-            other = int(line[at - 1])
-            if not c * y[2 * other] + s * y[2 * other + 1] > value:
+            other = cells.middle(origin, y, y, int(line[at - 1]))
+            if not cells.dot(along, other) > value:
                 break
-            line[at] = other
+            line[at] = line[at - 1]
             at -= 1
         line[at] = agent
     for k in range(n):
         agent = int(line[k])
-        position[2 * agent], position[2 * agent + 1] = 2 * k, 2 * k + 1
+        for a in range(d):
+            position[d * agent + a] = d * k + a
 
 
 @kernel
-def half_band(problem, near, position):
+def direction(origin, points, n):
+    """The level or upright unit vector along which n points are spread the most."""
+    along, across, up = 0.0, 0.0, 0.0
+    for i in range(n):
+        x, y, z = cells.middle(origin, points, points, i)
+        along, across, up = along + x / n, across + y / n, up + z / n
+    xx, xy, yy, zz = 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        x, y, z = cells.middle(origin, points, points, i)
+        a, b, c = x - along, y - across, z - up
+        xx, xy, yy, zz = xx + a * a, xy + a * b, yy + b * b, zz + c * c
+    if zz > 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy):
+        return 0.0, 0.0, 1.0
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    return np.cos(angle), np.sin(angle), 0.0
+
+
+@kernel
+def half_band(problem, near, origin, position):
     """How far apart rows of agents are at most that costs, constraints or pairs couple."""
-    data, farthest = problem.data, 0
+    data, farthest, d = problem.data, 0, len(origin)
     for i in range(len(data.cost_pointer) - 1):
         for member in range(data.cost_pointer[i], data.cost_pointer[i + 1]):
             other = data.cost_index[member]
-            farthest = max(farthest, abs(position[2 * i] - position[2 * other]))
+            farthest = max(farthest, abs(position[d * i] - position[d * other]))
     for k in range(len(data.member_pointer) - 1):
         low, high = len(position), 0
         for member in range(data.member_pointer[k], data.member_pointer[k + 1]):
-            row = position[2 * data.member_index[member]]
+            row = position[d * data.member_index[member]]
             low, high = min(low, row), max(high, row)
         farthest = max(farthest, high - low)
     for k in range(int(near.numbers.pairs)):
-        i, j = 2 * int(near.first[k]), 2 * int(near.second[k])
+        i, j = d * int(near.first[k]), d * int(near.second[k])
         farthest = max(farthest, abs(position[i] - position[j]))
-    return farthest + 1
+    return farthest + d - 1
 
 
 @kernel
@@ -190,10 +195,12 @@ def assemble(problem, first, last, b, kept, work, solver):
         slack = near.slack[k]
         if not slack < most:
             continue
-        i, j = 2 * int(near.first[k]), 2 * int(near.second[k])
-        n, stiff = (near.along[k], near.across[k]), rho / (slack * slack)
-        for a in range(2):
-            for c in range(2):
+        d = len(rule.origin)
+        i, j = d * int(near.first[k]), d * int(near.second[k])
+        up = near.up[k] if d == 3 else 0.0
+        n, stiff = (near.along[k], near.across[k], up), rho / (slack * slack)
+        for a in range(d):
+            for c in range(d):
                 bend = stiff * n[a] * n[c]
                 at_i, at_j, to_i, to_j = (
                     position[i + a],
@@ -211,10 +218,13 @@ def assemble(problem, first, last, b, kept, work, solver):
 def local_length(problem, first, last, kept, step, solver):
     """The step's length in the barrier's own norm, that of the worst action, constraint or pair."""
     greatest = joint.local_length(problem, first, last, kept.memory, step, solver)
-    near, position = kept.near, problem.order.position
+    near, rule, position = kept.near, kept.rule, problem.order.position
+    d = len(rule.origin)
     for k in range(int(near.numbers.pairs)):
-        i, j = 2 * int(near.first[k]), 2 * int(near.second[k])
+        i, j = d * int(near.first[k]), d * int(near.second[k])
         change = near.along[k] * (step[position[i]] - step[position[j]])
         change += near.across[k] * (step[position[i + 1]] - step[position[j + 1]])
+        if d == 3:
+            change += near.up[k] * (step[position[i + 2]] - step[position[j + 2]])
         greatest = max(greatest, abs(change) / near.slack[k])
     return greatest

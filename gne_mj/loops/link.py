@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gne_mj.barrier import scheduled
 from gne_mj.controllers.settings import LENGTH_OF_NOW, Now
 from gne_mj.linked_game import compiled_for
-from gne_mj.loops import functions, implicit
+from gne_mj.loops import cells, functions, implicit
 from gne_mj.loops import positions as followed
 from gne_mj.loops import separation as apart
 from gne_mj.loops.layout import (
@@ -49,6 +49,7 @@ class SolverWork(NamedTuple):
     profile: np.ndarray  # (m,) overwritten
     now: Now
     separation: np.ndarray  # of agents that keep apart
+    origin: tuple[float, ...]  # cells.PLANE or cells.SPACE, of these
 
 
 _now_in = numbers_in(Now)
@@ -209,7 +210,7 @@ def positions() -> Any:
 
 
 @cache
-def separation(held: bool) -> dict[int, Any]:
+def separation(held: bool, origin: tuple[float, ...]) -> dict[int, Any]:
     """What keeps agents apart, for all laws, games and agents; in held modes the solver pushes."""
     source = source_key()
 
@@ -218,14 +219,14 @@ def separation(held: bool) -> dict[int, Any]:
         steps = steps_in(block)
         good = apart.keep(
             parts_at(block, workspace, steps), Instant(time, step, stage),
-            floats_at(state, steps.actions * steps.states),
+            floats_at(state, steps.actions * steps.states), origin,
         )  # fmt: skip
         return 1 if good else 0
 
     def push(block, workspace, time, step, stage):
         _ = source
         parts = parts_at(block, workspace, steps_in(block))
-        return 1 if apart.add_to_law(parts, Instant(time, step, stage)) else 0
+        return 1 if apart.add_to_law(parts, Instant(time, step, stage), origin) else 0
 
     found = {functions.KEEP_APART: callback(_whole(_whole, _whole, _real, *[_whole] * 3), keep)}
     if not held:
@@ -307,12 +308,13 @@ def _of_implicit(game: ModuleType, law: ModuleType, alone: bool, driven: bool) -
 
 
 @cache
-def solve(equation: ModuleType) -> Any:
+def solve(equation: ModuleType, origin: tuple[float, ...] = cells.PLANE) -> Any:
     """The solver of mode implicit, for all laws and games.
 
     Args:
         equation: :mod:`gne_mj.loops.joint`, :mod:`gne_mj.loops.apart` or
             :mod:`gne_mj.loops.local`.
+        origin: cells.PLANE or cells.SPACE, of agents that keep apart.
     """
     source = source_key()
 
@@ -321,7 +323,8 @@ def solve(equation: ModuleType) -> Any:
         steps, problem = steps_in(block), problem_in(block)
         views = solver_in(floats_at(solver, length), problem.order, steps.constraints, steps.states)
         of_law = law_work_at(profile, now, steps.actions)
-        work = SolverWork(of_law.profile, of_law.now, floats_at(separation, steps.separation))
+        near = floats_at(separation, steps.separation)
+        work = SolverWork(of_law.profile, of_law.now, near, origin)
         return equation.solve(problem, floats_at(memory, steps.memory), work, views)
 
     return callback(_whole(*[_whole] * 7), solve)

@@ -20,9 +20,13 @@ def check_separation(system: SystemData) -> None:
         return
     key, rule = "separation", system.separation
     positions, parameters = system.start_positions, system.agents.kind.PARAMETERS
-    if positions is None or any(size != 2 for size in system.game.sizes):
+    sizes = set(system.game.sizes)
+    if positions is None or sizes not in ({2}, {3}):
         raise InvalidInput(
-            key, "given", "it is for agents in the plane whose output is a position (agents.output)"
+            key,
+            "given",
+            "it is for agents in the plane or in space (actions of 2 or of 3 entries) whose output"
+            " is a position (agents.output, or agents.lookahead)",
         )
     tau = system.agents.parameters[:, parameters.index("lookahead")]
     if np.any(tau != tau[0]):
@@ -46,7 +50,8 @@ def check_separation(system: SystemData) -> None:
     check_room("agents.count", system.game.agents, 3 * m * m, "pairs of agents")
     if system.game.agents < 2:
         return
-    i, j, near = rule.nearest(positions, system.start)
+    each = (system.game.agents, -1)
+    i, j, near = rule.nearest(positions.reshape(each), system.start.reshape(each))
     if not near > rule.distance:
         raise InfeasibleStart(
             "state",

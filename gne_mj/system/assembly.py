@@ -182,7 +182,7 @@ class Assembly(SystemData):
 
             found[functions.CONTACTS] = counter()
         if self.separation is not None:
-            found |= separation(mode_of(self).held)
+            found |= separation(mode_of(self).held, (0.0,) * self.agents.dimension)
         return found
 
     @property
@@ -325,7 +325,9 @@ class Assembly(SystemData):
         return Sizes(
             history=(late + 1) * m * (self.agents.states + 1) if late else 0,
             solver=mode_of(self).solver_length(self, self.rows),
-            separation=0 if self.separation is None else neighbours_length(self.game.agents),
+            separation=0
+            if self.separation is None
+            else neighbours_length(self.game.agents, self.agents.dimension),
         )
 
     def mujoco_plant(self, clock: Clock) -> "FleetPlant":

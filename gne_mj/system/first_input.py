@@ -42,10 +42,11 @@ def law_at_start(system: System) -> Array:
     left = functions.action(problem, y, weights, memory, scratch, u)
     raise_pending()
     if system.separation is not None and system.start_positions is not None:
-        pushes = system.separation.pushes(system.start_positions, system.start, rho)
-        for (i, j), push in pushes.items():
-            u[2 * i : 2 * i + 2] += push
-            u[2 * j : 2 * j + 2] -= push
+        each = (game.agents, -1)
+        places, outputs = system.start_positions.reshape(each), system.start.reshape(each)
+        for (i, j), push in system.separation.pushes(places, outputs, rho).items():
+            u.reshape(each)[i] += push
+            u.reshape(each)[j] -= push
     return u if left < 0 else np.full(game.actions, np.nan)
 
 

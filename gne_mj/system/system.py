@@ -41,7 +41,8 @@ class System(Assembly):
         faults: what goes wrong (:mod:`gne_mj.faults`).
         seed: of what is random in the faults.
         disturbance: what the game's tightening is meant to cover; None if nothing is declared.
-        separation: how far apart agents in the plane keep; None if nothing keeps them apart.
+        separation: how far apart agents in the plane or in space keep; None if nothing keeps
+            them apart.
         rtol: error allowed in a step that "tsit5" or "rosenbrock" chooses, of each state
             relative to its greatest magnitude so far.
         observer: mode implicit: gain of each agent's observer of loads (:mod:`gne_mj.loops.loads`),

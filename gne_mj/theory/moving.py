@@ -163,7 +163,7 @@ def obstacles_to_keeping(system: System) -> list[str]:
     if system.faults or limited(system):
         found.append("the proof has neither faults nor input limits")
     if system.separation is not None:
-        found.append("half-planes turn besides")
+        found.append("the bounds that keep agents apart turn besides")
     return found
 
 

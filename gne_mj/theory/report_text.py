@@ -101,7 +101,7 @@ def _separation(apart: dict[str, Any]) -> str:
     promised = "promised" if apart["promised"] else "not promised"
     return (
         f"at least {apart['distance']:g} m, {promised}; pairs within {apart['reach']:g} m look at"
-        f" each other, half-planes turn by up to {apart['turn']:g} rad"
+        f" each other, {apart['by']} turn by up to {apart['turn']:g} rad"
     )
 
 

@@ -1,4 +1,7 @@
-"""What is promised of agents that keep apart by half-planes that turn (docs/positions.md)."""
+"""What is promised of agents that keep apart by half-planes (in space half-spaces) that turn.
+
+docs/positions.md has the proof, which is the same in both.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,12 +29,17 @@ class KeptApart:
     clock: Clock
 
     @property
+    def kept_by(self) -> str:
+        """What keeps each pair of agents apart."""
+        return "half-planes" if self.theorem.system.agents.dimension == 2 else "half-spaces"
+
+    @property
     def obstacles(self) -> list[str]:
         """Why that is not certain; empty if it is."""
         if self.held is None:
             found = [each for each in self.theorem.obstacles if each != SEPARATED]
             if not self.theorem.continuous:
-                found.append("half-planes hold in continuous time only")
+                found.append(f"{self.kept_by} hold in continuous time only")
             return found
         found = [f"[{c.label}] {c.why}" for c in self.held.conditions if not c.granted]
         if self.theorem.system.integrator != "euler":
@@ -46,6 +54,7 @@ class KeptApart:
             "distance": self.rule.distance,
             "reach": self.rule.reach,
             "turn": self.rule.turn,
+            "by": self.kept_by,
             "promised": not self.obstacles,
             "obstacles": self.obstacles,
         }

@@ -29,7 +29,7 @@ from gne_mj.theory.triggers import Triggers
 
 CERTIFIED, CONDITIONAL, NOT_CERTIFIED = "certified", "certified for small epsilon", "not certified"
 # Why no theorem covers agents that keep apart
-SEPARATED = "agents keep apart by half-planes that turn, and no theorem has constraints that do"
+SEPARATED = "agents keep apart by bounds that turn, and no theorem has constraints that do"
 HELD = "certified at control instants"  # mode implicit, see gne_mj.theory.zero_order_hold
 
 

@@ -17,7 +17,7 @@ from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
-from gne_mj.loops import apart, functions, guard, implicit, joint, link, loads, local
+from gne_mj.loops import apart, cells, functions, guard, implicit, joint, link, loads, local
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.ode import IMPLICIT
 from gne_mj.margins import influence
@@ -58,11 +58,12 @@ class Implicit(Mode):
         """The law's barrier-free part, the equation's solver, and what a control instant does."""
         equation = self.equation(system)
         alone = equation.ALONE
+        origin = cells.PLANE if system.separation is None else (0.0,) * system.agents.dimension
         find = loads.act if system.observer > 0.0 else implicit.act
         find = guard.act if system.guarded else find
         return {
             **link.of_implicit(system.law.kernels, system.game.kernels, alone, system.feed_forward),
-            functions.SOLVE: link.solve(equation),
+            functions.SOLVE: link.solve(equation, origin),
             functions.ACT: acting(system, find),
         }
 
