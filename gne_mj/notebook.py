@@ -3,11 +3,15 @@
 from base64 import b64encode
 from html import escape
 from io import BytesIO
+from typing import TYPE_CHECKING
 
 from gne_mj.errors import GneError
 from gne_mj.extras import need
 from gne_mj.summary import summary
 from gne_mj.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from gne_mj.viewer.replay import Shown
 
 HEIGHT = 560  # pixels of a replay
 DPI = 64  # of the figures
@@ -40,8 +44,10 @@ def _figures(trajectory: Trajectory) -> str:
     return found
 
 
-def replay_html(trajectory: Trajectory) -> str:
-    """The replay inline. It needs no server, and still works in a notebook that was sent on.
+def replay_html(shown: "Shown") -> str:
+    """The replay of a run, or of up to four to compare, inline.
+
+    It needs no server, and still works in a notebook that was sent on.
 
     Raises:
         GneError: there is no scenario to draw robots from, their files are gone, or the extra
@@ -49,7 +55,7 @@ def replay_html(trajectory: Trajectory) -> str:
     """
     from gne_mj.viewer import html_page
 
-    page = escape(html_page(trajectory), quote=True)
+    page = escape(html_page(shown), quote=True)
     return (
         f'<iframe title="replay" sandbox="allow-scripts" srcdoc="{page}"'
         f' style="width:100%;height:{HEIGHT}px;border:1px solid #8888"></iframe>'

@@ -21,6 +21,7 @@ from gne_mj.progress import PREPARING, on_terminal, say, telling
 
 if TYPE_CHECKING:
     from gne_mj.trajectory import Trajectory
+    from gne_mj.viewer.replay import Shown
     from gne_mj.viewer.session import Begin
 
 REPLAY = "preparing the replay"
@@ -28,12 +29,12 @@ REPLAY = "preparing the replay"
 
 @app.command()
 def view(
-    folder: Annotated[
-        Path,
+    folders: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="RUN",
+            metavar="RUN...",
             help="Folder that `run --out`, `paper`, a program's `save` or (with --index) `batch`"
-            " wrote.",
+            " wrote; up to four are compared, on one clock.",
         ),
     ],
     index: INDEX = None,
@@ -44,7 +45,7 @@ def view(
     port: PORT = None,
     replace: REPLACE = False,
 ) -> None:
-    """Show a stored run in a browser, with a time slider; a batch's run is run again for it."""
+    """Show stored runs in a browser, with a time slider; a batch's run is run again for it."""
     from gne_mj.errors import InvalidInput
     from gne_mj.extras import need
     from gne_mj.files import refuse_existing, written
@@ -56,25 +57,43 @@ def view(
         raise InvalidInput("html", str(html), "it must be a file, in a folder that exists")
     if html is not None and not replace:
         refuse_existing("html", [html])
-    title = _title(folder.resolve().name)
-    if index is None:
-        trajectory = stored(folder)
-    elif is_batch(folder):
-        source = source_of(None, folder, index)
-        trajectory = simulate(source, None, Results(None), quiet=False)
-        title = f"{title}, run {index}"
-    else:
-        raise InvalidInput("index", index, "it goes with a folder that `batch` wrote")
+    shown, title = _replayed(folders, index)
     if html is not None:
         from gne_mj.viewer import html_page
 
         with telling(REPLAY):
-            page = html_page(trajectory, title)
+            page = html_page(shown, title)
         with written("html", html, replace=replace) as new:
             new.write_text(page, encoding="utf-8")
         print(html)
         return
-    _show(trajectory, title, port)
+    _show(shown, title, port)
+
+
+def _replayed(folders: list[Path], index: int | None) -> "tuple[Shown, str]":
+    """What to show of these folders, and a title."""
+    from gne_mj.errors import InvalidInput
+
+    names = [_title(folder.resolve().name) for folder in folders]
+    if len(folders) > 1:
+        from gne_mj.viewer.comparison import MOST
+        from gne_mj.viewer.differences import unique
+
+        if index is not None:
+            raise InvalidInput("index", index, "it goes with one folder, that `batch` wrote")
+        if len(folders) > MOST:
+            raise InvalidInput("runs", len(folders), f"at most {MOST} can be compared")
+        if len(set(names)) < len(names):
+            names = unique([_title(str(folder)) for folder in folders])
+        runs = {name: stored(folder) for name, folder in zip(names, folders, strict=True)}
+        return runs, " · ".join(names)
+    (folder,) = folders
+    if index is None:
+        return stored(folder), names[0]
+    if not is_batch(folder):
+        raise InvalidInput("index", index, "it goes with a folder that `batch` wrote")
+    trajectory = simulate(source_of(None, folder, index), None, Results(None), quiet=False)
+    return trajectory, f"{names[0]}, run {index}"
 
 
 def watch(
@@ -136,12 +155,12 @@ def _title(name: str) -> str:
     return name.encode(errors="replace").decode()
 
 
-def _show(trajectory: "Trajectory", title: str, port: int | None) -> None:
+def _show(shown: "Shown", title: str, port: int | None) -> None:
     with stopping() as stop:
         with telling(REPLAY):
             from gne_mj.viewer import serve
 
-            server = serve(trajectory, title, port=port or 0)
+            server = serve(shown, title, port=port or 0)
         with _announced(server.url):
             while not stop.is_set():
                 time.sleep(0.2)

@@ -162,11 +162,15 @@ class Run(Trajectory):
 
         return view(self, title, port=port)
 
-    def replay(self) -> Replay:
-        """The replay, for a notebook to show inline: some two megabytes each time."""
+    def replay(self, *others: Trajectory) -> Replay:
+        """The replay, for a notebook to show inline: some two megabytes each time.
+
+        Args:
+            others: up to three runs to compare with.
+        """
         from gne_mj.interface.show import Replay
 
-        return Replay(self)
+        return Replay((self, *others) if others else self)
 
 
 @answering

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gne_mj.viewer import Server
+    from gne_mj.viewer.replay import Shown
 
 DPI = 80  # of figures in a notebook
 
@@ -50,20 +51,20 @@ def _png(figure: Figure) -> str:
 
 
 class Replay:
-    """A trajectory's replay, which a notebook shows inline and keeps.
+    """A replay, which a notebook shows inline and keeps.
 
     Args:
-        trajectory: of a scenario, which it holds.
+        shown: a trajectory of a scenario, which it holds; or up to four, to compare.
     """
 
-    def __init__(self, trajectory: Trajectory) -> None:
-        self.trajectory = trajectory
+    def __init__(self, shown: Shown) -> None:
+        self.shown = shown
 
     def __repr__(self) -> str:
-        return f"<Replay of {self.trajectory!r}>"
+        return f"<Replay of {self.shown!r}>"
 
     def _repr_html_(self) -> str:
-        return replay_html(self.trajectory)
+        return replay_html(self.shown)
 
 
 @answering
@@ -95,22 +96,36 @@ def plot(
 
 
 @answering
-def view(shown: Trajectory | Source, title: str = "gne-mj replay", *, port: int = 0) -> Server:
+def view(
+    shown: Trajectory | Source | list[Trajectory | Source] | tuple[Trajectory | Source, ...],
+    title: str = "gne-mj replay",
+    *,
+    port: int = 0,
+) -> Server:
     """Serve a run's replay on 127.0.0.1 until the server is closed or the process ends.
 
     Open its ``url`` in a browser. ``gne-mj run --view`` shows a run while it is going on.
 
+    >>> gne_mj.view([gne_mj.run("paper"), gne_mj.run("paper", {"barrier.rho": 0.3})]).url
+
     Args:
-        shown: a trajectory; a scenario or game is run first.
+        shown: a trajectory; a scenario or game is run first. A list of up to four is shown on one
+            clock, a dict of trajectories by the names in it.
         title: of the page.
         port: 0 for any that is free.
 
     Raises:
         MissingExtra: what the page needs is not installed.
-        InvalidInput: there is no scenario to draw robots from; the port is taken.
+        InvalidInput: there is no scenario to draw robots from, or too many runs; the port is taken.
     """
     from gne_mj.viewer import serve
 
+    if isinstance(shown, Mapping) and shown:
+        named = {str(name): each for name, each in shown.items() if isinstance(each, Trajectory)}
+        if len(named) == len(shown):
+            return serve(named, title, port=port)
+    if isinstance(shown, list | tuple):
+        return serve([_trajectory(each) for each in shown], title, port=port)
     return serve(_trajectory(shown), title, port=port)
 
 

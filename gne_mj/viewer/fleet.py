@@ -27,14 +27,16 @@ class Fleet:
         agents: N.
 
     Attributes:
-        mirror: draws them below the name.
+        prefix: of the paths at which they are drawn: the name, in parts.
+        mirror: draws them there.
     """
 
     def __init__(self, plant: FleetPlant, name: str, agents: int) -> None:
         self.plant, self.agents = plant, agents
+        self.prefix = tuple(part for part in name.split("/") if part)
         self.mirror = Mirror(
             plant.model,
-            prefix=(name,),
+            prefix=self.prefix,
             tinted=[geom for geoms in self._tinted for geom in geoms],
             coils=self._coils,
         )
@@ -76,6 +78,16 @@ class Fleet:
         mujoco.mj_kinematics(self.plant.model, data)
         y = data.xpos[self._bodies, 1]
         return float(np.min(y)), float(np.max(y))
+
+    def start(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(nq,) joint positions in m or rad at the start.
+
+        Args:
+            state: (m, states) of the agents there; MJCF robots start as their files say.
+        """
+        if isinstance(self.plant, MujocoPlant):
+            return self.qpos({"state": state[None]})[0]
+        return self.plant.model.qpos0
 
     @property
     def places(self) -> dict[str, Any]:

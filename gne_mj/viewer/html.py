@@ -8,8 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from gne_mj.files import written
-from gne_mj.trajectory import Trajectory
-from gne_mj.viewer.replay import replay_pack
+from gne_mj.viewer.replay import Shown, replay_pack
 
 _MESHCAT = "meshcat.min.js"  # the page's name for the bundle of the meshcat package
 _SETTINGS = '<script id="settings" type="application/json">{}</script>'
@@ -25,17 +24,17 @@ def served_page(mode: str, title: str) -> str:
     return _begin(mode, title)
 
 
-def html_page(trajectory: Trajectory, title: str | None = None) -> str:
-    """A trajectory's replay as one page that needs no other file and no network.
+def html_page(shown: Shown, title: str | None = None) -> str:
+    """A replay as one page that needs no other file and no network.
 
     Args:
-        trajectory: of a scenario, which it holds.
-        title: of the page; the systems' names if left out.
+        shown: a trajectory of a scenario, which it holds; or up to four, to compare.
+        title: of the page; the systems' or runs' names if left out.
 
     Raises:
         InvalidInput: see :func:`gne_mj.viewer.replay.replay_pack`.
     """
-    return packed_page(replay_pack(trajectory, title), title or "gne-mj replay")
+    return packed_page(replay_pack(shown, title), title or "gne-mj replay")
 
 
 def packed_page(pack: bytes, title: str) -> str:
@@ -55,7 +54,7 @@ def packed_page(pack: bytes, title: str) -> str:
     ).replace("</body>", f"<!--\n{_licences()}\n-->\n</body>")
 
 
-def write_html(trajectory: Trajectory, path: str | Path, title: str | None = None) -> Path:
+def write_html(shown: Shown, path: str | Path, title: str | None = None) -> Path:
     """Write :func:`html_page` into a file, which it replaces only when it is whole.
 
     Raises:
@@ -63,7 +62,7 @@ def write_html(trajectory: Trajectory, path: str | Path, title: str | None = Non
         StorageError: the disk is full, or fails.
     """
     path = Path(path)
-    text = html_page(trajectory, title)
+    text = html_page(shown, title)
     with written("path", path, replace=True) as new:
         new.write_text(text, encoding="utf-8")
     return path

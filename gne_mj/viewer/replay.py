@@ -1,7 +1,7 @@
 """A trajectory as one compressed pack: everything that a page needs to show it again."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.recorded import recorded_system, sizes_of
-from gne_mj.scenario import load_scenario, scenario_of
+from gne_mj.scenario import Scenario, load_scenario, scenario_of
 from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.pack import packed_small
 from gne_mj.viewer.scene import Scene
@@ -20,35 +20,70 @@ from gne_mj.viewer.shown_system import Arrays, ShownSystem, is_line
 if TYPE_CHECKING:
     import xarray
 
+Shown = Trajectory | Sequence[Trajectory] | Mapping[str, Trajectory]
+"""What a replay is of: a run, or several to be compared, which can have names."""
+
+SAME = 1e-9  # s, up to which samples of several runs are at one time
 SAMPLES = 6000  # of longer trajectories so many are shown, evenly chosen
 
 
-def replay_pack(trajectory: Trajectory, title: str | None = None) -> bytes:
-    """The pack of a trajectory.
+def replay_pack(shown: Shown, title: str | None = None) -> bytes:
+    """The pack of a trajectory, or of several on one clock.
 
     Args:
-        trajectory: of a scenario, which it holds.
-        title: of the page; the systems' names if left out.
+        shown: a trajectory, or :data:`gne_mj.viewer.comparison.MOST` of them at most, to compare.
+        title: of the page; the systems' or runs' names if left out.
 
     Raises:
-        InvalidInput: it holds no scenario, or the robots' own files are gone. Its game and law need
-            not be there.
+        InvalidInput: one holds no scenario, or the robots' own files are gone. Its game and law
+            need not be there. Or there are none or too many.
     """
-    source = trajectory.source
-    if not source:
+    if not isinstance(shown, Trajectory):
+        from gne_mj.viewer.comparison import comparison_pack
+
+        return comparison_pack(shown, title)
+    scenario = scenario_within(shown)
+    recording = _recording(shown, list(scenario.systems))
+    scene = Scene(
+        shown_systems(shown, scenario),
+        title or ", ".join(scenario.systems),
+        scenario.clock().duration,
+        values=recording.values,
+    )
+    return recording.pack(scene, _about(shown))
+
+
+def scenario_within(trajectory: Trajectory) -> Scenario:
+    """The scenario that a trajectory holds.
+
+    Raises:
+        InvalidInput: it holds none.
+    """
+    if not trajectory.source:
         raise InvalidInput(
             "trajectory", "of no scenario", "robots are drawn from the scenario that it must hold"
         )
-    scenario = load_scenario(json.loads(source))
-    clock, shown_systems = scenario.clock(), []
+    return load_scenario(json.loads(trajectory.source))
+
+
+def shown_systems(
+    trajectory: Trajectory, scenario: Scenario, called: Callable[[str], str] = str
+) -> list[ShownSystem]:
+    """What a page shows of each system of a trajectory.
+
+    Args:
+        trajectory: with what was recorded.
+        scenario: of it.
+        called: the page's name of each.
+    """
+    clock, found = scenario.clock(), []
     for name, table in scenario.systems.items():
         data = trajectory[name]
         with table.naming(name):
             agents, faults = table.players(sizes_of(data))
-        system = recorded_system(name, data, agents, faults, scenario.simulation.seed)
-        shown_systems.append(ShownSystem(system, clock))
-    scene = Scene(shown_systems, title or ", ".join(scenario.systems), clock.duration)
-    return scene_pack(scene, trajectory)
+        seed = scenario.simulation.seed
+        found.append(ShownSystem(recorded_system(called(name), data, agents, faults, seed), clock))
+    return found
 
 
 def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
@@ -57,39 +92,72 @@ def scene_pack(scene: Scene, trajectory: Trajectory) -> bytes:
     Raises:
         InvalidInput: its robots have other joints than the scene's.
     """
-    datasets = {
-        shown_system.system.name: trajectory[shown_system.system.name]
-        for shown_system in scene.shown_systems
-    }
-    time = _times(list(datasets.values()))
-    values = {name: _values(data, time) for name, data in datasets.items()}
-    arrays: Arrays = {"time": time, **scene.arrays(values)}
-    for shown_system in scene.shown_systems:
-        ended = float(datasets[shown_system.system.name]["time"][-1])
-        cut(arrays, shown_system.system.name, time > ended + 1e-9)
-        left = outcome(trajectory.reports[shown_system.system.name])
-        if left["exit_agents"]:
-            mark_outside(
-                arrays, shown_system.system.name, left["exit_agents"], time >= ended - 1e-9
-            )
-        arrays |= _messages(shown_system, np.minimum(time, ended))
-    poses = scene.poses(values).reshape(len(time), -1)
-    varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
-    arrays["pose_base"] = poses[0]
-    arrays["pose_columns"] = varies.astype(np.int32)
-    arrays["pose_values"] = np.ascontiguousarray(poses[:, varies].T)
-    commands = _Commands()
-    scene.draw(commands.visualizer)
-    arrays["commands"] = np.frombuffer(b"".join(commands.sent), dtype=np.uint8)
-    meta = {
-        "kind": "replay",
-        **scene.meta(),
-        "outcome": {name: outcome(report) for name, report in trajectory.reports.items()},
-        "interventions": trajectory.interventions,
-        "scenario": _text(trajectory),
-        "command_lengths": [len(command) for command in commands.sent],
-    }
-    return packed_small(meta, {name: _lean(name, array) for name, array in arrays.items()})
+    names = [shown_system.system.name for shown_system in scene.shown_systems]
+    return _recording(trajectory, names).pack(scene, _about(trajectory))
+
+
+def _recording(trajectory: Trajectory, names: Sequence[str]) -> "Recording":
+    return Recording({name: trajectory[name] for name in names}, trajectory.reports)
+
+
+def _about(trajectory: Trajectory) -> dict[str, Any]:
+    return {"interventions": trajectory.interventions, "scenario": _text(trajectory)}
+
+
+class Recording:
+    """What systems recorded, at the sample times of all.
+
+    Args:
+        datasets, reports: of each system by its name on the page.
+
+    Attributes:
+        time: (T,) in s.
+        values: what depends on time, at these times, of each system.
+    """
+
+    def __init__(
+        self, datasets: Mapping[str, "xarray.Dataset"], reports: Mapping[str, dict[str, Any]]
+    ) -> None:
+        self._datasets, self._reports = datasets, reports
+        self.time = _times(list(datasets.values()))
+        self.values = {name: _values(data, self.time) for name, data in datasets.items()}
+
+    def pack(self, scene: Scene, about: Mapping[str, Any]) -> bytes:
+        """The pack of it.
+
+        Args:
+            scene: of these systems.
+            about: what the page is told besides.
+
+        Raises:
+            InvalidInput: robots have other joints than the scene's.
+        """
+        time, values = self.time, self.values
+        arrays: Arrays = {"time": time, **scene.arrays(values)}
+        for shown_system in scene.shown_systems:
+            name = shown_system.system.name
+            ended = float(self._datasets[name]["time"][-1])
+            cut(arrays, name, time > ended + 1e-9)
+            left = outcome(self._reports[name])
+            if left["exit_agents"]:
+                mark_outside(arrays, name, left["exit_agents"], time >= ended - 1e-9)
+            arrays |= _messages(shown_system, np.minimum(time, ended))
+        poses = scene.poses(values).reshape(len(time), -1)
+        varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
+        arrays["pose_base"] = poses[0]
+        arrays["pose_columns"] = varies.astype(np.int32)
+        arrays["pose_values"] = np.ascontiguousarray(poses[:, varies].T)
+        commands = _Commands()
+        scene.draw(commands.visualizer)
+        arrays["commands"] = np.frombuffer(b"".join(commands.sent), dtype=np.uint8)
+        meta = {
+            "kind": "replay",
+            **scene.meta(),
+            "outcome": {name: outcome(self._reports[name]) for name in self._datasets},
+            "command_lengths": [len(command) for command in commands.sent],
+            **about,
+        }
+        return packed_small(meta, {name: _lean(name, array) for name, array in arrays.items()})
 
 
 def _text(trajectory: Trajectory) -> str | None:
@@ -133,6 +201,7 @@ class _Commands:
 def _times(datasets: Sequence["xarray.Dataset"]) -> NDArray[np.float64]:
     """All times at which a system was sampled, at most SAMPLES and the last one always."""
     time = np.unique(np.concatenate([data["time"].to_numpy() for data in datasets]))
+    time = time[np.diff(time, prepend=-np.inf) > SAME]  # clocks differ in their last bits
     every = -(-len(time) // SAMPLES)
     kept = np.zeros(len(time), dtype=bool)
     kept[::every] = kept[-1:] = True

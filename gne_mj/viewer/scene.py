@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.viewer.beside import shifts_of
 from gne_mj.viewer.mirror import POSITION, QUATERNION
 from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
 
-APART = 1.2  # m between the lanes of systems that are drawn beside each other
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
 
 
@@ -20,19 +20,37 @@ class Scene:
         shown_systems: one a system.
         title: of the page.
         duration: of the run, in s.
+        runs: which run each system is of, from 0, where several are compared; all of one if left
+            out.
+        values: what is known of each system by its name over a run, so that none is drawn upon
+            another one; if left out by how they start.
     """
 
-    def __init__(self, shown_systems: Sequence[ShownSystem], title: str, duration: float) -> None:
+    def __init__(
+        self,
+        shown_systems: Sequence[ShownSystem],
+        title: str,
+        duration: float,
+        *,
+        runs: Sequence[int] | None = None,
+        values: Mapping[str, Values] | None = None,
+    ) -> None:
         self.shown_systems, self.title, self.duration = shown_systems, title, duration
-        self._shifts = _beside(shown_systems)
+        self._runs = [0] * len(shown_systems) if runs is None else list(runs)
+        self._shifts, self._beside = shifts_of(shown_systems, self._runs, values)
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the scene; see :mod:`gne_mj.viewer`."""
         items: list[str] = []
         systems = []
-        for shown_system in self.shown_systems:
+        for k, shown_system in enumerate(self.shown_systems):
             about = shown_system.meta()
+            about["run"] = self._runs[k]
+            about["shift"], about["beside"] = self._shifts[k].tolist(), self._beside[k].tolist()
+            about["items"] = [len(items), 0]
             if shown_system.fleet is not None:
+                about["root"] = f"{ROOT}/{'/'.join(shown_system.fleet.prefix)}"
+                about["items"][1] = len(shown_system.fleet.mirror.items)
                 about["anchors"] = [len(items) + anchor for anchor in about["anchors"]]
                 about["tints"] = [[f"{ROOT}/{path}" for path in each] for each in about["tints"]]
                 items.extend(f"{ROOT}/{item}" for item in shown_system.fleet.mirror.items)
@@ -60,7 +78,7 @@ class Scene:
                 mirror = shown_system.fleet.mirror
                 rows = shown_system.fleet.qpos(values[shown_system.system.name])
                 poses = np.array([_hidden(mirror.poses(row)) for row in rows])
-                poses[..., 1] += shift
+                poses[..., :2] += shift
                 found.append(poses)
         if not found:
             samples = len(next(iter(values.values()))["action"])
@@ -73,18 +91,6 @@ class Scene:
         for shown_system in self.shown_systems:
             found |= shown_system.arrays(values[shown_system.system.name])
         return found
-
-
-def _beside(shown_systems: Sequence[ShownSystem]) -> list[float]:
-    """How far in m along y each system is moved: lanes do not lie upon each other."""
-    shifts, taken = [], None
-    for shown_system in shown_systems:
-        lane = None if shown_system.fleet is None else shown_system.fleet.lane
-        shift = 0.0 if lane is None or taken is None else taken - APART - lane[1]
-        shifts.append(shift)
-        if lane is not None:
-            taken = lane[0] + shift
-    return shifts
 
 
 def _hidden(poses: NDArray[np.float64]) -> NDArray[np.float64]:

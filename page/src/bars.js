@@ -7,6 +7,8 @@ import { withUnit } from "./words.js";
 
 const PITCH = 0.62; // m between bars, at scale 1
 const WIDTH = 0.4;
+const FAINT = 0.35; // opacity over another run's
+const WIDER = 1.25; // than those of the other run
 const GAUGE = 1.7; // between gauges
 const TALL = 1.9; // m, of the greatest action and of a bound
 const BOX = new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5);
@@ -115,6 +117,23 @@ export class Bars {
     this.group.add(this.slab);
   }
 
+  /**
+   * Bars over those of another run are translucent and a little wider, so that no faces coincide.
+   * @param {boolean} faint
+   */
+  fade(faint) {
+    this.slab.visible = !faint;
+    for (const bar of [...this.bars, ...this.gauges.map((gauge) => gauge.bar)]) {
+      const width = (bar.userData.width ??= bar.scale.x) * (faint ? WIDER : 1);
+      bar.scale.x = bar.scale.y = width;
+      Object.assign(bar.material, {
+        transparent: faint,
+        opacity: faint ? FAINT : 1,
+        depthWrite: !faint,
+      });
+    }
+  }
+
   restyle() {
     this.slab.material.color.set(colour("slab"));
     for (const { frame, plate, rim } of this.gauges) {
@@ -136,7 +155,10 @@ export class Bars {
    */
   update(instant, store, [x, y, z], scale) {
     const own = instant.systems[this.system.name];
-    this.reference = store.greatest(`${this.system.name}/action`) || 1;
+    const { alike, faint, off } = this.system.shown;
+    this.reference = Math.max(...alike.map((name) => store.greatest(`${name}/action`))) || 1;
+    this.fade(faint);
+    this.group.visible = !off;
     this.origin = [x, y, z];
     this.scale = scale;
     this.group.position.set(x, y, z + 0.035);

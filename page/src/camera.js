@@ -78,7 +78,7 @@ export class Camera {
     const length = box ? box.high[0] - box.low[0] : 0;
     const long = Math.min(Math.max((length - 40) / 60, 0), 1);
     const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
-    const rows = Math.max(0, ...bars.map((each) => each.rows));
+    const rows = bars.reduce((sum, each) => sum + each.rows, 0);
     const ofBars = rows > 1 ? 32 : 12;
     const ofFleet = planar ? 36 : 20 - 13 * long;
     const elevation = (box ? ofFleet : ofBars) * DEGREE;

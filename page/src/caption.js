@@ -22,7 +22,7 @@ const symbolOf = (tex) => {
 /** @param {Plot} plot */
 export const captionOf = (plot) => {
   const { spec } = plot;
-  const what = `${spec.system.name}, ${spec.title}`;
+  const what = `${spec.whose} ${spec.title}`.trim();
   const tool = (/** @type {string} */ text, /** @type {string} */ title, /** @type {any} */ act) =>
     element("button", { type: "button", text, title, "aria-label": `${title}: ${what}`, onclick: act });
   const log = tool("log", "Logarithmic scale", () => {
@@ -34,7 +34,7 @@ export const captionOf = (plot) => {
   return element(
     "figcaption",
     {},
-    element("span", { class: "plot-system", text: spec.system.name }),
+    element("span", { class: "plot-system", text: spec.whose }),
     element("span", { class: "plot-title", text: spec.title }),
     symbolOf(spec.symbol),
     element(

@@ -4,7 +4,7 @@ import { colour } from "./theme.js";
 import { number, withUnit } from "./words.js";
 /** @import { Plot } from "./plot.js" */
 /** @import { MovingBound, Spec } from "./specs.js" */
-/** @import { Intervention } from "./types.d.ts" */
+/** @import { Intervention, System } from "./types.d.ts" */
 
 export const MOST_CHIPS = 14; // lines, up to which each has a chip with its value
 const FONT = "12px system-ui, sans-serif";
@@ -27,7 +27,7 @@ export const optionsOf = (plot, width, height) => ({
     y: { distr: plot.look.log ? 3 : 1, range: (u, low, high) => valuesOf(plot, u, low, high) },
   },
   axes: axesOf(plot.spec.unit, plot.look.log),
-  series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
+  series: [{}, ...plot.spec.lines.map(({ label }, k) => seriesOf(plot, label, k))],
   focus: { alpha: 0.22 },
   cursor: {
     drag: { x: false, y: false },
@@ -86,12 +86,12 @@ const axesOf = (unit, log) => {
  * @param {number} k
  */
 const seriesOf = (plot, label, k) => {
-  const look = plot.lineOf(k);
+  const look = plot.lines.lookOf(k);
   return {
     label,
     stroke: look.colour,
     dash: look.dash.length ? look.dash : undefined,
-    width: plot.spec.columns.length > MOST_CHIPS ? 1 : 1.75,
+    width: plot.spec.groups.length > MOST_CHIPS ? 1 : 1.75,
     points: { show: false },
     spanGaps: false,
   };
@@ -144,7 +144,7 @@ const drawMarks = (u, plot) => {
   context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   context.clip();
   drawInterventions(u, plot.plots.source.interventions);
-  drawApproach(u, plot);
+  for (const system of plot.spec.systems) drawApproach(u, plot, system);
   if (plot.look.log) return context.restore();
   drawBounds(u, plot.spec);
   drawMovingBounds(u, plot.movingBounds);
@@ -170,12 +170,14 @@ const drawInterventions = (u, interventions) => {
 };
 
 /**
- * Where the run's least margin was.
+ * Where a run's least margin was.
  * @param {uPlot} u
  * @param {Plot} plot
+ * @param {System} system
  */
-const drawApproach = (u, { spec, plots }) => {
-  const { margin_time: time } = plots.source.stateOf(spec.system);
+const drawApproach = (u, { spec, plots }, system) => {
+  if (plots.hiddenRuns.has(system.run)) return;
+  const { margin_time: time } = plots.source.stateOf(system);
   if (typeof time !== "number") return;
   const { ctx: context, bbox } = u;
   const ratio = uPlot.pxRatio;
@@ -186,7 +188,7 @@ const drawApproach = (u, { spec, plots }) => {
   context.lineTo(x - 5 * ratio, bbox.top);
   context.lineTo(x + 5 * ratio, bbox.top);
   context.fill();
-  if (spec.name !== "constraint") return;
+  if (spec.name !== "constraint" || spec.systems.length > 1) return;
   context.font = `${12 * ratio}px system-ui, sans-serif`;
   context.textBaseline = "top";
   const leftward = x > bbox.left + 0.7 * bbox.width;

@@ -42,6 +42,12 @@ const LINES = {
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
 
 /**
+ * Dash of the lines of one of several runs.
+ * @param {number} run
+ */
+export const dashOf = (run) => DASHES[run];
+
+/**
  * Colour and dash of the k-th line of a plot.
  * @param {number} k
  */

@@ -18,7 +18,7 @@ export const download = (name, blob) => {
 
 /** @param {Plot} plot */
 const fileOf = ({ spec }) =>
-  [spec.system.name, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
+  [spec.whose, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
 
 /** @param {string} text */
 const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
@@ -28,13 +28,13 @@ const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"
  * @param {Plot} plot
  */
 export const csvOf = (plot) => {
-  const { spec, plots, hidden } = plot;
+  const { spec, plots } = plot;
   const [from, to] = plots.window;
   const { time } = plots.source.store;
   const columns = plot.columns();
-  const on = [...columns.keys()].filter((k) => !hidden.has(k));
+  const { on } = plot.lines;
   const unit = spec.unit ? ` (${spec.unit})` : "";
-  const names = on.map((k) => quoted(`${spec.noun} ${spec.labels[k]}`.trim() + unit));
+  const names = on.map((k) => quoted(plot.lines.nameOf(k) + unit));
   const rows = [["time (s)", ...names].join(",")];
   time.forEach((t, i) => {
     if (t < from || t > to) return;
@@ -53,13 +53,16 @@ export const saveCsv = (plot) =>
  * Caption, lines and key, as they are seen.
  * @param {Plot} plot
  */
-export const pictureOf = ({ uplot, spec, hidden, lineOf }) => {
+export const pictureOf = (plot) => {
+  const { lines, uplot, spec } = plot;
   if (!uplot) return null;
   const chart = uplot.ctx.canvas;
   const ratio = chart.width / uplot.width;
-  const on = [...spec.labels.keys()].filter((k) => !hidden.has(k));
-  const perRow = Math.max(1, Math.floor(uplot.width / 110));
-  const key = on.length > 14 || spec.total === 1 ? [] : on;
+  const { on } = lines;
+  const several = spec.systems.length > 1;
+  const wide = several ? 230 : 110;
+  const perRow = Math.max(1, Math.floor(uplot.width / wide));
+  const key = on.length > 14 || (spec.total === 1 && !several) ? [] : on;
   const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
   const canvas = element("canvas", {
     width: chart.width,
@@ -73,11 +76,11 @@ export const pictureOf = ({ uplot, spec, hidden, lineOf }) => {
   context.textBaseline = "middle";
   context.fillStyle = colour("text");
   context.font = "600 14px system-ui, sans-serif";
-  context.fillText(`${spec.system.name}: ${spec.title}`, 8, above / 2);
+  context.fillText([spec.whose, spec.title].filter(Boolean).join(": "), 8, above / 2);
   context.font = "12px system-ui, sans-serif";
   key.forEach((k, n) => {
-    const look = lineOf.call({ spec }, k);
-    const x = 8 + 110 * (n % perRow);
+    const look = lines.lookOf(k);
+    const x = 8 + wide * (n % perRow);
     const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
     Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
     context.setLineDash(look.dash);
@@ -85,7 +88,7 @@ export const pictureOf = ({ uplot, spec, hidden, lineOf }) => {
     context.moveTo(x, y);
     context.lineTo(x + 20, y);
     context.stroke();
-    context.fillText(spec.shorts[k], x + 26, y, 80);
+    context.fillText(lines.shortOf(k), x + 26, y, wide - 30);
   });
   return canvas;
 };

@@ -23,6 +23,8 @@ export const handleOf = (page) => ({
   tint: (/** @type {number} */ agent, /** @type {string} */ system) => tintOf(page, agent, system),
   /** What lies on the ground under a system's robots: outputs, the region's middle, strips. */
   plan: (/** @type {string} */ system) => planOf(page, system),
+  /** How each system is drawn, beside those of other runs or over them. */
+  compared: () => comparedOf(page),
   /** What is plotted. */
   get plots() {
     return page.plots.describe();
@@ -62,6 +64,17 @@ const planOf = ({ scene }, name) => {
     discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius),
   };
 };
+
+/** @param {Page} page */
+const comparedOf = ({ meta, scene }) =>
+  (meta?.systems ?? []).map(({ name, items: [first], drawn_as: as, shown }) => {
+    const object = as === "fleet" ? scene.objects[first] : scene.bars.find(({ system }) => system.name === name)?.group;
+    let opacity = 1;
+    object?.traverse((/** @type {Three} */ { material }) => {
+      if (material?.color) opacity = Math.min(opacity, material.opacity);
+    });
+    return { name, opacity, visible: object?.visible ?? false, offset: shown.offset };
+  });
 
 /** @param {Page} page */
 const stateOf = ({ meta, mode, live, overlay, playback, scene, source, tuning }) => ({

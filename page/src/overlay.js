@@ -1,11 +1,12 @@
 // Drawn flat over the 3-D pane: labels, links, messages on their way, distances on the ground.
 import { line } from "./colours.js";
+import { headingTexts, isSolid } from "./compare.js";
 import { isThere } from "./instant.js";
 import { Links } from "./links.js";
 import { colour } from "./theme.js";
 import { decimals, fixed, number } from "./words.js";
 /** @import { Scene } from "./scene.js" */
-/** @import { Agent, Instant, Scene as Meta, System, Text } from "./types.d.ts" */
+/** @import { Agent, Instant, Run, Scene as Meta, System, Text } from "./types.d.ts" */
 
 /** @typedef {{x: number, y: number, w: number, h: number}} Box in CSS pixels */
 /** @typedef {Box & {wide: number, text: string}} Pill of an agent's number, so wide, and a text */
@@ -36,6 +37,8 @@ export class Overlay {
     this.labelled = true;
     /** @type {System[]} */
     this.systems = [];
+    /** @type {Run[]} */
+    this.runs = []; // if several are compared
     /** @type {Map<string, number[]>} */
     this.orders = new Map();
     /** @type {Box[]} */
@@ -47,8 +50,9 @@ export class Overlay {
   }
 
   /** @param {Meta} meta */
-  setMeta({ systems }) {
+  setMeta({ systems, runs = [] }) {
     this.systems = systems;
+    this.runs = runs;
     this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
     this.links.begin();
   }
@@ -76,8 +80,11 @@ export class Overlay {
     context.clearRect(0, 0, w, h);
     this.taken = [];
     this.marks = [];
-    this.links.draw(this.systems, instant, now);
-    for (const system of this.systems)
+    const solid = this.systems.filter(isSolid);
+    this.links.draw(solid, instant, now);
+    if (this.runs.length && solid.length === this.systems.length)
+      for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
+    for (const system of solid)
       if (system.drawn_as === "bars") this.barTexts(system);
       else if (this.labelled) this.labels(system, instant);
     this.distances();

@@ -1,5 +1,6 @@
 // The page: puts a source of instants, the scene, plots and controls together.
 import { byId } from "./dom.js";
+import { Comparison, isSolid } from "./compare.js";
 import { Header, warn } from "./header.js";
 import { Keep, momentAsked } from "./keep.js";
 import { Live } from "./live.js";
@@ -10,10 +11,9 @@ import { Plots } from "./plots.js";
 import { Scene } from "./scene.js";
 import { setTheme, theme } from "./theme.js";
 import { Toolbar } from "./toolbar.js";
-import { Transport } from "./transport.js";
+import { marksOf, Transport } from "./transport.js";
 import { Tuning } from "./tuning.js";
 import { wire } from "./wiring.js";
-import { number } from "./words.js";
 /** @import { Agent, Instant, Numbers, Pack, Scene as Meta, Source, System } from "./types.d.ts" */
 /** @import { Plot } from "./plot.js" */
 
@@ -30,6 +30,7 @@ export class Page {
       seek: (time) => this.seek(time),
       highlight: (which, plot) => this.highlight(which, plot),
     });
+    this.comparison = new Comparison(this);
     this.header = new Header((time) => this.lead(time));
     this.toolbar = new Toolbar(this.scene, this.overlay);
     this.transport = new Transport(this);
@@ -87,7 +88,7 @@ export class Page {
     const playback = new Playback(pack, { messages: this.messages });
     this.playback = playback;
     this.setScene(playback.meta, playback);
-    this.markOutcome(playback);
+    this.transport.mark(marksOf(playback), playback.end);
     playback.restart();
     this.keep.go();
   }
@@ -135,7 +136,7 @@ export class Page {
     const playback = new Playback(pack, options);
     this.playback = playback;
     this.plots.setSource(playback);
-    this.markOutcome(playback);
+    this.transport.mark(marksOf(playback), playback.end);
     playback.seek(momentAsked() ?? playback.end);
   }
 
@@ -151,7 +152,10 @@ export class Page {
    * @param {System} system
    * @param {Numbers | undefined} counts
    */
-  messages = (system, counts) => this.overlay.links.messages(system, counts, performance.now());
+  messages = (system, counts) => {
+    const drawn = this.meta?.systems.find(({ name }) => name === system.name);
+    if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, performance.now());
+  };
 
   /**
    * @param {Meta} meta
@@ -163,29 +167,11 @@ export class Page {
     document.title = `${meta.title} · gne_mj`;
     byId("title").textContent = meta.title;
     byId("waiting").hidden = true;
+    this.comparison.setMeta(meta);
     this.scene.setMeta(meta);
     this.overlay.setMeta(meta);
     this.plots.setScene(meta, source);
     this.toolbar.setMeta(meta);
-  }
-
-  /**
-   * Exits and interventions of a replay, marked along the slider.
-   * @param {Playback} playback
-   */
-  markOutcome(playback) {
-    const { exits, interventions, end } = playback;
-    const marks = Object.entries(exits).map(([name, time]) => ({
-      time,
-      what: `${name} left the set`,
-      bad: true,
-    }));
-    const near = (this.meta?.systems ?? []).flatMap((system) => {
-      const { margin, margin_time: time } = playback.stateOf(system);
-      const what = `${system.name}: closest approach, margin ${number(margin)}`;
-      return typeof time === "number" ? [{ time, what, near: true }] : [];
-    });
-    this.transport.mark([...interventions, ...near, ...marks], end);
   }
 
   // ---- what users ask for
@@ -247,6 +233,7 @@ export class Page {
     setTheme(theme() === "dark" ? "light" : "dark");
     this.scene.restyle();
     this.plots.restyle();
+    this.comparison.restyle();
   }
 
   // ---- pictures
@@ -260,7 +247,7 @@ export class Page {
     this.watchPace(passed, source?.playing ?? false);
     source?.advance(passed);
     if (!this.meta || !source) return;
-    if (source.playing) this.overlay.links.flow(this.meta.systems, now);
+    if (source.playing) this.overlay.links.flow(this.meta.systems.filter(isSolid), now);
     this.draw(source, now);
     if (now >= this.slowDue) this.slow(this.meta, source, now);
   }
@@ -285,6 +272,7 @@ export class Page {
   draw(source, now) {
     const instant = source.take();
     if (instant) {
+      this.comparison.place(instant);
       this.instant = instant;
       this.scene.apply(instant, source.store);
       this.plots.setTime(instant.time);

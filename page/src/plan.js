@@ -107,7 +107,8 @@ export class Plan {
    * @param {number} time s
    */
   origin(time) {
-    return this.plan.velocity.map((v) => v * time);
+    const { offset } = this.system.shown;
+    return this.plan.velocity.map((v, axis) => v * time + offset[axis]);
   }
 
   /** Corners of the region, if it is of the size of a fleet, for the camera. */
@@ -124,6 +125,7 @@ export class Plan {
     const own = instant.systems[this.system.name];
     const [x, y] = this.origin(instant.time);
     const level = layout.floor + STEP;
+    this.group.visible = !this.system.shown.faint && !this.system.shown.off;
     if (this.region)
       for (const part of [this.region.fill, this.region.edge]) part.position.set(x, y, level);
     for (const distance of this.distances) this.placeDistance(distance, own, layout);

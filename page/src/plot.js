@@ -1,12 +1,12 @@
 // One plot over time: its caption, a chip for each line, and uPlot's chart.
 import uPlot from "uplot";
-import { captionOf, swatchOf } from "./caption.js";
-import { MOST_CHIPS, optionsOf } from "./chart.js";
-import { line } from "./colours.js";
-import { element, press } from "./dom.js";
+import { captionOf } from "./caption.js";
+import { optionsOf } from "./chart.js";
+import { Chips } from "./chips.js";
+import { element } from "./dom.js";
+import { Lines } from "./lines.js";
 import { Reading } from "./reading.js";
 import { movingBoundsOf } from "./specs.js";
-import { colour } from "./theme.js";
 import { exitLine, TimeLine } from "./timeline.js";
 import { Hands, scaled } from "./window.js";
 import { decimals, fixed } from "./words.js";
@@ -29,7 +29,7 @@ export class Plot {
     this.plots = plots;
     this.spec = spec;
     this.look = look;
-    this.hidden = look.hidden; // lines that are switched off
+    this.lines = new Lines(plots, spec, look.hidden);
     /** @type {number | null} */
     this.hovered = null; // index into the samples
     /** @type {number | null} */
@@ -39,12 +39,9 @@ export class Plot {
     /** @type {MovingBound[]} */
     this.movingBounds = [];
     this.mouseInside = false;
-    this.chips = element("div", { class: "plot-chips" });
-    const shown = spec.columns.length;
-    this.several = spec.total > shown ? `${shown} of ${spec.total} shown` : "";
-    this.note = element("span", { class: "plot-note", text: this.several });
+    this.chips = new Chips(this);
     this.reading = new Reading(this);
-    const name = `${spec.system.name}: ${spec.title} over time`;
+    const name = `${[spec.whose, spec.title].filter(Boolean).join(": ")} over time`;
     this.chart = element("div", {
       class: "chart",
       tabindex: 0,
@@ -54,73 +51,21 @@ export class Plot {
       onblur: () => this.reading.at(null),
     });
     this.root = element("figure", { class: "plot", "aria-label": name });
-    this.root.append(captionOf(this), this.chips, this.chart, this.reading.spoken);
+    this.root.append(captionOf(this), this.chips.root, this.chart, this.reading.spoken);
     this.timeLine = new TimeLine(element("div", { class: "time-line" }));
-    this.exitLine = new TimeLine(exitLine());
-    this.values = shown > MOST_CHIPS ? [] : spec.labels.map((_, k) => this.addChip(k));
-    this.readout = element("span", { class: "readout" });
-    if (!this.values.length) this.chips.append(this.readout);
-    this.chips.append(this.note);
-  }
-
-  /**
-   * Colour and dash of the k-th line.
-   * @param {number} k
-   */
-  lineOf(k) {
-    const { spec } = this;
-    if (spec.total === 1) return { colour: colour("text"), dash: [] };
-    return line(spec.agents[k] ?? spec.columns[k]);
-  }
-
-  /**
-   * The chip of the k-th line, which switches it; returns where its value is written.
-   * @param {number} k
-   */
-  addChip(k) {
-    const { spec } = this;
-    const value = element("span", { class: "chip-value", "aria-hidden": true });
-    const what = `${spec.noun} ${spec.labels[k]}`.trim();
-    const chip = element(
-      "button",
-      {
-        type: "button",
-        class: "plot-chip",
-        title: `${what}: click switches the line, a double click shows it alone`,
-        "aria-label": `line of ${what}`,
-        onmouseenter: () => this.point(k),
-        onmouseleave: () => this.point(null),
-        onclick: () => this.toggle(k),
-        ondblclick: () => this.showOnly(k),
-      },
-      swatchOf(this.lineOf(k)),
-      spec.total === 1 ? "" : spec.shorts[k],
-      value,
-    );
-    press(chip, !this.hidden.has(k));
-    this.chips.append(chip);
-    return value;
-  }
-
-  /** @param {number} k */
-  toggle(k) {
-    if (!this.hidden.delete(k)) this.hidden.add(k);
-    this.showLines();
-  }
-
-  /** @param {number} k */
-  showOnly(k) {
-    this.hidden.clear();
-    for (const each of this.spec.columns.keys()) if (each !== k) this.hidden.add(each);
-    this.showLines();
+    this.exitLines = spec.systems.map((system) => ({
+      system,
+      line: new TimeLine(exitLine(plots.headingOf(system.run))),
+    }));
   }
 
   showLines() {
-    const { uplot, hidden } = this;
+    const { lines, spec, uplot } = this;
     uplot?.batch(() => {
-      for (const k of this.spec.columns.keys()) uplot.setSeries(k + 1, { show: !hidden.has(k) });
+      for (const k of spec.lines.keys()) uplot.setSeries(k + 1, { show: lines.shows(k) });
     });
-    this.values.forEach((value, k) => value.parentElement && press(value.parentElement, !hidden.has(k)));
+    this.chips.press();
+    this.writeValues();
   }
 
   /**
@@ -134,8 +79,8 @@ export class Plot {
 
   /** @param {number | null} k */
   tell(k) {
-    const agent = k === null ? null : this.spec.agents[k];
-    const which = agent === null ? null : { system: this.spec.system.name, agent };
+    const { agent = null, system } = k === null ? {} : this.spec.lines[k];
+    const which = agent === null || !system ? null : { system: system.name, agent };
     this.plots.callbacks.highlight(which, this);
   }
 
@@ -143,21 +88,15 @@ export class Plot {
   focus(k) {
     if (this.focused === k) return;
     this.focused = k;
-    this.markChip(k);
+    this.chips.mark(k);
     this.uplot?.setSeries(k === null ? /** @type {any} */ (null) : k + 1, { focus: true });
-  }
-
-  /** @param {number | null} k */
-  markChip(k) {
-    this.values.forEach((value, each) =>
-      value.parentElement?.classList.toggle("chosen", each === k),
-    );
   }
 
   /** @param {Agent | null} which */
   highlight(which) {
-    const own = which?.system === this.spec.system.name;
-    const k = own ? this.spec.agents.indexOf(which.agent) : -1;
+    const k = this.spec.lines.findIndex(
+      ({ system, agent }) => system.name === which?.system && agent === which.agent,
+    );
     this.focus(k < 0 ? null : k);
   }
 
@@ -180,8 +119,9 @@ export class Plot {
     this.uplot?.destroy();
     this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
     const { over } = this.uplot;
-    over.append(this.timeLine.root, this.exitLine.root);
-    this.timeLine.x = this.exitLine.x = NaN;
+    const lines = [this.timeLine, ...this.exitLines.map((each) => each.line)];
+    for (const each of lines) each.x = NaN;
+    over.append(...lines.map(({ root }) => root));
     new Hands(this, this.uplot);
     over.addEventListener("mouseenter", () => (this.mouseInside = true));
     over.addEventListener("mouseleave", () => {
@@ -205,7 +145,7 @@ export class Plot {
   /** The columns as they are. */
   columns() {
     const { store } = this.plots.source;
-    return this.spec.columns.map((k) => store.column(this.spec.array, k));
+    return this.spec.lines.map(({ array, column }) => store.column(array, column));
   }
 
   /** @returns {uPlot.AlignedData} */
@@ -269,7 +209,7 @@ export class Plot {
     const focused = k === null || k === undefined ? null : k - 1;
     if (focused === this.focused) return;
     this.focused = focused;
-    this.markChip(focused);
+    this.chips.mark(focused);
     this.tell(focused);
   }
 
@@ -282,13 +222,15 @@ export class Plot {
   setTime(t) {
     if (!this.uplot) return;
     this.timeLine.place(this.uplot, t);
-    const exit = this.plots.source.exits[this.spec.system.name];
-    const { root } = this.exitLine;
-    root.hidden = !Number.isFinite(exit);
-    if (root.hidden) return;
-    this.exitLine.place(this.uplot, exit);
-    const [from, to] = this.plots.window;
-    root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+    for (const { system, line: own } of this.exitLines) {
+      const exit = this.plots.source.exits[system.name];
+      const { root } = own;
+      root.hidden = !Number.isFinite(exit) || this.plots.hiddenRuns.has(system.run);
+      if (root.hidden) continue;
+      own.place(this.uplot, exit);
+      const [from, to] = this.plots.window;
+      root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+    }
   }
 
   /**
@@ -298,7 +240,7 @@ export class Plot {
   valueText(k, i) {
     const { store } = this.plots.source;
     const value = this.uplot?.data[k + 1][i] ?? null;
-    return fixed(value, decimals(store.greatest(this.spec.array)));
+    return fixed(value, decimals(store.greatest(this.spec.lines[k].array)));
   }
 
   /** Values at the mouse, or now. */
@@ -308,13 +250,6 @@ export class Plot {
     const i = this.hovered ?? u.valToIdx(this.plots.now);
     const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
     const turned = this.turned ? "margin −g, log" : this.look.log ? "log" : "";
-    this.note.textContent = [this.several, turned, hover].filter(Boolean).join(" · ");
-    this.values.forEach((place, k) => (place.textContent = this.valueText(k, i)));
-    if (this.values.length) return;
-    const { spec, focused: k } = this;
-    this.readout.textContent =
-      k === null
-        ? "point at a line for its value"
-        : `${spec.noun} ${spec.labels[k]}: ${this.valueText(k, i)} ${spec.unit}`.trim();
+    this.chips.write(i, [turned, hover]);
   }
 }

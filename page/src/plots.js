@@ -1,7 +1,7 @@
 // Plots over time, one below the other: each system's actions and bounded quantities.
 import { element } from "./dom.js";
 import { Plot } from "./plot.js";
-import { specsOf } from "./specs.js";
+import { plottedOf } from "./compared.js";
 import { scaled, STEP, within } from "./window.js";
 import { number } from "./words.js";
 /** @import { Look } from "./plot.js" */
@@ -39,6 +39,10 @@ export class Plots {
     this.stretch = null; // of time that is shown; null: all
     /** @type {Map<string, Look>} */
     this.looks = new Map();
+    /** @type {Set<number>} */
+    this.hiddenRuns = new Set(); // of several
+    this.runs = element("div", { id: "run-keys", role: "group", "aria-label": "runs" });
+    this.left = element("p", { class: "muted small", id: "plots-left", hidden: true });
     this.shown = element("span", { class: "muted", role: "status" });
     this.all = this.tool("All", "All of the run (0)", () => this.showAll());
     this.tools = element(
@@ -73,13 +77,17 @@ export class Plots {
     }
     this.meta = meta;
     this.source = source;
-    this.plots = meta.systems.flatMap(specsOf).map((spec) => {
-      const key = `${spec.array} ${spec.axis}`;
+    const { specs, left } = plottedOf(meta);
+    this.left.textContent = left;
+    this.left.hidden = !left;
+    this.plots = specs.map((spec) => {
+      const key = `${spec.lines[0].array} ${spec.axis}`;
       const look = this.looks.get(key) ?? { hidden: new Set(), log: false, values: null };
       this.looks.set(key, look);
       return new Plot(this, spec, look);
     });
-    this.column.replaceChildren(this.tools, ...this.plots.map((plot) => plot.root));
+    const figures = this.plots.map((plot) => plot.root);
+    this.column.replaceChildren(this.tools, this.runs, ...figures, this.left);
     this.size = "";
     this.resize();
     this.tellStretch();
@@ -168,11 +176,11 @@ export class Plots {
 
   /** Height of a chart in px, for as many as fit. */
   room() {
-    const { column, plots, tools } = this;
+    const { column, plots, tools, runs, left } = this;
     if (getComputedStyle(column).overflowY === "visible") return PART * innerHeight; // it grows
     const extra = plots.reduce(
       (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-      tools.offsetHeight,
+      tools.offsetHeight + runs.offsetHeight + left.offsetHeight,
     );
     return (column.clientHeight - extra - 16) / Math.max(plots.length, 1);
   }
@@ -186,6 +194,19 @@ export class Plots {
 
   refresh() {
     for (const plot of this.plots) plot.refresh();
+  }
+
+  /** Other lines are switched on, or those of another run. */
+  showLines() {
+    for (const plot of this.plots) plot.showLines();
+  }
+
+  /**
+   * The heading of a run, where there are several.
+   * @param {number} run
+   */
+  headingOf(run) {
+    return this.meta?.runs?.[run].heading ?? "";
   }
 
   /** @param {number} t */
@@ -207,12 +228,12 @@ export class Plots {
   }
 
   describe() {
-    return this.plots.map(({ spec, uplot, look, movingBounds }) => ({
-      system: spec.system.name,
+    return this.plots.map(({ spec, uplot, look, lines, movingBounds }) => ({
+      system: spec.whose,
       name: spec.name,
       axis: spec.axis,
       title: spec.title,
-      series: [...spec.labels],
+      series: spec.lines.map(({ label }) => label),
       total: spec.total,
       bounds: spec.bounds.map(({ value }) => value),
       moving: movingBounds.length,
@@ -221,6 +242,9 @@ export class Plots {
       time: uplot && [uplot.scales.x.min, uplot.scales.x.max],
       values: uplot && [uplot.scales.y.min, uplot.scales.y.max],
       hidden: [...look.hidden],
+      shown: [...spec.lines.keys()].map((k) => lines.shows(k)),
+      colours: [...spec.lines.keys()].map((k) => lines.lookOf(k).colour),
+      dashes: [...spec.lines.keys()].map((k) => lines.lookOf(k).dash),
       log: look.log,
     }));
   }

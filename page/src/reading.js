@@ -61,8 +61,8 @@ export class Reading {
    */
   sentence(u, i) {
     const { spec } = this.plot;
-    const on = [...spec.labels.keys()].filter((k) => !this.plot.hidden.has(k)).slice(0, MOST_CHIPS);
-    const values = on.map((k) => `${spec.noun} ${spec.labels[k]} ${this.plot.valueText(k, i)}`);
+    const on = this.plot.lines.on.slice(0, MOST_CHIPS);
+    const values = on.map((k) => `${this.plot.lines.nameOf(k)} ${this.plot.valueText(k, i)}`);
     return `${fixed(u.data[0][i], 2)} s: ${values.join(", ")} ${spec.unit}`;
   }
 }

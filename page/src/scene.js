@@ -13,6 +13,7 @@ import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
 /** @import { Plan } from "./plan.js" */
 /** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
+const FAINT = 0.3; // opacity of what lies over another run
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 
 export class Scene {
@@ -121,7 +122,28 @@ export class Scene {
     this.nextLook = now + AGAIN;
     this.stale = false;
     this.ghosts.forget();
+    for (const system of this.fleets) this.fade(system);
     this.batches.build(this.objects);
+  }
+
+  /**
+   * What never moves of a system goes where it is drawn; what lies over another run is translucent.
+   * @param {System} system
+   */
+  fade({ items: [first, count], root, shown }) {
+    const still = nodeAt(this.viewer, root ?? "")?.children["<object>"]?.object;
+    if (still) {
+      [still.position.x, still.position.y] = shown.offset;
+      still.visible = !shown.faint && !shown.off;
+    }
+    for (const object of this.objects.slice(first, first + count))
+      object?.traverse((/** @type {Three} */ { material, userData }) => {
+        if (!material?.color) return;
+        const { opacity, transparent, depthWrite } = (userData.solid ??= { ...material });
+        material.opacity = shown.faint ? FAINT * opacity : opacity;
+        material.transparent = shown.faint || transparent;
+        material.depthWrite = !shown.faint && depthWrite;
+      });
   }
 
   staticMeshes() {
@@ -235,6 +257,12 @@ export class Scene {
     const { box, floor } = this.layout;
     let behind = box ? box.high[1] + 2.4 : 0;
     for (const bars of this.bars) {
+      const { over } = bars.system.shown;
+      const under = over && this.bars.find(({ system }) => system === over);
+      if (under) {
+        bars.update(instant, store, under.origin, under.scale);
+        continue;
+      }
       const span = box ? box.high[0] - box.low[0] : 0;
       const scale = box ? Math.min(Math.max((0.6 * span) / bars.width, 0.8), 6) : 1;
       const x = box ? (box.low[0] + box.high[0]) / 2 : 0;

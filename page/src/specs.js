@@ -8,22 +8,29 @@ const MOST_LINES = 40;
  *
  * @typedef {{values: (number | null)[], note: string}} MovingBound the same at each sample
  *
- * @typedef {object} Spec
+ * @typedef {object} Line
  * @property {System} system
+ * @property {string} array that a store has it under
+ * @property {number} column of the array
+ * @property {string} label
+ * @property {string} key the label, numbered where an earlier line has the same
+ * @property {number | null} agent from 0, if it is an agent's own
+ * @property {string[]} moving arrays of bounds that change in time, with the same columns
+ *
+ * @typedef {object} Spec
+ * @property {System[]} systems of which it is, one a run
+ * @property {string} whose what the systems are called
  * @property {string} name of the quantity, or "action"
  * @property {string} axis of the actions, if they have several
- * @property {string} array that a store has it under
  * @property {string} unit
- * @property {number[]} columns of the array
- * @property {number} total how many there are, of which columns are chosen
  * @property {string} title
  * @property {string} symbol TeX
- * @property {string[]} labels of the columns
- * @property {string[]} shorts the same without what all of them say
- * @property {(number | null)[]} agents from 0, of the columns that are an agent's own
  * @property {string} noun before a label
+ * @property {Line[]} lines
+ * @property {string[]} shorts labels of the lines without what all of them say
+ * @property {number[][]} groups lines with a key in common: one, or one of each run
+ * @property {number} total how many groups there are, of which some are chosen
  * @property {Bound[]} bounds
- * @property {string[]} moving arrays of bounds that change in time, with the same columns
  */
 
 /**
@@ -46,25 +53,41 @@ const shortOf = (labels) => {
   );
 };
 
-/** @returns {Omit<Spec, "total" | "shorts">[]} one for each axis of the actions */
+/**
+ * Labels with keys that tell equal ones apart.
+ * @param {string[]} labels
+ */
+const keyed = (labels) =>
+  labels.map((label, k) => {
+    const before = labels.slice(0, k).filter((each) => each === label).length;
+    return { label, key: before ? `${label} ${before + 1}` : label };
+  });
+
+/** @typedef {Omit<Spec, "total" | "shorts" | "groups">} Whole before lines are chosen */
+
+/** @returns {Whole[]} one for each axis of the actions */
 const actionsOf = (/** @type {System} */ system) => {
-  const { action, agent_name: agent } = system;
+  const { action, agent_name: noun } = system;
   return [...new Set(action.axis)].map((axis) => {
     const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
     return {
-      system,
+      systems: [system],
+      whose: system.name,
       name: "action",
       axis,
-      array: `${system.name}/action`,
       unit: action.unit,
-      columns,
       title: axis ? `${action.name}, ${axis}` : action.name,
       symbol: "",
-      labels: columns.map((k) => String(action.owner[k])),
-      agents: columns.map((k) => action.owner[k] - 1),
-      noun: agent,
+      noun,
+      lines: keyed(columns.map((column) => String(action.owner[column]))).map((named, k) => ({
+        ...named,
+        system,
+        array: `${system.name}/action`,
+        column: columns[k],
+        agent: action.owner[columns[k]] - 1,
+        moving: [],
+      })),
       bounds: [],
-      moving: [],
     };
   });
 };
@@ -72,24 +95,31 @@ const actionsOf = (/** @type {System} */ system) => {
 /**
  * @param {System} system
  * @param {Quantity} quantity
- * @returns {Omit<Spec, "total" | "shorts">}
+ * @returns {Whole}
  */
 const quantityOf = (system, quantity) => {
   const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
+  const moving = Object.values(quantity.moving_bounds).map(
+    (each) => `${system.name}/quantity/${each}`,
+  );
   return {
-    system,
+    systems: [system],
+    whose: system.name,
     name: quantity.name,
     axis: "",
-    array: `${system.name}/quantity/${quantity.name}`,
     unit: quantity.unit,
-    columns: [...quantity.labels.keys()],
     title: quantity.long_name,
     symbol: quantity.symbol,
-    labels: quantity.labels.map((each) => each || quantity.long_name),
-    agents: quantity.labels.map((_, k) => (ofAgents ? k : null)),
     noun: ofAgents ? system.agent_name : "",
+    lines: keyed(quantity.labels.map((label) => label || quantity.long_name)).map((named, column) => ({
+      ...named,
+      system,
+      array: `${system.name}/quantity/${quantity.name}`,
+      column,
+      agent: ofAgents ? column : null,
+      moving,
+    })),
     bounds: boundsOf(quantity),
-    moving: Object.values(quantity.moving_bounds).map((each) => `${system.name}/quantity/${each}`),
   };
 };
 
@@ -118,20 +148,22 @@ const boundsOf = ({ bound, lower_bound, labels }) => {
  * @param {Store} store
  * @returns {MovingBound[]}
  */
-export const movingBoundsOf = ({ moving, columns, shorts }, store) => {
-  /** @type {Map<string, {values: (number | null)[], whose: string[]}>} */
+export const movingBoundsOf = ({ lines, shorts }, store) => {
+  /** @type {Map<string, {values: (number | null)[], whose: Set<string>}>} */
   const found = new Map();
-  for (const array of moving)
-    columns.forEach((column, k) => {
+  lines.forEach(({ moving, column }, k) => {
+    for (const array of moving) {
       const values = store.column(array, column);
-      if (values.every((value) => value === null)) return;
+      if (values.every((value) => value === null)) continue;
       const key = values.join();
-      const known = found.get(key) ?? { values, whose: [] };
-      found.set(key, { values, whose: [...known.whose, shorts[k]] });
-    });
+      const known = found.get(key) ?? { values, whose: new Set() };
+      found.set(key, known);
+      known.whose.add(shorts[k]);
+    }
+  });
   return [...found.values()].map(({ values, whose }) => ({
     values,
-    note: noteOf(whose, columns.length),
+    note: noteOf([...whose], new Set(shorts).size),
   }));
 };
 
@@ -156,31 +188,31 @@ const evenly = (n, most) => {
 };
 
 /**
- * @param {Omit<Spec, "total" | "shorts">} spec
+ * A plot with so many lines as can be told apart.
+ * @param {Whole} whole
+ * @param {number} runs
  * @returns {Spec}
  */
-const thinned = (spec) => {
-  const total = spec.columns.length;
-  const chosen = evenly(total, MOST_LINES);
-  /** @type {<T>(values: T[]) => T[]} */
-  const pick = (values) => chosen.map((k) => values[k]);
+export const thinned = (whole, runs = 1) => {
+  const keys = [...new Set(whole.lines.map(({ key }) => key))];
+  const chosen = evenly(keys.length, Math.floor(MOST_LINES / runs)).map((k) => keys[k]);
+  const shorts = shortOf(keys.map((key) => whole.lines.find((line) => line.key === key)?.label ?? ""));
+  const lines = whole.lines.filter(({ key }) => chosen.includes(key));
   return {
-    ...spec,
-    total,
-    columns: pick(spec.columns),
-    shorts: pick(shortOf(spec.labels)),
-    labels: pick(spec.labels),
-    agents: pick(spec.agents),
+    ...whole,
+    total: keys.length,
+    lines,
+    shorts: lines.map(({ key }) => shorts[keys.indexOf(key)]),
+    groups: chosen.map((key) => [...lines.keys()].filter((k) => lines[k].key === key)),
   };
 };
 
 /**
  * What to plot of a system: actions by axis, then quantities.
  * @param {System} system
- * @returns {Spec[]}
+ * @returns {Whole[]}
  */
-export const specsOf = (system) =>
-  [
-    ...actionsOf(system),
-    ...system.quantities.map((quantity) => quantityOf(system, quantity)),
-  ].map(thinned);
+export const wholesOf = (system) => [
+  ...actionsOf(system),
+  ...system.quantities.map((quantity) => quantityOf(system, quantity)),
+];

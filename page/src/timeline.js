@@ -23,9 +23,10 @@ export class TimeLine {
   }
 }
 
-export const exitLine = () =>
+/** @param {string} whose run, if there are several */
+export const exitLine = (whose) =>
   element(
     "div",
     { class: "exit-line", hidden: true },
-    element("span", { text: "left the set" }),
+    element("span", { text: `${whose} left the set`.trim() }),
   );

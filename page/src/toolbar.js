@@ -89,7 +89,9 @@ export class Toolbar {
     byId("follow-label").hidden = fleets.length === 0;
     byId("follow").replaceChildren(
       element("option", { value: "fleet", text: "all" }),
-      ...fleets.flatMap(optionsOf),
+      ...(fleets.length > 1
+        ? fleets.map((fleet) => element("optgroup", { label: fleet.name }, ...optionsOf(fleet)))
+        : fleets.flatMap(optionsOf)),
       element("option", { value: "none", text: "nothing" }),
     );
   }

@@ -1,12 +1,36 @@
 // Play, step, speed and time: the bar below.
 import { byId, element } from "./dom.js";
+import { number } from "./words.js";
 /** @import { Page } from "./page.js" */
+/** @import { Playback } from "./playback.js" */
 /** @import { Intervention, Source } from "./types.d.ts" */
+
+/** @typedef {Intervention & {bad?: boolean, near?: boolean}} Mark */
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 
 /** @param {number | null} speed */
 const speedName = (speed) => (speed === null ? "max" : `×${speed}`);
+
+/**
+ * What is marked along the slider: exits, closest approaches and interventions of a replay.
+ * @param {Playback} playback
+ * @returns {Mark[]}
+ */
+export const marksOf = (playback) => {
+  const { exits, interventions, meta } = playback;
+  const left = Object.entries(exits).map(([name, time]) => ({
+    time,
+    what: `${name} left the set`,
+    bad: true,
+  }));
+  const near = meta.systems.flatMap((system) => {
+    const { margin, margin_time: time } = playback.stateOf(system);
+    const what = `${system.name}: closest approach, margin ${number(margin)}`;
+    return typeof time === "number" ? [{ time, what, near: true }] : [];
+  });
+  return [...interventions, ...near, ...left];
+};
 
 export class Transport {
   speedKey = ""; // of what the menu of speeds has
@@ -79,7 +103,7 @@ export class Transport {
 
   /**
    * Marks along the slider, each of which leads there.
-   * @param {(Intervention & {bad?: boolean, near?: boolean})[]} marks
+   * @param {Mark[]} marks
    * @param {number} end
    */
   mark(marks, end) {

@@ -52,6 +52,30 @@ export interface System {
   height: number; // m
   plan: Plan | null;
   tints: string[][]; // paths of what has each agent's colour
+  items: [number, number]; // the first of its items, and how many they are
+  root?: string; // the path below which a fleet is drawn
+  run: number; // from 0, where several are compared
+  shift: [number, number]; // m along x and y, by which it is drawn beside others of its run
+  beside: [number, number]; // m more, where runs are drawn beside each other
+  shown: Shown; // the page's own
+}
+
+/** How the page draws a system. */
+export interface Shown {
+  offset: [number, number]; // m along x and y, from where it was simulated
+  faint: boolean; // translucent, over another run's
+  off: boolean; // not at all
+  over: System | null; // the system of the other run
+  alike: string[]; // systems whose bars have one scale
+}
+
+/** One of several runs that are compared. */
+export interface Run {
+  name: string;
+  heading: string; // what is different of it, or its name
+  about: string; // all that is different
+  end: number; // s
+  systems: Record<string, string>; // what each of its systems is compared by
 }
 
 export interface Control {
@@ -99,6 +123,7 @@ export interface Scene {
   interventions?: Intervention[];
   scenario?: string | null; // a file's text, with what was done
   command_lengths?: number[];
+  runs?: Run[]; // if there are several
 }
 
 export interface Frame {
@@ -192,6 +217,9 @@ export interface Elements {
   "banner-close": HTMLButtonElement;
   lost: HTMLElement;
   "lost-text": HTMLElement;
+  "compare-label": HTMLElement;
+  compare: HTMLSelectElement;
+  "compare-note": HTMLElement;
   follow: HTMLSelectElement;
   "follow-label": HTMLElement;
   fit: HTMLButtonElement;

@@ -19,6 +19,7 @@ export const wire = (page) => {
     c: () => toolbar.toggleLinks(),
     g: () => toolbar.toggleGhosts(),
     p: fold,
+    b: () => page.comparison.toggle(),
     d: () => page.switchTheme(),
     "?": () => byId("help").showModal(),
     "[": () => scene.camera.nudge(-6, 1),

@@ -78,6 +78,7 @@
     light: ["#0072b2", "#c07c00", "#00805c", "#8c7a00", "#d55e00", "#a8518a", "#111111", "#2f62c9"]
   };
   var DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
+  var dashOf = (run) => DASHES[run];
   var line = (k) => {
     const colours2 = LINES[theme()];
     return {
@@ -105,6 +106,8 @@
     tint: (agent, system) => tintOf(page, agent, system),
     /** What lies on the ground under a system's robots: outputs, the region's middle, strips. */
     plan: (system) => planOf(page, system),
+    /** How each system is drawn, beside those of other runs or over them. */
+    compared: () => comparedOf(page),
     /** What is plotted. */
     get plots() {
       return page.plots.describe();
@@ -131,6 +134,14 @@
       discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius)
     };
   };
+  var comparedOf = ({ meta, scene }) => (meta?.systems ?? []).map(({ name, items: [first], drawn_as: as, shown: shown2 }) => {
+    const object = as === "fleet" ? scene.objects[first] : scene.bars.find(({ system }) => system.name === name)?.group;
+    let opacity = 1;
+    object?.traverse(({ material }) => {
+      if (material?.color) opacity = Math.min(opacity, material.opacity);
+    });
+    return { name, opacity, visible: object?.visible ?? false, offset: shown2.offset };
+  });
   var stateOf = ({ meta, mode: mode2, live, overlay, playback, scene, source, tuning }) => ({
     mode: mode2,
     replaying: playback !== null,
@@ -151,6 +162,125 @@
     interventions: source.interventions,
     systems: Object.fromEntries(meta.systems.map((each) => [each.name, source.stateOf(each)]))
   });
+
+  // src/export.js
+  var DIGITS = 9;
+  var download = (name, blob) => {
+    const url = URL.createObjectURL(blob);
+    element("a", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1e4);
+  };
+  var fileOf = ({ spec }) => [spec.whose, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
+  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  var csvOf = (plot) => {
+    const { spec, plots } = plot;
+    const [from, to] = plots.window;
+    const { time } = plots.source.store;
+    const columns = plot.columns();
+    const { on: on2 } = plot.lines;
+    const unit = spec.unit ? ` (${spec.unit})` : "";
+    const names = on2.map((k) => quoted(plot.lines.nameOf(k) + unit));
+    const rows = [["time (s)", ...names].join(",")];
+    time.forEach((t, i) => {
+      if (t < from || t > to) return;
+      const values = on2.map((k) => columns[k][i]);
+      const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
+      rows.push(texts.join(","));
+    });
+    return [...rows, ""].join("\n");
+  };
+  var saveCsv = (plot) => download(`${fileOf(plot)}.csv`, new Blob([csvOf(plot)], { type: "text/csv" }));
+  var pictureOf = (plot) => {
+    const { lines, uplot, spec } = plot;
+    if (!uplot) return null;
+    const chart = uplot.ctx.canvas;
+    const ratio = chart.width / uplot.width;
+    const { on: on2 } = lines;
+    const several = spec.systems.length > 1;
+    const wide = several ? 230 : 110;
+    const perRow = Math.max(1, Math.floor(uplot.width / wide));
+    const key = on2.length > 14 || spec.total === 1 && !several ? [] : on2;
+    const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
+    const canvas = element("canvas", {
+      width: chart.width,
+      height: chart.height + ratio * (above + below)
+    });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      canvas.getContext("2d")
+    );
+    context.fillStyle = colour("panel");
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(chart, 0, ratio * above);
+    context.scale(ratio, ratio);
+    context.textBaseline = "middle";
+    context.fillStyle = colour("text");
+    context.font = "600 14px system-ui, sans-serif";
+    context.fillText([spec.whose, spec.title].filter(Boolean).join(": "), 8, above / 2);
+    context.font = "12px system-ui, sans-serif";
+    key.forEach((k, n) => {
+      const look = lines.lookOf(k);
+      const x = 8 + wide * (n % perRow);
+      const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
+      Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
+      context.setLineDash(look.dash);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x + 20, y);
+      context.stroke();
+      context.fillText(lines.shortOf(k), x + 26, y, wide - 30);
+    });
+    return canvas;
+  };
+  var savePng = (plot) => pictureOf(plot)?.toBlob((blob) => blob && download(`${fileOf(plot)}.png`, blob));
+
+  // src/caption.js
+  var symbolOf = (tex) => {
+    const plain = tex.replace(/\\(lVert|rVert|Vert|\|)/g, "‖").replace(/\\(left|right|,|;|mathrm|text)/g, "").replace(/-/g, "−");
+    if (!plain || /[\\^]/.test(plain)) return null;
+    const made = element("span", { class: "symbol" });
+    for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
+      made.append(other ?? element("sub", { text: sub ?? one }));
+    return made;
+  };
+  var captionOf = (plot) => {
+    const { spec } = plot;
+    const what = `${spec.whose} ${spec.title}`.trim();
+    const tool = (text, title, act) => element("button", { type: "button", text, title, "aria-label": `${title}: ${what}`, onclick: act });
+    const log = tool("log", "Logarithmic scale", () => {
+      plot.setLogarithmic(!plot.look.log);
+      press(log, plot.look.log);
+    });
+    press(log, plot.look.log);
+    log.className = "toggle";
+    return element(
+      "figcaption",
+      {},
+      element("span", { class: "plot-system", text: spec.whose }),
+      element("span", { class: "plot-title", text: spec.title }),
+      symbolOf(spec.symbol),
+      element(
+        "span",
+        { class: "plot-tools" },
+        log,
+        tool("CSV", "Save the numbers that are shown", () => saveCsv(plot)),
+        tool("PNG", "Save the picture", () => savePng(plot))
+      )
+    );
+  };
+  var swatchOf = (look) => {
+    const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
+    const context = (
+      /** @type {CanvasRenderingContext2D} */
+      made.getContext("2d")
+    );
+    Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
+    context.setLineDash(look.dash.map((length) => 1.6 * length));
+    context.moveTo(0, 3);
+    context.lineTo(28, 3);
+    context.stroke();
+    return made;
+  };
 
   // src/words.js
   var number = (value, digits = 3) => {
@@ -173,6 +303,150 @@
     return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
   };
   var outside = (word) => status(word).kind === "bad";
+
+  // src/compare.js
+  var BELOW = 0.7;
+  var isSolid = ({ shown: shown2 }) => !shown2.faint && !shown2.off;
+  var offsetOf = ({ shift, beside }, ghosts) => ghosts ? shift : [shift[0] + beside[0], shift[1] + beside[1]];
+  var Comparison = class {
+    /** @param {Page} page */
+    constructor(page) {
+      this.page = page;
+      this.hidden = page.plots.hiddenRuns;
+      this.ghosts = false;
+      this.meta = null;
+      byId("compare").onchange = () => this.setGhosts(byId("compare").value === "ghosts");
+    }
+    /** @returns {Run[]} none where there is only one */
+    get runs() {
+      return this.meta?.runs ?? [];
+    }
+    /** @param {Scene} meta */
+    setMeta(meta) {
+      this.meta = meta;
+      this.hidden.clear();
+      this.arrange();
+      byId("compare-label").hidden = !meta.runs;
+      this.page.plots.runs.replaceChildren(...this.runs.map((run, k) => this.keyOf(run, k)));
+      this.restyle();
+    }
+    /** Where each system is drawn, and how. */
+    arrange() {
+      const systems = this.meta?.systems ?? [];
+      const first = systems.find(({ run }) => !this.hidden.has(run))?.run ?? 0;
+      for (const system of systems) {
+        const alike = systems.filter((each) => this.comparedBy(each) === this.comparedBy(system));
+        const off2 = this.hidden.has(system.run);
+        const faint = this.ghosts && !off2 && system.run !== first;
+        system.shown = {
+          offset: offsetOf(system, this.ghosts),
+          faint,
+          off: off2,
+          over: faint && alike.find(({ run }) => run === first) || null,
+          alike: alike.map(({ name }) => name)
+        };
+      }
+    }
+    /**
+     * What systems of several runs have in common.
+     * @param {System} system
+     */
+    comparedBy({ name, run }) {
+      return this.runs[run]?.systems[name] ?? name;
+    }
+    /** @param {boolean} ghosts */
+    setGhosts(ghosts) {
+      this.ghosts = ghosts;
+      byId("compare").value = ghosts ? "ghosts" : "beside";
+      this.changed();
+    }
+    toggle() {
+      if (this.runs.length) this.setGhosts(!this.ghosts);
+    }
+    /** @param {number} run */
+    toggleRun(run) {
+      if (!this.hidden.delete(run)) this.hidden.add(run);
+      this.restyle();
+      this.page.plots.showLines();
+      this.changed();
+    }
+    changed() {
+      const { scene, source } = this.page;
+      this.arrange();
+      this.tell();
+      scene.stale = true;
+      source?.seek(source.time);
+    }
+    /** Keys of runs in the theme's colours. */
+    restyle() {
+      [...this.page.plots.runs.children].forEach((key, run) => {
+        key.querySelector("canvas")?.replaceWith(this.swatch(run));
+        press(
+          /** @type {HTMLElement} */
+          key,
+          !this.hidden.has(run)
+        );
+      });
+      this.tell();
+    }
+    /** @param {number} run */
+    swatch(run) {
+      return swatchOf({ colour: colour("text"), dash: dashOf(run) });
+    }
+    /**
+     * The key of a run, which switches it.
+     * @param {Run} run
+     * @param {number} k
+     */
+    keyOf({ name, heading, about, end }, k) {
+      const ends = this.runs.some((each) => each.end !== end) ? `to ${number(end, 4)} s` : "";
+      const more = [name === heading ? "" : name, ends].filter(Boolean).join(", ");
+      return element(
+        "button",
+        {
+          type: "button",
+          class: "plot-chip run-key",
+          title: `${name}: ${about}. A click switches this run.`,
+          onclick: () => this.toggleRun(k)
+        },
+        this.swatch(k),
+        element("b", { text: heading }),
+        element("span", { class: "muted", text: more })
+      );
+    }
+    /** What is solid, in the legend. */
+    tell() {
+      const note = byId("compare-note");
+      note.hidden = !this.ghosts || !this.runs.length;
+      const seen = this.runs.filter((_2, k) => !this.hidden.has(k)).map(({ heading }) => heading);
+      const others = seen.length > 1 ? `; translucent: ${seen.slice(1).join("; ")}` : "";
+      note.textContent = `solid: ${seen[0] ?? "none"}${others}`;
+    }
+    /**
+     * An instant with all runs where they are drawn.
+     * @param {Instant} instant
+     */
+    place(instant) {
+      if (!this.runs.length || !instant.poses) return;
+      const poses = Float64Array.from(instant.poses);
+      instant.poses = poses;
+      for (const { name, agents, items, shift, shown: shown2 } of this.meta?.systems ?? []) {
+        const [first, count] = items;
+        for (let p = 8 * first; p < 8 * (first + count); p += 8) {
+          for (const axis of [0, 1]) poses[p + axis] += shown2.offset[axis] - shift[axis];
+          if (shown2.off) poses[p + 7] = 0;
+        }
+        if (shown2.off) instant.systems[name].there = new Float64Array(agents);
+      }
+    }
+  };
+  var headingTexts = (systems, runs, layout) => systems.filter((system) => system.drawn_as === "fleet" && isSolid(system)).map((system) => {
+    const places = [...Array(system.agents).keys()].map((k) => layout.agentAt(system, k));
+    const middle = places.reduce((sum, [x]) => sum + x, 0) / places.length;
+    const front = Math.min(...places.map(([, y]) => y)) - BELOW;
+    const point = [middle, front, layout.floor];
+    return { point, text: runs[system.run].heading, bold: true, title: true };
+  });
 
   // src/header.js
   var Header = class {
@@ -269,74 +543,6 @@
     const when = at === void 0 ? "" : ` at ${number(at, 4)} s`;
     return `${system.name}: ${status(word).words}${when}${message ? `: ${message}` : ""}`;
   };
-
-  // src/export.js
-  var DIGITS = 9;
-  var download = (name, blob) => {
-    const url = URL.createObjectURL(blob);
-    element("a", { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1e4);
-  };
-  var fileOf = ({ spec }) => [spec.system.name, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
-  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  var csvOf = (plot) => {
-    const { spec, plots, hidden } = plot;
-    const [from, to] = plots.window;
-    const { time } = plots.source.store;
-    const columns = plot.columns();
-    const on2 = [...columns.keys()].filter((k) => !hidden.has(k));
-    const unit = spec.unit ? ` (${spec.unit})` : "";
-    const names = on2.map((k) => quoted(`${spec.noun} ${spec.labels[k]}`.trim() + unit));
-    const rows = [["time (s)", ...names].join(",")];
-    time.forEach((t, i) => {
-      if (t < from || t > to) return;
-      const values = on2.map((k) => columns[k][i]);
-      const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
-      rows.push(texts.join(","));
-    });
-    return [...rows, ""].join("\n");
-  };
-  var saveCsv = (plot) => download(`${fileOf(plot)}.csv`, new Blob([csvOf(plot)], { type: "text/csv" }));
-  var pictureOf = ({ uplot, spec, hidden, lineOf }) => {
-    if (!uplot) return null;
-    const chart = uplot.ctx.canvas;
-    const ratio = chart.width / uplot.width;
-    const on2 = [...spec.labels.keys()].filter((k) => !hidden.has(k));
-    const perRow = Math.max(1, Math.floor(uplot.width / 110));
-    const key = on2.length > 14 || spec.total === 1 ? [] : on2;
-    const [above, below] = [26, 8 + 18 * Math.ceil(key.length / perRow)];
-    const canvas = element("canvas", {
-      width: chart.width,
-      height: chart.height + ratio * (above + below)
-    });
-    const context = (
-      /** @type {CanvasRenderingContext2D} */
-      canvas.getContext("2d")
-    );
-    context.fillStyle = colour("panel");
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(chart, 0, ratio * above);
-    context.scale(ratio, ratio);
-    context.textBaseline = "middle";
-    context.fillStyle = colour("text");
-    context.font = "600 14px system-ui, sans-serif";
-    context.fillText(`${spec.system.name}: ${spec.title}`, 8, above / 2);
-    context.font = "12px system-ui, sans-serif";
-    key.forEach((k, n) => {
-      const look = lineOf.call({ spec }, k);
-      const x = 8 + 110 * (n % perRow);
-      const y = above + uplot.height + 12 + 18 * Math.floor(n / perRow);
-      Object.assign(context, { strokeStyle: look.colour, lineWidth: 2 });
-      context.setLineDash(look.dash);
-      context.beginPath();
-      context.moveTo(x, y);
-      context.lineTo(x + 20, y);
-      context.stroke();
-      context.fillText(spec.shorts[k], x + 26, y, 80);
-    });
-    return canvas;
-  };
-  var savePng = (plot) => pictureOf(plot)?.toBlob((blob) => blob && download(`${fileOf(plot)}.png`, blob));
 
   // src/notices.js
   var MOST = 3;
@@ -1042,14 +1248,16 @@
       this.links = new Links(this.context, scene);
       this.labelled = true;
       this.systems = [];
+      this.runs = [];
       this.orders = /* @__PURE__ */ new Map();
       this.taken = [];
       this.marks = [];
       this.highlighted = null;
     }
     /** @param {Meta} meta */
-    setMeta({ systems }) {
+    setMeta({ systems, runs = [] }) {
       this.systems = systems;
+      this.runs = runs;
       this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
       this.links.begin();
     }
@@ -1074,8 +1282,11 @@
       context.clearRect(0, 0, w, h);
       this.taken = [];
       this.marks = [];
-      this.links.draw(this.systems, instant, now);
-      for (const system of this.systems)
+      const solid = this.systems.filter(isSolid);
+      this.links.draw(solid, instant, now);
+      if (this.runs.length && solid.length === this.systems.length)
+        for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
+      for (const system of solid)
         if (system.drawn_as === "bars") this.barTexts(system);
         else if (this.labelled) this.labels(system, instant);
       this.distances();
@@ -5802,54 +6013,6 @@
     paths.spline = monotoneCubic;
   }
 
-  // src/caption.js
-  var symbolOf = (tex) => {
-    const plain = tex.replace(/\\(lVert|rVert|Vert|\|)/g, "‖").replace(/\\(left|right|,|;|mathrm|text)/g, "").replace(/-/g, "−");
-    if (!plain || /[\\^]/.test(plain)) return null;
-    const made = element("span", { class: "symbol" });
-    for (const [, sub, one, other] of plain.matchAll(/_\{([^}]*)\}|_(\w)|([^_]+)/g))
-      made.append(other ?? element("sub", { text: sub ?? one }));
-    return made;
-  };
-  var captionOf = (plot) => {
-    const { spec } = plot;
-    const what = `${spec.system.name}, ${spec.title}`;
-    const tool = (text, title, act) => element("button", { type: "button", text, title, "aria-label": `${title}: ${what}`, onclick: act });
-    const log = tool("log", "Logarithmic scale", () => {
-      plot.setLogarithmic(!plot.look.log);
-      press(log, plot.look.log);
-    });
-    press(log, plot.look.log);
-    log.className = "toggle";
-    return element(
-      "figcaption",
-      {},
-      element("span", { class: "plot-system", text: spec.system.name }),
-      element("span", { class: "plot-title", text: spec.title }),
-      symbolOf(spec.symbol),
-      element(
-        "span",
-        { class: "plot-tools" },
-        log,
-        tool("CSV", "Save the numbers that are shown", () => saveCsv(plot)),
-        tool("PNG", "Save the picture", () => savePng(plot))
-      )
-    );
-  };
-  var swatchOf = (look) => {
-    const made = element("canvas", { class: "swatch", width: 28, height: 6, "aria-hidden": true });
-    const context = (
-      /** @type {CanvasRenderingContext2D} */
-      made.getContext("2d")
-    );
-    Object.assign(context, { strokeStyle: look.colour, lineWidth: 5 });
-    context.setLineDash(look.dash.map((length) => 1.6 * length));
-    context.moveTo(0, 3);
-    context.lineTo(28, 3);
-    context.stroke();
-    return made;
-  };
-
   // src/chart.js
   var MOST_CHIPS = 14;
   var FONT = "12px system-ui, sans-serif";
@@ -5865,7 +6028,7 @@
       y: { distr: plot.look.log ? 3 : 1, range: (u, low, high) => valuesOf(plot, u, low, high) }
     },
     axes: axesOf(plot.spec.unit, plot.look.log),
-    series: [{}, ...plot.spec.labels.map((label, k) => seriesOf(plot, label, k))],
+    series: [{}, ...plot.spec.lines.map(({ label }, k) => seriesOf(plot, label, k))],
     focus: { alpha: 0.22 },
     cursor: {
       drag: { x: false, y: false },
@@ -5917,12 +6080,12 @@
     ];
   };
   var seriesOf = (plot, label, k) => {
-    const look = plot.lineOf(k);
+    const look = plot.lines.lookOf(k);
     return {
       label,
       stroke: look.colour,
       dash: look.dash.length ? look.dash : void 0,
-      width: plot.spec.columns.length > MOST_CHIPS ? 1 : 1.75,
+      width: plot.spec.groups.length > MOST_CHIPS ? 1 : 1.75,
       points: { show: false },
       spanGaps: false
     };
@@ -5953,7 +6116,7 @@
     context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     context.clip();
     drawInterventions(u, plot.plots.source.interventions);
-    drawApproach(u, plot);
+    for (const system of plot.spec.systems) drawApproach(u, plot, system);
     if (plot.look.log) return context.restore();
     drawBounds(u, plot.spec);
     drawMovingBounds(u, plot.movingBounds);
@@ -5972,8 +6135,9 @@
       context.stroke();
     }
   };
-  var drawApproach = (u, { spec, plots }) => {
-    const { margin_time: time } = plots.source.stateOf(spec.system);
+  var drawApproach = (u, { spec, plots }, system) => {
+    if (plots.hiddenRuns.has(system.run)) return;
+    const { margin_time: time } = plots.source.stateOf(system);
     if (typeof time !== "number") return;
     const { ctx: context, bbox } = u;
     const ratio = uPlot.pxRatio;
@@ -5984,7 +6148,7 @@
     context.lineTo(x - 5 * ratio, bbox.top);
     context.lineTo(x + 5 * ratio, bbox.top);
     context.fill();
-    if (spec.name !== "constraint") return;
+    if (spec.name !== "constraint" || spec.systems.length > 1) return;
     context.font = `${12 * ratio}px system-ui, sans-serif`;
     context.textBaseline = "top";
     const leftward = x > bbox.left + 0.7 * bbox.width;
@@ -6039,6 +6203,165 @@
       );
       const right = Math.min(x, bbox.left + bbox.width - 4 * ratio);
       context.fillText(`bound${note}`, right, y - 2 * ratio);
+    }
+  };
+
+  // src/chips.js
+  var Chips = class {
+    /** @param {Plot} plot */
+    constructor(plot) {
+      const { spec } = plot;
+      const shown2 = spec.groups.length;
+      this.plot = plot;
+      this.root = element("div", { class: "plot-chips" });
+      this.several = spec.total > shown2 ? `${shown2} of ${spec.total} shown` : "";
+      this.note = element("span", { class: "plot-note", text: this.several });
+      this.values = shown2 > MOST_CHIPS ? [] : spec.groups.map((_2, group) => this.add(group));
+      this.readout = element("span", { class: "readout" });
+      this.root.append(...this.values.length ? [] : [this.readout], this.note);
+    }
+    /**
+     * The chip of a group of lines; returns where their values are written.
+     * @param {number} group
+     */
+    add(group) {
+      const { plot } = this;
+      const { spec, lines } = plot;
+      const [k] = spec.groups[group];
+      const value = element("span", { class: "chip-value", "aria-hidden": true });
+      const what = `${spec.noun} ${spec.lines[k].label}`.trim();
+      const chip = element(
+        "button",
+        {
+          type: "button",
+          class: "plot-chip",
+          title: `${what}: click switches the line, a double click shows it alone`,
+          "aria-label": `line of ${what}`,
+          onmouseenter: () => plot.point(k),
+          onmouseleave: () => plot.point(null),
+          onclick: () => this.change(() => lines.toggle(group)),
+          ondblclick: () => this.change(() => lines.showOnly(group))
+        },
+        swatchOf(lines.lookOf(k)),
+        spec.total === 1 ? "" : spec.shorts[k],
+        value
+      );
+      this.root.append(chip);
+      return value;
+    }
+    /** @param {() => void} act */
+    change(act) {
+      act();
+      this.plot.showLines();
+    }
+    /** Says which lines are on. */
+    press() {
+      const { hidden } = this.plot.lines;
+      this.values.forEach(
+        (value, group) => value.parentElement && press(value.parentElement, !hidden.has(group))
+      );
+    }
+    /**
+     * The chip of a line stands out.
+     * @param {number | null} k
+     */
+    mark(k) {
+      const chosen = k === null ? -1 : this.plot.lines.groupOf(k);
+      this.values.forEach(
+        (value, group) => value.parentElement?.classList.toggle("chosen", group === chosen)
+      );
+    }
+    /**
+     * Values at a sample.
+     * @param {number} i
+     * @param {string[]} notes what else is said of the plot
+     */
+    write(i, notes) {
+      const { plot } = this;
+      const { spec, lines, focused: k } = plot;
+      this.note.textContent = [this.several, ...notes].filter(Boolean).join(" · ");
+      this.values.forEach((place, group) => {
+        const seen = spec.groups[group].filter((each) => lines.runOn(each));
+        place.textContent = seen.map((each) => plot.valueText(each, i)).join(" / ");
+      });
+      if (this.values.length) return;
+      this.readout.textContent = k === null ? "point at a line for its value" : `${lines.nameOf(k)}: ${plot.valueText(k, i)} ${spec.unit}`.trim();
+    }
+  };
+
+  // src/lines.js
+  var Lines = class {
+    /**
+     * @param {Plots} plots
+     * @param {Spec} spec
+     * @param {Set<number>} hidden groups of lines that are switched off
+     */
+    constructor(plots, spec, hidden) {
+      this.plots = plots;
+      this.spec = spec;
+      this.hidden = hidden;
+    }
+    /**
+     * Colour and dash of the k-th line.
+     * @param {number} k
+     */
+    lookOf(k) {
+      const { spec } = this;
+      const { agent, column, system } = spec.lines[k];
+      const look = spec.total === 1 ? { colour: colour("text"), dash: [] } : line(agent ?? column);
+      return spec.systems.length > 1 ? { ...look, dash: dashOf(system.run) } : look;
+    }
+    /**
+     * What the k-th line is.
+     * @param {number} k
+     */
+    nameOf(k) {
+      const { label, system } = this.spec.lines[k];
+      const whose = this.spec.systems.length > 1 ? `, ${this.plots.headingOf(system.run)}` : "";
+      return `${this.spec.noun} ${label}`.trim() + whose;
+    }
+    /**
+     * The same in few characters.
+     * @param {number} k
+     */
+    shortOf(k) {
+      const { shorts, systems, lines, total } = this.spec;
+      const short = total === 1 ? "" : shorts[k];
+      return systems.length > 1 ? `${short} ${this.plots.headingOf(lines[k].system.run)}`.trim() : short;
+    }
+    /**
+     * Which lines have their key in common with the k-th.
+     * @param {number} k
+     */
+    groupOf(k) {
+      return this.spec.groups.findIndex((group) => group.includes(k));
+    }
+    /**
+     * Whether the k-th line is drawn.
+     * @param {number} k
+     */
+    shows(k) {
+      return !this.hidden.has(this.groupOf(k)) && this.runOn(k);
+    }
+    /**
+     * Whether the run is on that the k-th line is of.
+     * @param {number} k
+     */
+    runOn(k) {
+      return !this.plots.hiddenRuns.has(this.spec.lines[k].system.run);
+    }
+    /** @param {number} group */
+    toggle(group) {
+      if (!this.hidden.delete(group)) this.hidden.add(group);
+    }
+    /** @param {number} group */
+    showOnly(group) {
+      this.hidden.clear();
+      for (const each of this.spec.groups.keys()) if (each !== group) this.hidden.add(each);
+    }
+    /** The lines that are drawn. */
+    get on() {
+      return [...this.spec.lines.keys()].filter((k) => this.shows(k));
     }
   };
 
@@ -6214,8 +6537,8 @@
      */
     sentence(u, i) {
       const { spec } = this.plot;
-      const on2 = [...spec.labels.keys()].filter((k) => !this.plot.hidden.has(k)).slice(0, MOST_CHIPS);
-      const values = on2.map((k) => `${spec.noun} ${spec.labels[k]} ${this.plot.valueText(k, i)}`);
+      const on2 = this.plot.lines.on.slice(0, MOST_CHIPS);
+      const values = on2.map((k) => `${this.plot.lines.nameOf(k)} ${this.plot.valueText(k, i)}`);
       return `${fixed(u.data[0][i], 2)} s: ${values.join(", ")} ${spec.unit}`;
     }
   };
@@ -6232,43 +6555,58 @@
       (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_2, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
     );
   };
+  var keyed = (labels) => labels.map((label, k) => {
+    const before = labels.slice(0, k).filter((each) => each === label).length;
+    return { label, key: before ? `${label} ${before + 1}` : label };
+  });
   var actionsOf = (system) => {
-    const { action, agent_name: agent } = system;
+    const { action, agent_name: noun } = system;
     return [...new Set(action.axis)].map((axis) => {
       const columns = [...action.owner.keys()].filter((k) => action.axis[k] === axis);
       return {
-        system,
+        systems: [system],
+        whose: system.name,
         name: "action",
         axis,
-        array: `${system.name}/action`,
         unit: action.unit,
-        columns,
         title: axis ? `${action.name}, ${axis}` : action.name,
         symbol: "",
-        labels: columns.map((k) => String(action.owner[k])),
-        agents: columns.map((k) => action.owner[k] - 1),
-        noun: agent,
-        bounds: [],
-        moving: []
+        noun,
+        lines: keyed(columns.map((column) => String(action.owner[column]))).map((named, k) => ({
+          ...named,
+          system,
+          array: `${system.name}/action`,
+          column: columns[k],
+          agent: action.owner[columns[k]] - 1,
+          moving: []
+        })),
+        bounds: []
       };
     });
   };
   var quantityOf = (system, quantity) => {
     const ofAgents = quantity.labels.length === system.agents && system.agents > 1;
+    const moving = Object.values(quantity.moving_bounds).map(
+      (each) => `${system.name}/quantity/${each}`
+    );
     return {
-      system,
+      systems: [system],
+      whose: system.name,
       name: quantity.name,
       axis: "",
-      array: `${system.name}/quantity/${quantity.name}`,
       unit: quantity.unit,
-      columns: [...quantity.labels.keys()],
       title: quantity.long_name,
       symbol: quantity.symbol,
-      labels: quantity.labels.map((each) => each || quantity.long_name),
-      agents: quantity.labels.map((_2, k) => ofAgents ? k : null),
       noun: ofAgents ? system.agent_name : "",
-      bounds: boundsOf(quantity),
-      moving: Object.values(quantity.moving_bounds).map((each) => `${system.name}/quantity/${each}`)
+      lines: keyed(quantity.labels.map((label) => label || quantity.long_name)).map((named, column) => ({
+        ...named,
+        system,
+        array: `${system.name}/quantity/${quantity.name}`,
+        column,
+        agent: ofAgents ? column : null,
+        moving
+      })),
+      bounds: boundsOf(quantity)
     };
   };
   var boundsOf = ({ bound, lower_bound, labels }) => {
@@ -6281,19 +6619,21 @@
       });
     return [...found].map(([value, whose]) => ({ value, note: noteOf(whose, labels.length) })).sort((a, b) => a.value - b.value);
   };
-  var movingBoundsOf = ({ moving, columns, shorts }, store) => {
+  var movingBoundsOf = ({ lines, shorts }, store) => {
     const found = /* @__PURE__ */ new Map();
-    for (const array of moving)
-      columns.forEach((column, k) => {
+    lines.forEach(({ moving, column }, k) => {
+      for (const array of moving) {
         const values = store.column(array, column);
-        if (values.every((value) => value === null)) return;
+        if (values.every((value) => value === null)) continue;
         const key = values.join();
-        const known = found.get(key) ?? { values, whose: [] };
-        found.set(key, { values, whose: [...known.whose, shorts[k]] });
-      });
+        const known = found.get(key) ?? { values, whose: /* @__PURE__ */ new Set() };
+        found.set(key, known);
+        known.whose.add(shorts[k]);
+      }
+    });
     return [...found.values()].map(({ values, whose }) => ({
       values,
-      note: noteOf(whose, columns.length)
+      note: noteOf([...whose], new Set(shorts).size)
     }));
   };
   var noteOf = (whose, of) => {
@@ -6304,23 +6644,23 @@
     if (n <= most) return [...Array(n).keys()];
     return [...Array(most).keys()].map((k) => Math.round(k * (n - 1) / (most - 1)));
   };
-  var thinned = (spec) => {
-    const total = spec.columns.length;
-    const chosen = evenly(total, MOST_LINES);
-    const pick = (values) => chosen.map((k) => values[k]);
+  var thinned = (whole, runs = 1) => {
+    const keys = [...new Set(whole.lines.map(({ key }) => key))];
+    const chosen = evenly(keys.length, Math.floor(MOST_LINES / runs)).map((k) => keys[k]);
+    const shorts = shortOf(keys.map((key) => whole.lines.find((line2) => line2.key === key)?.label ?? ""));
+    const lines = whole.lines.filter(({ key }) => chosen.includes(key));
     return {
-      ...spec,
-      total,
-      columns: pick(spec.columns),
-      shorts: pick(shortOf(spec.labels)),
-      labels: pick(spec.labels),
-      agents: pick(spec.agents)
+      ...whole,
+      total: keys.length,
+      lines,
+      shorts: lines.map(({ key }) => shorts[keys.indexOf(key)]),
+      groups: chosen.map((key) => [...lines.keys()].filter((k) => lines[k].key === key))
     };
   };
-  var specsOf = (system) => [
+  var wholesOf = (system) => [
     ...actionsOf(system),
     ...system.quantities.map((quantity) => quantityOf(system, quantity))
-  ].map(thinned);
+  ];
 
   // src/timeline.js
   var TimeLine = class {
@@ -6342,10 +6682,10 @@
       this.root.style.visibility = seen ? "visible" : "hidden";
     }
   };
-  var exitLine = () => element(
+  var exitLine = (whose) => element(
     "div",
     { class: "exit-line", hidden: true },
-    element("span", { text: "left the set" })
+    element("span", { text: `${whose} left the set`.trim() })
   );
 
   // src/plot.js
@@ -6359,18 +6699,15 @@
       this.plots = plots;
       this.spec = spec;
       this.look = look;
-      this.hidden = look.hidden;
+      this.lines = new Lines(plots, spec, look.hidden);
       this.hovered = null;
       this.focused = null;
       this.uplot = null;
       this.movingBounds = [];
       this.mouseInside = false;
-      this.chips = element("div", { class: "plot-chips" });
-      const shown2 = spec.columns.length;
-      this.several = spec.total > shown2 ? `${shown2} of ${spec.total} shown` : "";
-      this.note = element("span", { class: "plot-note", text: this.several });
+      this.chips = new Chips(this);
       this.reading = new Reading(this);
-      const name = `${spec.system.name}: ${spec.title} over time`;
+      const name = `${[spec.whose, spec.title].filter(Boolean).join(": ")} over time`;
       this.chart = element("div", {
         class: "chart",
         tabindex: 0,
@@ -6380,68 +6717,20 @@
         onblur: () => this.reading.at(null)
       });
       this.root = element("figure", { class: "plot", "aria-label": name });
-      this.root.append(captionOf(this), this.chips, this.chart, this.reading.spoken);
+      this.root.append(captionOf(this), this.chips.root, this.chart, this.reading.spoken);
       this.timeLine = new TimeLine(element("div", { class: "time-line" }));
-      this.exitLine = new TimeLine(exitLine());
-      this.values = shown2 > MOST_CHIPS ? [] : spec.labels.map((_2, k) => this.addChip(k));
-      this.readout = element("span", { class: "readout" });
-      if (!this.values.length) this.chips.append(this.readout);
-      this.chips.append(this.note);
-    }
-    /**
-     * Colour and dash of the k-th line.
-     * @param {number} k
-     */
-    lineOf(k) {
-      const { spec } = this;
-      if (spec.total === 1) return { colour: colour("text"), dash: [] };
-      return line(spec.agents[k] ?? spec.columns[k]);
-    }
-    /**
-     * The chip of the k-th line, which switches it; returns where its value is written.
-     * @param {number} k
-     */
-    addChip(k) {
-      const { spec } = this;
-      const value = element("span", { class: "chip-value", "aria-hidden": true });
-      const what = `${spec.noun} ${spec.labels[k]}`.trim();
-      const chip = element(
-        "button",
-        {
-          type: "button",
-          class: "plot-chip",
-          title: `${what}: click switches the line, a double click shows it alone`,
-          "aria-label": `line of ${what}`,
-          onmouseenter: () => this.point(k),
-          onmouseleave: () => this.point(null),
-          onclick: () => this.toggle(k),
-          ondblclick: () => this.showOnly(k)
-        },
-        swatchOf(this.lineOf(k)),
-        spec.total === 1 ? "" : spec.shorts[k],
-        value
-      );
-      press(chip, !this.hidden.has(k));
-      this.chips.append(chip);
-      return value;
-    }
-    /** @param {number} k */
-    toggle(k) {
-      if (!this.hidden.delete(k)) this.hidden.add(k);
-      this.showLines();
-    }
-    /** @param {number} k */
-    showOnly(k) {
-      this.hidden.clear();
-      for (const each of this.spec.columns.keys()) if (each !== k) this.hidden.add(each);
-      this.showLines();
+      this.exitLines = spec.systems.map((system) => ({
+        system,
+        line: new TimeLine(exitLine(plots.headingOf(system.run)))
+      }));
     }
     showLines() {
-      const { uplot, hidden } = this;
+      const { lines, spec, uplot } = this;
       uplot?.batch(() => {
-        for (const k of this.spec.columns.keys()) uplot.setSeries(k + 1, { show: !hidden.has(k) });
+        for (const k of spec.lines.keys()) uplot.setSeries(k + 1, { show: lines.shows(k) });
       });
-      this.values.forEach((value, k) => value.parentElement && press(value.parentElement, !hidden.has(k)));
+      this.chips.press();
+      this.writeValues();
     }
     /**
      * One line is pointed at: it stands out, and so does its agent in the scene.
@@ -6453,30 +6742,25 @@
     }
     /** @param {number | null} k */
     tell(k) {
-      const agent = k === null ? null : this.spec.agents[k];
-      const which = agent === null ? null : { system: this.spec.system.name, agent };
+      const { agent = null, system } = k === null ? {} : this.spec.lines[k];
+      const which = agent === null || !system ? null : { system: system.name, agent };
       this.plots.callbacks.highlight(which, this);
     }
     /** @param {number | null} k */
     focus(k) {
       if (this.focused === k) return;
       this.focused = k;
-      this.markChip(k);
+      this.chips.mark(k);
       this.uplot?.setSeries(k === null ? (
         /** @type {any} */
         null
       ) : k + 1, { focus: true });
     }
-    /** @param {number | null} k */
-    markChip(k) {
-      this.values.forEach(
-        (value, each) => value.parentElement?.classList.toggle("chosen", each === k)
-      );
-    }
     /** @param {Agent | null} which */
     highlight(which) {
-      const own = which?.system === this.spec.system.name;
-      const k = own ? this.spec.agents.indexOf(which.agent) : -1;
+      const k = this.spec.lines.findIndex(
+        ({ system, agent }) => system.name === which?.system && agent === which.agent
+      );
       this.focus(k < 0 ? null : k);
     }
     // ---- uPlot
@@ -6496,8 +6780,9 @@
       this.uplot?.destroy();
       this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
       const { over } = this.uplot;
-      over.append(this.timeLine.root, this.exitLine.root);
-      this.timeLine.x = this.exitLine.x = NaN;
+      const lines = [this.timeLine, ...this.exitLines.map((each) => each.line)];
+      for (const each of lines) each.x = NaN;
+      over.append(...lines.map(({ root }) => root));
       new Hands(this, this.uplot);
       over.addEventListener("mouseenter", () => this.mouseInside = true);
       over.addEventListener("mouseleave", () => {
@@ -6518,7 +6803,7 @@
     /** The columns as they are. */
     columns() {
       const { store } = this.plots.source;
-      return this.spec.columns.map((k) => store.column(this.spec.array, k));
+      return this.spec.lines.map(({ array, column }) => store.column(array, column));
     }
     /** @returns {uPlot.AlignedData} */
     data() {
@@ -6575,7 +6860,7 @@
       const focused = k === null || k === void 0 ? null : k - 1;
       if (focused === this.focused) return;
       this.focused = focused;
-      this.markChip(focused);
+      this.chips.mark(focused);
       this.tell(focused);
     }
     refresh() {
@@ -6586,13 +6871,15 @@
     setTime(t) {
       if (!this.uplot) return;
       this.timeLine.place(this.uplot, t);
-      const exit = this.plots.source.exits[this.spec.system.name];
-      const { root } = this.exitLine;
-      root.hidden = !Number.isFinite(exit);
-      if (root.hidden) return;
-      this.exitLine.place(this.uplot, exit);
-      const [from, to] = this.plots.window;
-      root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+      for (const { system, line: own } of this.exitLines) {
+        const exit = this.plots.source.exits[system.name];
+        const { root } = own;
+        root.hidden = !Number.isFinite(exit) || this.plots.hiddenRuns.has(system.run);
+        if (root.hidden) continue;
+        own.place(this.uplot, exit);
+        const [from, to] = this.plots.window;
+        root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+      }
     }
     /**
      * @param {number} k
@@ -6601,7 +6888,7 @@
     valueText(k, i) {
       const { store } = this.plots.source;
       const value = this.uplot?.data[k + 1][i] ?? null;
-      return fixed(value, decimals(store.greatest(this.spec.array)));
+      return fixed(value, decimals(store.greatest(this.spec.lines[k].array)));
     }
     /** Values at the mouse, or now. */
     writeValues() {
@@ -6610,12 +6897,69 @@
       const i = this.hovered ?? u.valToIdx(this.plots.now);
       const hover = this.hovered === null ? "" : `at ${fixed(u.data[0][i] ?? null, 2)} s`;
       const turned = this.turned ? "margin −g, log" : this.look.log ? "log" : "";
-      this.note.textContent = [this.several, turned, hover].filter(Boolean).join(" · ");
-      this.values.forEach((place, k2) => place.textContent = this.valueText(k2, i));
-      if (this.values.length) return;
-      const { spec, focused: k } = this;
-      this.readout.textContent = k === null ? "point at a line for its value" : `${spec.noun} ${spec.labels[k]}: ${this.valueText(k, i)} ${spec.unit}`.trim();
+      this.chips.write(i, [turned, hover]);
     }
+  };
+
+  // src/compared.js
+  var plottedOf = ({ systems, runs }) => {
+    const all = systems.flatMap(wholesOf);
+    if (!runs) return { specs: all.map((whole) => thinned(whole)), left: "" };
+    const whose = (system) => runs[system.run].systems[system.name];
+    const found = /* @__PURE__ */ new Map();
+    for (const whole of all) {
+      const key = [whose(whole.systems[0]), whole.name, whole.axis, whole.unit].join("\n");
+      found.set(key, [...found.get(key) ?? [], whole]);
+    }
+    const joined = [...found.values()].map((wholes) => joinedOf(wholes, runs, whose(wholes[0].systems[0])));
+    const common = joined.flatMap(({ whole }) => whole ? [thinned(whole, runs.length)] : []);
+    if (!common.length)
+      return {
+        specs: all.map((whole) => thinned(whole)),
+        left: "These runs have no variable in common; each has plots of its own."
+      };
+    const left = joined.flatMap((each) => each.left);
+    return { specs: common, left: left.length ? `Of one run alone, and not plotted: ${left.join("; ")}.` : "" };
+  };
+  var joinedOf = (wholes, runs, whose) => {
+    const lines = wholes.flatMap((whole) => whole.lines);
+    const often = (line2) => lines.filter(({ key }) => key === line2.key).length > 1;
+    const common = lines.filter(often);
+    const left = wholes.flatMap((whole) => {
+      const alone = whole.lines.filter((line2) => !often(line2));
+      return alone.length ? [leftOf(whole, alone, runs)] : [];
+    });
+    if (!common.length) return { whole: null, left };
+    const of = wholes.filter((whole) => whole.lines.some(often));
+    return {
+      whole: {
+        ...of[0],
+        systems: of.flatMap((whole) => whole.systems),
+        whose,
+        lines: common,
+        bounds: boundsOf2(of, runs)
+      },
+      left
+    };
+  };
+  var leftOf = ({ systems: [{ run }], title, noun, lines }, alone, runs) => {
+    const labels = alone.map(({ label }) => label).join(", ");
+    const whose = /^\d/.test(labels) ? `${noun} ${labels}` : labels;
+    const part = alone.length < lines.length ? ` of ${whose}` : "";
+    return `${title}${part} (${runs[run].heading})`;
+  };
+  var boundsOf2 = (wholes, runs) => {
+    const found = /* @__PURE__ */ new Map();
+    for (const { bounds, systems } of wholes)
+      for (const { value, note } of bounds) {
+        const known = found.get(value) ?? { note, whose: [] };
+        known.whose.push(runs[systems[0].run].heading);
+        found.set(value, known);
+      }
+    return [...found].map(([value, { note, whose }]) => ({
+      value,
+      note: whose.length < wholes.length ? `: ${whose.join("; ")}` : note
+    })).sort((a, b) => a.value - b.value);
   };
 
   // src/plots.js
@@ -6643,6 +6987,9 @@
       this.size = "";
       this.stretch = null;
       this.looks = /* @__PURE__ */ new Map();
+      this.hiddenRuns = /* @__PURE__ */ new Set();
+      this.runs = element("div", { id: "run-keys", role: "group", "aria-label": "runs" });
+      this.left = element("p", { class: "muted small", id: "plots-left", hidden: true });
       this.shown = element("span", { class: "muted", role: "status" });
       this.all = this.tool("All", "All of the run (0)", () => this.showAll());
       this.tools = element(
@@ -6675,13 +7022,17 @@
       }
       this.meta = meta;
       this.source = source;
-      this.plots = meta.systems.flatMap(specsOf).map((spec) => {
-        const key = `${spec.array} ${spec.axis}`;
+      const { specs, left } = plottedOf(meta);
+      this.left.textContent = left;
+      this.left.hidden = !left;
+      this.plots = specs.map((spec) => {
+        const key = `${spec.lines[0].array} ${spec.axis}`;
         const look = this.looks.get(key) ?? { hidden: /* @__PURE__ */ new Set(), log: false, values: null };
         this.looks.set(key, look);
         return new Plot(this, spec, look);
       });
-      this.column.replaceChildren(this.tools, ...this.plots.map((plot) => plot.root));
+      const figures = this.plots.map((plot) => plot.root);
+      this.column.replaceChildren(this.tools, this.runs, ...figures, this.left);
       this.size = "";
       this.resize();
       this.tellStretch();
@@ -6756,11 +7107,11 @@
     }
     /** Height of a chart in px, for as many as fit. */
     room() {
-      const { column, plots, tools } = this;
+      const { column, plots, tools, runs, left } = this;
       if (getComputedStyle(column).overflowY === "visible") return PART * innerHeight;
       const extra = plots.reduce(
         (sum, { root, chart }) => sum + root.offsetHeight - chart.offsetHeight,
-        tools.offsetHeight
+        tools.offsetHeight + runs.offsetHeight + left.offsetHeight
       );
       return (column.clientHeight - extra - 16) / Math.max(plots.length, 1);
     }
@@ -6772,6 +7123,17 @@
     }
     refresh() {
       for (const plot of this.plots) plot.refresh();
+    }
+    /** Other lines are switched on, or those of another run. */
+    showLines() {
+      for (const plot of this.plots) plot.showLines();
+    }
+    /**
+     * The heading of a run, where there are several.
+     * @param {number} run
+     */
+    headingOf(run) {
+      return this.meta?.runs?.[run].heading ?? "";
     }
     /** @param {number} t */
     setTime(t) {
@@ -6789,12 +7151,12 @@
       for (const plot of this.plots) if (plot !== except) plot.highlight(which);
     }
     describe() {
-      return this.plots.map(({ spec, uplot, look, movingBounds }) => ({
-        system: spec.system.name,
+      return this.plots.map(({ spec, uplot, look, lines, movingBounds }) => ({
+        system: spec.whose,
         name: spec.name,
         axis: spec.axis,
         title: spec.title,
-        series: [...spec.labels],
+        series: spec.lines.map(({ label }) => label),
         total: spec.total,
         bounds: spec.bounds.map(({ value }) => value),
         moving: movingBounds.length,
@@ -6803,6 +7165,9 @@
         time: uplot && [uplot.scales.x.min, uplot.scales.x.max],
         values: uplot && [uplot.scales.y.min, uplot.scales.y.max],
         hidden: [...look.hidden],
+        shown: [...spec.lines.keys()].map((k) => lines.shows(k)),
+        colours: [...spec.lines.keys()].map((k) => lines.lookOf(k).colour),
+        dashes: [...spec.lines.keys()].map((k) => lines.lookOf(k).dash),
         log: look.log
       }));
     }
@@ -6814,6 +7179,8 @@
   // src/bars.js
   var PITCH = 0.62;
   var WIDTH2 = 0.4;
+  var FAINT = 0.35;
+  var WIDER = 1.25;
   var GAUGE = 1.7;
   var TALL = 1.9;
   var BOX = new THREE.BoxGeometry(1, 1, 1).translate(0, 0, 0.5);
@@ -6904,6 +7271,22 @@
       this.slab.position.set(0, (this.depth - PITCH) / 2, -0.032);
       this.group.add(this.slab);
     }
+    /**
+     * Bars over those of another run are translucent and a little wider, so that no faces coincide.
+     * @param {boolean} faint
+     */
+    fade(faint) {
+      this.slab.visible = !faint;
+      for (const bar of [...this.bars, ...this.gauges.map((gauge) => gauge.bar)]) {
+        const width = (bar.userData.width ??= bar.scale.x) * (faint ? WIDER : 1);
+        bar.scale.x = bar.scale.y = width;
+        Object.assign(bar.material, {
+          transparent: faint,
+          opacity: faint ? FAINT : 1,
+          depthWrite: !faint
+        });
+      }
+    }
     restyle() {
       this.slab.material.color.set(colour("slab"));
       for (const { frame, plate, rim } of this.gauges) {
@@ -6923,7 +7306,10 @@
      */
     update(instant, store, [x, y, z], scale) {
       const own = instant.systems[this.system.name];
-      this.reference = store.greatest(`${this.system.name}/action`) || 1;
+      const { alike, faint, off: off2 } = this.system.shown;
+      this.reference = Math.max(...alike.map((name) => store.greatest(`${name}/action`))) || 1;
+      this.fade(faint);
+      this.group.visible = !off2;
       this.origin = [x, y, z];
       this.scale = scale;
       this.group.position.set(x, y, z + 0.035);
@@ -7289,7 +7675,7 @@
       const length = box ? box.high[0] - box.low[0] : 0;
       const long = Math.min(Math.max((length - 40) / 60, 0), 1);
       const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
-      const rows = Math.max(0, ...bars2.map((each) => each.rows));
+      const rows = bars2.reduce((sum, each) => sum + each.rows, 0);
       const ofBars = rows > 1 ? 32 : 12;
       const ofFleet = planar ? 36 : 20 - 13 * long;
       const elevation = (box ? ofFleet : ofBars) * DEGREE;
@@ -7810,7 +8196,8 @@
      * @param {number} time s
      */
     origin(time) {
-      return this.plan.velocity.map((v) => v * time);
+      const { offset } = this.system.shown;
+      return this.plan.velocity.map((v, axis) => v * time + offset[axis]);
     }
     /** Corners of the region, if it is of the size of a fleet, for the camera. */
     corners(time, floor2) {
@@ -7828,6 +8215,7 @@
       const own = instant.systems[this.system.name];
       const [x, y] = this.origin(instant.time);
       const level = layout.floor + STEP2;
+      this.group.visible = !this.system.shown.faint && !this.system.shown.off;
       if (this.region)
         for (const part of [this.region.fill, this.region.edge]) part.position.set(x, y, level);
       for (const distance of this.distances) this.placeDistance(distance, own, layout);
@@ -7890,6 +8278,7 @@
   var plansOf = (parent, systems) => systems.flatMap((system) => system.plan ? [new Plan(parent, system, system.plan)] : []);
 
   // src/scene.js
+  var FAINT2 = 0.3;
   var AGAIN2 = 500;
   var Scene = class {
     /** @param {HTMLElement} pane */
@@ -7980,7 +8369,27 @@
       this.nextLook = now + AGAIN2;
       this.stale = false;
       this.ghosts.forget();
+      for (const system of this.fleets) this.fade(system);
       this.batches.build(this.objects);
+    }
+    /**
+     * What never moves of a system goes where it is drawn; what lies over another run is translucent.
+     * @param {System} system
+     */
+    fade({ items: [first, count], root, shown: shown2 }) {
+      const still2 = nodeAt(this.viewer, root ?? "")?.children["<object>"]?.object;
+      if (still2) {
+        [still2.position.x, still2.position.y] = shown2.offset;
+        still2.visible = !shown2.faint && !shown2.off;
+      }
+      for (const object of this.objects.slice(first, first + count))
+        object?.traverse(({ material, userData }) => {
+          if (!material?.color) return;
+          const { opacity, transparent: transparent2, depthWrite } = userData.solid ??= { ...material };
+          material.opacity = shown2.faint ? FAINT2 * opacity : opacity;
+          material.transparent = shown2.faint || transparent2;
+          material.depthWrite = !shown2.faint && depthWrite;
+        });
     }
     staticMeshes() {
       const moving = new Set(this.objects);
@@ -8082,6 +8491,12 @@
       const { box, floor: floor2 } = this.layout;
       let behind = box ? box.high[1] + 2.4 : 0;
       for (const bars2 of this.bars) {
+        const { over } = bars2.system.shown;
+        const under = over && this.bars.find(({ system }) => system === over);
+        if (under) {
+          bars2.update(instant, store, under.origin, under.scale);
+          continue;
+        }
         const span = box ? box.high[0] - box.low[0] : 0;
         const scale = box ? Math.min(Math.max(0.6 * span / bars2.width, 0.8), 6) : 1;
         const x = box ? (box.low[0] + box.high[0]) / 2 : 0;
@@ -8177,7 +8592,7 @@
       byId("follow-label").hidden = fleets.length === 0;
       byId("follow").replaceChildren(
         element("option", { value: "fleet", text: "all" }),
-        ...fleets.flatMap(optionsOf2),
+        ...fleets.length > 1 ? fleets.map((fleet) => element("optgroup", { label: fleet.name }, ...optionsOf2(fleet))) : fleets.flatMap(optionsOf2),
         element("option", { value: "none", text: "nothing" })
       );
     }
@@ -8254,6 +8669,20 @@
   // src/transport.js
   var SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
   var speedName = (speed) => speed === null ? "max" : `×${speed}`;
+  var marksOf = (playback) => {
+    const { exits, interventions, meta } = playback;
+    const left = Object.entries(exits).map(([name, time]) => ({
+      time,
+      what: `${name} left the set`,
+      bad: true
+    }));
+    const near = meta.systems.flatMap((system) => {
+      const { margin, margin_time: time } = playback.stateOf(system);
+      const what = `${system.name}: closest approach, margin ${number(margin)}`;
+      return typeof time === "number" ? [{ time, what, near: true }] : [];
+    });
+    return [...interventions, ...near, ...left];
+  };
   var Transport = class {
     speedKey = "";
     // of what the menu of speeds has
@@ -8318,7 +8747,7 @@
     }
     /**
      * Marks along the slider, each of which leads there.
-     * @param {(Intervention & {bad?: boolean, near?: boolean})[]} marks
+     * @param {Mark[]} marks
      * @param {number} end
      */
     mark(marks, end) {
@@ -8587,6 +9016,7 @@
       c: () => toolbar.toggleLinks(),
       g: () => toolbar.toggleGhosts(),
       p: fold,
+      b: () => page.comparison.toggle(),
       d: () => page.switchTheme(),
       "?": () => byId("help").showModal(),
       "[": () => scene.camera.nudge(-6, 1),
@@ -8670,6 +9100,7 @@
         seek: (time) => this.seek(time),
         highlight: (which, plot) => this.highlight(which, plot)
       });
+      this.comparison = new Comparison(this);
       this.header = new Header((time) => this.lead(time));
       this.toolbar = new Toolbar(this.scene, this.overlay);
       this.transport = new Transport(this);
@@ -8722,7 +9153,7 @@
       const playback = new Playback(pack, { messages: this.messages });
       this.playback = playback;
       this.setScene(playback.meta, playback);
-      this.markOutcome(playback);
+      this.transport.mark(marksOf(playback), playback.end);
       playback.restart();
       this.keep.go();
     }
@@ -8765,7 +9196,7 @@
       const playback = new Playback(pack, options);
       this.playback = playback;
       this.plots.setSource(playback);
-      this.markOutcome(playback);
+      this.transport.mark(marksOf(playback), playback.end);
       playback.seek(momentAsked() ?? playback.end);
     }
     /** @param {Live} live */
@@ -8779,7 +9210,10 @@
      * @param {System} system
      * @param {Numbers | undefined} counts
      */
-    messages = (system, counts) => this.overlay.links.messages(system, counts, performance.now());
+    messages = (system, counts) => {
+      const drawn = this.meta?.systems.find(({ name }) => name === system.name);
+      if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, performance.now());
+    };
     /**
      * @param {Meta} meta
      * @param {Source} source
@@ -8790,28 +9224,11 @@
       document.title = `${meta.title} · gne_mj`;
       byId("title").textContent = meta.title;
       byId("waiting").hidden = true;
+      this.comparison.setMeta(meta);
       this.scene.setMeta(meta);
       this.overlay.setMeta(meta);
       this.plots.setScene(meta, source);
       this.toolbar.setMeta(meta);
-    }
-    /**
-     * Exits and interventions of a replay, marked along the slider.
-     * @param {Playback} playback
-     */
-    markOutcome(playback) {
-      const { exits, interventions, end } = playback;
-      const marks = Object.entries(exits).map(([name, time]) => ({
-        time,
-        what: `${name} left the set`,
-        bad: true
-      }));
-      const near = (this.meta?.systems ?? []).flatMap((system) => {
-        const { margin, margin_time: time } = playback.stateOf(system);
-        const what = `${system.name}: closest approach, margin ${number(margin)}`;
-        return typeof time === "number" ? [{ time, what, near: true }] : [];
-      });
-      this.transport.mark([...interventions, ...near, ...marks], end);
     }
     // ---- what users ask for
     playPause() {
@@ -8863,6 +9280,7 @@
       setTheme(theme() === "dark" ? "light" : "dark");
       this.scene.restyle();
       this.plots.restyle();
+      this.comparison.restyle();
     }
     // ---- pictures
     /** @param {number} now ms */
@@ -8874,7 +9292,7 @@
       this.watchPace(passed, source?.playing ?? false);
       source?.advance(passed);
       if (!this.meta || !source) return;
-      if (source.playing) this.overlay.links.flow(this.meta.systems, now);
+      if (source.playing) this.overlay.links.flow(this.meta.systems.filter(isSolid), now);
       this.draw(source, now);
       if (now >= this.slowDue) this.slow(this.meta, source, now);
     }
@@ -8897,6 +9315,7 @@
     draw(source, now) {
       const instant = source.take();
       if (instant) {
+        this.comparison.place(instant);
         this.instant = instant;
         this.scene.apply(instant, source.store);
         this.plots.setTime(instant.time);
