@@ -143,11 +143,6 @@ def drawn(page):
     return {system["name"]: system for system in page.evaluate("window.gne.compared()")}
 
 
-def key(page, name):
-    page.keyboard.press(name)
-    page.evaluate("() => new Promise(resolve => setTimeout(resolve, 60))")
-
-
 def test_two_runs_in_a_browser(page, recorded, runs):
     server = serve({name: runs[name] for name in ("first", "second")}, "both")
     try:
@@ -170,12 +165,13 @@ def test_two_runs_in_a_browser(page, recorded, runs):
                 x = run.data["position"].sel(time=min(time, run.data["time"][-1]), method="nearest")
                 found = position(page, f"meshcat/{name}/robot_2/main")
                 assert np.allclose(found, [x[1], 0.0 if own == "first" else -1.2, 0], atol=CLOSE)
-        key(page, "b")  # as ghosts
+        page.keyboard.press("b")
+        until(page, "window.gne.compared()[1].opacity < 0.5")
         assert position(page, "meshcat/rho = 0.5/robot_2/main")[1] == pytest.approx(0.0)
         assert [each["opacity"] < 0.5 for each in drawn(page).values()] == [False, True]
         assert "translucent: rho = 0.5" in page.locator("#compare-note").inner_text()
         page.locator("#run-keys button").nth(0).click()  # the first is switched off
-        assert [each["visible"] for each in drawn(page).values()] == [False, True]
+        until(page, "window.gne.compared().map(each => each.visible).join() === 'false,true'")
         assert page.evaluate("window.gne.plots[0].shown") == [*[False] * 5, *[True] * 5]
         assert [each["opacity"] < 0.5 for each in drawn(page).values()] == [False, False]
         quiet(recorded, *origins(server))
@@ -196,7 +192,7 @@ def test_only_what_runs_have_in_common_is_plotted_and_the_rest_is_told(browser, 
         try:
             with browser.page(recorded) as page:
                 opened(page, server.url)
-                key(page, "b")
+                page.keyboard.press("b")
                 seek(page, 0.4)
                 found = [plot["name"] for plot in page.evaluate("window.gne.plots")]
                 assert set(names) <= set(found)
