@@ -1,4 +1,4 @@
-"""What scenario files can name: games, agent types, laws, faults, time functions, modes, schedules.
+"""What scenario files can name: games, agent types, laws, low-level controllers, faults and so on.
 
 Things with keys of their own are named by their tables, which register beside what they make:
 
@@ -126,6 +126,7 @@ class Names(Generic[N]):
 
 GAMES, AGENTS, FAULTS, TIMES = Registry(), Registry(), Registry(), Registry()
 LAWS = Registry("information")
+LOW_LEVEL = Registry("controller")
 MODES: Names[Any] = Names("mode")
 SCHEDULES: Names[Any] = Names("kind")
 

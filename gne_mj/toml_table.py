@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,10 +154,11 @@ def all_tables() -> list[type[Table]]:
 
 def union_tags() -> set[str]:
     """What may stand in the keys that choose among tables, such as "osnr" in ``game.type``."""
-    keys = ("type", "information")
+    keys = ("type", "information", "controller")
     fields = [table.model_fields[key] for table in all_tables() for key in keys
               if key in table.model_fields]  # fmt: skip
-    return {tag for field in fields for tag in get_args(field.annotation)}
+    chosen = [field.annotation for field in fields if get_origin(field.annotation) is Literal]
+    return {tag for kind in chosen for tag in get_args(kind)}
 
 
 def dimension_of(sizes: Sizes) -> int:

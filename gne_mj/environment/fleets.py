@@ -21,7 +21,6 @@ from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.native_mujoco import (
     PLANT_MARK,
-    STATE,
     USERDATA_HEADER,
     check_warnings,
     offsets,
@@ -130,7 +129,7 @@ class Fleets:
         rows.found[row], self.exits[row] = INSIDE, None
         header = PLANT_MARK, float(self._marks[row])
         plant.data.userdata[:USERDATA_HEADER] = header
-        mujoco.mj_getState(plant.model, plant.data, rows.now[row], STATE)
+        mujoco.mj_getState(plant.model, plant.data, rows.now[row], plant.state_bits)
 
     def look(self) -> None:
         """Bring all rows that move up to date without stepping."""
@@ -140,7 +139,7 @@ class Fleets:
         """Back to the start of a fleet's last step; the exit that it led to stays noted."""
         left, plant, rows = self.exits[row], self.plants[row], self.rows
         rows.now[row] = rows.before[row]
-        mujoco.mj_setState(plant.model, plant.data, rows.now[row], STATE)
+        mujoco.mj_setState(plant.model, plant.data, rows.now[row], plant.state_bits)
         moves, found = rows.moves.copy(), rows.found[row]
         rows.moves[:] = np.arange(self.count) == row
         rows.found[row] = INSIDE
@@ -189,7 +188,7 @@ class Fleets:
 def _tools(plant: FleetPlant, keeper: ParameterBlock | None, shared: bool) -> Tools:
     kind = plant.agents.kind
     return Tools(
-        step_address(), step_address("mj_getState"), step_address("mj_setState"), STATE,
+        step_address(), step_address("mj_getState"), step_address("mj_setState"), plant.state_bits,
         plant.model._address, plant.data._address, int(shared),
         0 if keeper is None else keeper.address, len(kind.STATES), kind.OUTPUT,
     )  # fmt: skip
@@ -215,6 +214,6 @@ def _rows(plants: Sequence[FleetPlant], game: Game) -> Rows:
         state=real(m * first.agents.states),
         y=real(m),
         g=real(game.constraints_count),
-        now=real(mujoco.mj_stateSize(first.model, STATE)),
-        before=real(mujoco.mj_stateSize(first.model, STATE)),
+        now=real(mujoco.mj_stateSize(first.model, first.state_bits)),
+        before=real(mujoco.mj_stateSize(first.model, first.state_bits)),
     )

@@ -173,6 +173,8 @@ def build(at: Offsets, fleet: ModuleType) -> Any:
                     rows.found[e] = NO_INPUT
                     break
                 keep(tools, rows.before[e])
+                block = abs(parameter_block_of(at, tools.model, tools.data))
+                fleet.drive_again(at, tools.model, tools.data, block, rows.given[e])
                 timed_step(at, tools.step, tools.model, tools.data)
                 rows.step[e] += 1
                 rows.found[e] = look(at, fleet, tools, game, rows, e)

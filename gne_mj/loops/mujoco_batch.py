@@ -109,4 +109,4 @@ class _Fleet:
             plant.agents = replace(plant.agents, parameters=given)  # which say a start
         self._parameters = given
         plant.reset(case.state)
-        put_start(plant.data, parameter_block, mode, case.memory)
+        put_start(plant, parameter_block, mode, case.memory)

@@ -48,7 +48,7 @@ class MujocoLoop(ClosedLoop):
         workspace = workspace_of(data.userdata, plant.sizes.workspace, sizes)
         loop = workspace.loop
         self._progress, self.monitor, self._u = loop, loop.monitor, loop.u
-        self._memory = put_start(data, self._parameter_block, setup.clock.mode, memory)
+        self._memory = put_start(plant, self._parameter_block, setup.clock.mode, memory)
         moved = setup.clock.mode == CONTINUOUS and len(memory) > 0
         self._remembers = moved  # by MuJoCo's integrator
         self._machine = machine_of(plant.model, data)

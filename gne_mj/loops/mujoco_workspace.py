@@ -6,7 +6,6 @@ law's memory is in act in mode `continuous`, where MuJoCo's integrator moves it,
 
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -131,10 +130,11 @@ def mujoco_parameter_block(
 
 
 def put_start(
-    data: mujoco.MjData, parameter_block: ParameterBlock, mode: int, memory: NDArray[np.float64]
+    plant: "FleetPlant", parameter_block: ParameterBlock, mode: int, memory: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Make mjData the start of a run; returns the memory."""
-    data.userdata[:] = 0.0
+    """Make mjData the start of a run, but for what is the fleet's own; returns the memory."""
+    data = plant.data
+    data.userdata[plant.sizes.workspace :] = 0.0
     place = data.act if mode == CONTINUOUS and len(memory) else data.userdata
     held: NDArray[np.float64] = place[len(place) - len(memory) :]
     held[:] = memory

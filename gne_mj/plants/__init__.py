@@ -3,6 +3,7 @@
 from gne_mj.plants import (
     flexible_robot,
     integrator,
+    low_level,
     mixed,
     mjcf_robot,
     pi_cascade,
@@ -13,6 +14,7 @@ from gne_mj.plants import (
 __all__ = [
     "flexible_robot",
     "integrator",
+    "low_level",
     "mixed",
     "mjcf_robot",
     "pi_cascade",

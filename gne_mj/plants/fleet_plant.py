@@ -13,6 +13,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.plants.agent_type import fleet_module
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
+from gne_mj.plants.native_mujoco import STATE
 
 if TYPE_CHECKING:
     from gne_mj.plants.mujoco import Sizes
@@ -47,6 +48,11 @@ class FleetPlant(Plant):
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage of a step."""
         return True
+
+    @property
+    def state_bits(self) -> int:
+        """Of mjtState, what puts a fleet back to where it was, but for what a loop keeps."""
+        return STATE
 
     @property
     @abstractmethod

@@ -86,8 +86,8 @@ def make_force(
     path: Path,
     *,
     own_velocity: bool,
-) -> float:
-    """Make an actuator's control the force at what it drives; returns the greatest it delivers.
+) -> tuple[float, float]:
+    """Make an actuator's control the force at what it drives; returns the range that it delivers.
 
     Args:
         model: of the fleet; the actuator's gain and ranges are changed.
@@ -98,7 +98,7 @@ def make_force(
             force that goes with it is the one before the gear.
 
     Returns:
-        In N (N m), infinite if nothing clamps it.
+        The least and the greatest in N (N m), infinite if nothing clamps it.
 
     Raises:
         InvalidInput: it gives no force in proportion to its control, or none at all.
@@ -127,7 +127,7 @@ def make_force(
         model.actuator_gainprm[actuator, 0] = 1.0 / gear
         for ranges, row in ((model.actuator_ctrlrange, ctrl), (model.actuator_actrange, actuator)):
             ranges[row] = np.sort(scale * ranges[row])
-    return _clamp(model, data, actuator, gear)
+    return _range(model, data, actuator, gear)
 
 
 def _is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
@@ -137,8 +137,10 @@ def _is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
     return bool(by_group or by_flag)
 
 
-def _clamp(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, gear: float) -> float:
-    """The greatest |u| that passes unchanged, u = gear times the actuator's force."""
+def _range(
+    model: mujoco.MjModel, data: mujoco.MjData, actuator: int, gear: float
+) -> tuple[float, float]:
+    """The least and greatest u that pass unchanged, u = gear times the actuator's force."""
     ranges = []
     ctrl, along = model.actuator_ctrladr[actuator], model.actuator_trnid[actuator, 0]
     if _clamps(model, actuator):
@@ -156,4 +158,5 @@ def _clamp(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, gear: floa
         joint, lever = model.dof_jntid[data.moment_colind[entry]], data.actuator_moment[entry]
         if model.jnt_actfrclimited[joint] and lever:
             ranges.append(gear / lever * model.jnt_actfrcrange[joint])
-    return min((min(-low, high) for low, high in map(np.sort, ranges)), default=np.inf)
+    rows = np.sort(np.array([[-np.inf, np.inf], *ranges]), axis=1)
+    return float(np.max(rows[:, 0])), float(np.min(rows[:, 1]))

@@ -1,4 +1,7 @@
-"""How inputs reach a fleet of users' robots: which controls each is a part of, and by how much."""
+"""How inputs reach a fleet of users' robots: which controls each is a part of, and by how much.
+
+Those that a low-level controller takes are in :mod:`gne_mj.plants.mjcf_control`.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, nearest
+from gne_mj.plants.low_level.table import Controlled
 from gne_mj.plants.mjcf_actuator import make_force
 from gne_mj.plants.mjcf_input import Input
 from gne_mj.plants.mjcf_reading import names_in, terms_of
@@ -44,7 +48,7 @@ class Driving:
         np.add.at(ctrl, self.actuators, self.factors * u[self.channels])
 
 
-def add_effort(spec: Any, given: str | Input, channel: int, path: Path) -> None:
+def add_effort(spec: Any, given: str | Input | Controlled, channel: int, path: Path) -> None:
     """Give a robot's file the actuator that is a force at a body or site, if an input is one.
 
     Of an actuator at a site MuJoCo takes the axes from a second one, which stands in the world.
@@ -58,7 +62,7 @@ def add_effort(spec: Any, given: str | Input, channel: int, path: Path) -> None:
     Raises:
         InvalidInput: the file has no such body or site; names ``agents.input``.
     """
-    if isinstance(given, str) or not given.kind:
+    if not isinstance(given, Input) or not given.kind:
         return
     found = getattr(spec, given.kind)(given.name)
     if found is None:
@@ -101,6 +105,8 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
     for channel, robot in enumerate(agents.robots):
         prefix = f"robot_{channel // agents.dimension + 1}/"
         given = robot.input
+        if isinstance(given, Controlled):
+            continue
         if isinstance(given, str):
             given = Input((given,), (1.0,))
         elif given.kind:
@@ -115,14 +121,14 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
             own = given.factors == (1.0,) and _measures(model, prefix, robot.output, index)
             ctrl = int(model.actuator_ctrladr[index])
             if ctrl not in clamps:
-                most = make_force(model, data, index, name, robot.path, own_velocity=own)
-                clamps[ctrl] = name, most
+                low, high = make_force(model, data, index, name, robot.path, own_velocity=own)
+                clamps[ctrl] = name, min(-low, high)
             if factor:
                 rows.append((channel, ctrl, factor))
     found = Driving(
-        np.array([row[0] for row in rows]),
-        np.array([row[1] for row in rows]),
-        np.array([row[2] for row in rows]),
+        np.array([row[0] for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows], dtype=np.int64),
+        np.array([row[2] for row in rows], dtype=np.float64),
     )
     _check_limits(found, clamps, agents)
     return found

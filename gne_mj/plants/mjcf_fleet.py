@@ -17,6 +17,7 @@ from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model, read_model
 from gne_mj.plants.fleet_plant import FleetPlant
+from gne_mj.plants.low_level.table import Controller
 from gne_mj.plants.mjcf_contacts import (
     check_apart,
     counted_owners,
@@ -25,32 +26,53 @@ from gne_mj.plants.mjcf_contacts import (
     share_floors,
     sizes_of,
 )
+from gne_mj.plants.mjcf_control import (
+    add_memory,
+    begin,
+    controllers_of,
+    fleet_controls,
+    limits_met,
+    own_entries,
+    read_all,
+)
 from gne_mj.plants.mjcf_drive import add_effort, driving
 from gne_mj.plants.mjcf_prediction import (
-    FRAME_FUNCTIONS,
-    SENSOR_FUNCTIONS,
     ChannelPlace,
     Prediction,
     add_forces,
+    controls_of,
     drive,
+    drive_again,
     gather,
+    prediction_in,
     refresh,
 )
-from gne_mj.plants.mjcf_reading import Term, array_word, terms_of
+from gne_mj.plants.mjcf_reading import Term, array_word, fresh_by, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
     PLANT_MARK,
+    STATE,
     USERDATA_HEADER,
     check_warnings,
     offsets,
     passive_callback,
     step_address,
+    timed_step,
 )
 from gne_mj.records import by_name
 
-__all__ = ["AGENT", "MjcfPlant", "add_forces", "drive", "gather", "refresh", "stored"]
+__all__ = [
+    "AGENT",
+    "MjcfPlant",
+    "add_forces",
+    "drive",
+    "drive_again",
+    "gather",
+    "refresh",
+    "stored",
+]
 
 NEWTON = 20  # steps to a start's positions
 # What to do where they do
@@ -112,11 +134,13 @@ class MjcfPlant(FleetPlant):
         lookahead = agents.parameters.size
         self.passive = passive_callback(offsets(), self.kernels) if lookahead else None
         with named(path="agents.path"):
-            world, sizes_of_robots, memory_asked = _world(agents)
+            controllers = controllers_of(agents)
+            world, sizes_of_robots, memory_asked = _world(agents, controllers)
+        own = own_entries(controllers)
         with named(world="agents.path"):
             self.model = compile_model(
                 world, timestep=timestep, integrator=INTEGRATORS[integrator],
-                userdata=USERDATA_HEADER + userdata, memory=memory, arena=memory_asked,
+                userdata=USERDATA_HEADER + own + userdata, memory=memory, arena=memory_asked,
             )  # fmt: skip
         self.data = mujoco.MjData(self.model)
         with quiet():
@@ -127,6 +151,7 @@ class MjcfPlant(FleetPlant):
         self._terms: list[Term] = []  # of all outputs that are no joint's
         with named(input="agents.input", output="agents.output"):
             self._driving = driving(self.model, self.data, agents)
+            self._controls = fleet_controls(self.model, self.data, agents, controllers)
         flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -135,20 +160,35 @@ class MjcfPlant(FleetPlant):
         self._twin = mujoco.MjData(model)  # where mode implicit predicts
         self._geom_owners = counted_owners(model, self._owners)
         self.sizes = Sizes(
-            model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER,
+            model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER + own,
             model.na - memory, self._geom_owners.ctypes.data,
         )  # fmt: skip
-        functions = [step_address(name) for name in self._refreshing] or [0, 0, 0]
+        numbers = self._numbers(agents)
+        self.parameter_arrays = [flat, numbers, self._sizes(lookahead)]
+        self._parameter_block = ParameterBlock(self.parameter_arrays)
+
+    def _sizes(self, lookahead: int) -> NDArray[np.int64]:
+        """What compiled code has in SIZES."""
+        terms = [*self._terms, *self._controls.terms]
+        controls = self._controls.behind(
+            len(self._terms), lookahead + len(terms) + len(self._driving.factors)
+        )
+        functions = [
+            step_address(name) if name else 0
+            for names in (self._refreshing, fresh_by(self._controls.terms))
+            for name in (names or ("", "", ""))
+        ]
         prediction = Prediction(
             self._twin._address, KNOWN_STATE, lookahead, array_word(self.data, "cvel"),
-            array_word(self.data, "subtree_com"), len(self._terms), len(self._driving.factors),
-            step_address(), step_address("mj_copyState"), *functions,
+            array_word(self.data, "subtree_com"), len(terms), len(self._driving.factors),
+            len(controls.controllers), controls.room, step_address(),
+            step_address("mj_copyState"), *functions,
         )  # fmt: skip
-        readings = [number for term in self._terms for number in term.numbers(self.data)]
+        readings = [number for term in terms for number in term.numbers(self.data)]
         drives = self._driving.numbers
-        sizes = np.array([*self.sizes, *prediction, *readings, *drives], dtype=np.int64)
-        self.parameter_arrays = [flat, self._numbers(agents), sizes]
-        self._parameter_block = ParameterBlock(self.parameter_arrays)
+        return np.array(
+            [*self.sizes, *prediction, *readings, *drives, *controls.places], dtype=np.int64
+        )
 
     def arrays_for(self, agents: Agents) -> list[NDArray[Any]]:
         """The table's arrays for agents with numbers of their own besides those in their files."""
@@ -157,9 +197,11 @@ class MjcfPlant(FleetPlant):
 
     def _numbers(self, agents: Agents) -> NDArray[np.float64]:
         """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors, of
-        readings and of drives."""
-        factors = [term.factor for term in self._terms]
-        return np.concatenate([np.ravel(agents.parameters), factors, self._driving.factors])
+        readings and of drives, and the controllers' numbers."""
+        factors = [term.factor for term in (*self._terms, *self._controls.terms)]
+        return np.concatenate(
+            [np.ravel(agents.parameters), factors, self._driving.factors, self._controls.numbers]
+        )
 
     def model_fields(
         self, parameters: NDArray[np.float64]
@@ -173,6 +215,11 @@ class MjcfPlant(FleetPlant):
         return int(self.model.nq)
 
     @property
+    def state_bits(self) -> int:
+        """See the base class; controllers keep in userdata what they began with."""
+        return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self._controls.controllers)
+
+    @property
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
         return all(term.fresh for term in self._terms)
@@ -180,9 +227,7 @@ class MjcfPlant(FleetPlant):
     @property
     def _refreshing(self) -> tuple[str, ...]:
         """The functions of MuJoCo's that bring outputs up to date after a step."""
-        if all(term.body >= 0 for term in self._terms):
-            return FRAME_FUNCTIONS if self._terms else ()
-        return SENSOR_FUNCTIONS
+        return fresh_by(self._terms)
 
     def _place(self, i: int, robot: RobotFile) -> tuple[int, int, int]:
         model, prefix = self.model, f"robot_{i // self.agents.dimension + 1}/"
@@ -262,6 +307,18 @@ class MjcfPlant(FleetPlant):
                 str(self.agents.robots[int(np.argmax(missed))].output),
                 "in the file's reference pose no joint velocities give it its initial value",
             )
+        begin(self.data, self._controls, self._read)
+
+    def _read(self, which: int, out: NDArray[np.float64]) -> None:
+        """Fill out with what a controller reads, in a state that is evaluated."""
+        _readings()(self.data._address, self._parameter_block.address, which, out)
+
+    @property
+    def limits_met(self) -> dict[int, dict[str, float]]:
+        """Since the start: for each agent (from 0) with a low-level controller the actuators that
+        it asked for more than they give, by name, and in what part of all evaluations; and
+        "controller" where it gave less by limits of its own."""
+        return limits_met(self.data, self._controls)
 
     def _slopes(self) -> NDArray[np.float64]:
         """(m, nv) how outputs change with joint velocities, all of which are zero at the end."""
@@ -296,17 +353,24 @@ class MjcfPlant(FleetPlant):
 
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
-        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, self._parameter_block.address
-        self._driving.set(self.data.ctrl, np.asarray(u, dtype=np.float64))
+        block = self._parameter_block.address
+        self.data.userdata[:USERDATA_HEADER] = PLANT_MARK, block
+        given = np.array(u, dtype=np.float64)
+        self._driving.set(self.data.ctrl, given)
         with callbacks(passive=self.passive):
-            run_steps()(step_address(), self.model._address, self.data._address, steps)
+            if self._controls.controllers:
+                _driven_steps()(self.model._address, self.data._address, block, given, steps)
+            else:
+                run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)
 
 
 PLANT = MjcfPlant
 
 
-def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
+def _world(
+    agents: MjcfRobots, controllers: dict[int, Controller]
+) -> tuple[Any, list[tuple[int, int]], int]:
     """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
     world = mujoco.MjSpec.from_string(read_model("lane.xml"))
     robots, spacing = agents.files, 0.0 if agents.together else agents.spacing
@@ -322,6 +386,8 @@ def _world(agents: MjcfRobots) -> tuple[Any, list[tuple[int, int]], int]:
         mjcf_file.check_options(world, spec, robot.path)
         for channel in range(i * agents.dimension, (i + 1) * agents.dimension):
             add_effort(spec, agents.robots[channel].input, channel, robot.path)
+        if i in controllers:
+            add_memory(spec, controllers[i])
         sizes.append(sizes_of(spec))
         memory += max(spec.memory, 0)
         place = (0.0, spacing * i, 0.0)
@@ -345,3 +411,31 @@ def _gather() -> Any:
         gather(at, data, parameter_block, state)
 
     return read
+
+
+@cache
+def _readings() -> Any:
+    """Fills what a controller reads: (address of mjData, of the parameter block, which, out)."""
+    source = source_key()
+
+    @compiled
+    def read(data, parameter_block, which, out):
+        _ = source
+        read_all(data, controls_of(parameter_block), which, out)
+
+    return read
+
+
+@cache
+def _driven_steps() -> Any:
+    """The native loop of steps under held inputs that controllers drive with at each of them."""
+    at, source = offsets(), source_key()
+
+    @compiled
+    def run(model, data, parameter_block, u, steps):
+        _ = source
+        for _step in range(steps):
+            drive_again(at, model, data, parameter_block, u)
+            timed_step(at, prediction_in(parameter_block).step, model, data)
+
+    return run

@@ -107,6 +107,6 @@ class InputTable(Table):
         return rows
 
 
-def inputs_of(given: Any, count: int, axes: int) -> list[str | Input]:
+def inputs_of(given: Any, count: int, axes: int) -> list[Any]:
     """The input of every channel, agent by agent: as ``channels`` of mjcf_output has them."""
     return channels("input", given, count, axes)

@@ -2,7 +2,7 @@
 
 Nothing but MuJoCo knows how such robots move. The outputs at the end of a control period are
 therefore found by stepping a second mjData from the same state. It bears no loop's mark, so that
-no law acts on it; the agents' own damping does.
+no law acts on it; the agents' own damping and their low-level controllers do.
 """
 
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from typing import NamedTuple
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.parameter_block import floats, integers
+from gne_mj.plants.mjcf_control import Controls, run_all
 from gne_mj.plants.mjcf_reading import READING, position_of, velocity_of
 from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import (
@@ -34,17 +35,17 @@ class Prediction(NamedTuple):
     centres: int
     readings: int  # how many, behind these numbers
     drives: int  # behind the readings
+    controllers: int  # behind the drives
+    room: int  # entry of userdata where that of all controllers begins
     # addresses of MuJoCo's functions
     step: int
     copy: int
     first: int  # those that bring up to date what is read; 0 if nothing needs them
     second: int
     third: int
-
-
-# Functions of MuJoCo's that bring up to date what is read, in their order: frames alone, or all
-FRAME_FUNCTIONS = ("mj_kinematics", "mj_comPos", "mj_comVel")
-SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
+    look_first: int  # and what controllers read, likewise
+    look_second: int
+    look_third: int
 
 
 class ChannelPlace(Numbers):
@@ -65,7 +66,7 @@ class Drive(Numbers):
 
 PLACE, DRIVE = len(names_of(ChannelPlace)), len(names_of(Drive))
 # Between the places and the sizes: tau, d and v_0 of each channel, nothing where outputs are
-# velocities; then the readings' factors, and the drives'
+# velocities; then the readings' factors, the drives', and the controllers' numbers
 NUMBERS = 1
 READINGS = len(Sizes._fields) + len(Prediction._fields)  # where they begin in SIZES
 prediction_in = in_numbers(Prediction, SIZES, len(Sizes._fields))
@@ -153,6 +154,32 @@ def drive(at, data, parameter_block, u, on):
         each = _drive_in(table, k * DRIVE)
         part = factors[k] * u[each.channel] if on else 0.0
         ctrl[each.actuator] = part if each.first != 0 else ctrl[each.actuator] + part
+    if prediction.controllers > 0:
+        run_all(at, data, controls_of(parameter_block), u, on)
+
+
+@kernel
+def controls_of(parameter_block):
+    """All that controllers are run with."""
+    prediction, numbers = prediction_in(parameter_block), floats(parameter_block, NUMBERS)
+    table = integers(parameter_block, SIZES)[READINGS:]
+    return Controls(
+        prediction.controllers, prediction.twists, prediction.centres, table,
+        table[READING * prediction.readings + DRIVE * prediction.drives :], numbers,
+        prediction.room,
+    )  # fmt: skip
+
+
+@kernel
+def drive_again(at, model, data, parameter_block, u):
+    """Let low-level controllers act where another step begins under inputs u, out of callbacks."""
+    prediction = prediction_in(parameter_block)
+    if prediction.controllers > 0:
+        if prediction.look_first != 0:
+            call(prediction.look_first, model, data)
+            call(prediction.look_second, model, data)
+            call(prediction.look_third, model, data)
+        run_all(at, data, controls_of(parameter_block), u, True)
 
 
 @kernel
@@ -168,6 +195,11 @@ def set_out(context, channels, state, u, trial):
     twin = prediction.twin
     call_state(prediction.copy, model, data, twin, prediction.known)
     mark_twin(at, parameter_block, twin)
+    if prediction.controllers > 0:
+        kept = field(data, at.userdata, prediction.room)
+        given = field(twin, at.userdata, prediction.room)
+        for k in range(USERDATA_HEADER, prediction.room):
+            given[k] = kept[k]
     drive(at, twin, parameter_block, u, True)
 
 
@@ -176,6 +208,7 @@ def step_on(context, channels, clock, u, out, trial, scratch):
     """Fill out (m,) with the outputs one integration step after where the second mjData is."""
     at, model, _data, parameter_block = context
     prediction = prediction_in(parameter_block)
+    drive_again(at, model, prediction.twin, parameter_block, u)
     timed_step(at, prediction.step, model, prediction.twin)
     # a whole mj_forward would leave another warm start
     refresh(model, prediction.twin, parameter_block)
@@ -196,6 +229,7 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     twin = prediction.twin
     set_out(context, channels, state, u, trial)
     for _ in range(clock.period):
+        drive_again(at, model, twin, parameter_block, u)
         timed_step(at, prediction.step, model, twin)
     refresh(model, twin, parameter_block)
     gather(at, twin, parameter_block, trial)

@@ -6,7 +6,7 @@ output is a sum of such numbers, read where they lie; sensors alone are of a ste
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ _FRAMES = {
     "body": ("xpos", "xmat"), "centre": ("xipos", "ximat"), "site": ("site_xpos", "site_xmat"),
     "geom": ("geom_xpos", "geom_xmat"),
 }  # fmt: skip
-_OBJECTS = {
+OBJECTS = {
     "body": _OBJECT.mjOBJ_BODY, "site": _OBJECT.mjOBJ_SITE, "geom": _OBJECT.mjOBJ_GEOM,
     "joint": _OBJECT.mjOBJ_JOINT, "tendon": _OBJECT.mjOBJ_TENDON,
     "actuator": _OBJECT.mjOBJ_ACTUATOR, "sensor": _OBJECT.mjOBJ_SENSOR,
@@ -44,6 +44,16 @@ _FRAME_KINDS = {
     _OBJECT.mjOBJ_BODY: "centre", _OBJECT.mjOBJ_XBODY: "body", _OBJECT.mjOBJ_SITE: "site",
     _OBJECT.mjOBJ_GEOM: "geom",
 }  # fmt: skip
+
+
+# Functions of MuJoCo's that bring up to date what is read, in their order: frames alone, or all
+_FRAME_FUNCTIONS = ("mj_kinematics", "mj_comPos", "mj_comVel")
+_SENSOR_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_sensorVel")
+_STATE_ARRAYS = ("qpos", "qvel", "act")
+_OF_FRAMES = (
+    "xpos", "xmat", "xipos", "ximat", "site_xpos", "site_xmat", "geom_xpos", "geom_xmat", "xaxis",
+    "xanchor", "subtree_com",
+)  # fmt: skip
 
 
 class Reading(Numbers):
@@ -97,6 +107,15 @@ class Term:
             self.place_entry, self.body, self.root, array_word(data, self.matrix), self.axis,
             int(self.angular),
         ]  # fmt: skip
+
+
+def fresh_by(terms: Sequence[Term]) -> tuple[str, ...]:
+    """The functions of MuJoCo's that bring these up to date after a step; none of the state's."""
+    if all(term.body < 0 and term.source in _STATE_ARRAYS for term in terms):
+        return ()
+    if all(term.body >= 0 or term.source in (*_STATE_ARRAYS, *_OF_FRAMES) for term in terms):
+        return _FRAME_FUNCTIONS
+    return _SENSOR_FUNCTIONS
 
 
 def array_word(data: mujoco.MjData, name: str) -> int:
@@ -287,7 +306,7 @@ def _refused(output: Output, expected: str) -> InvalidInput:
 
 
 def _find(model: mujoco.MjModel, kind: str, name: str) -> int:
-    return int(mujoco.mj_name2id(model, _OBJECTS[kind], name))
+    return int(mujoco.mj_name2id(model, OBJECTS[kind], name))
 
 
 def names_in(model: mujoco.MjModel, kind: str, prefix: str) -> list[str]:

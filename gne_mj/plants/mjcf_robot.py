@@ -11,14 +11,15 @@ from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from gne_mj.errors import InvalidInput
 from gne_mj.native import kernel
 from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.lookahead import LookaheadKeys
-from gne_mj.plants.mjcf_input import Input, InputTable, inputs_of
+from gne_mj.plants.low_level.table import Controlled, InputGiven
+from gne_mj.plants.mjcf_input import Input, inputs_of
 from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
 from gne_mj.plants.mjcf_source import located
 from gne_mj.plants.table import AgentsTable, check_sizes
@@ -45,12 +46,12 @@ class RobotFile:
             declared one.
         input: what u_i drives: the name of the actuator whose force it is, at the joint or tendon
             that it drives (at an ``actuatorvel`` sensor of its own the force before the gear), or
-            a declared one.
+            a declared one; or that a low-level controller takes it.
     """
 
     path: Path
     output: str | Output
-    input: str | Input
+    input: str | Input | Controlled
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,8 @@ def storage(q, x, equilibrium_state):
 class MjcfAgents(AgentsTable, LookaheadKeys):
     """Robots of the user's own; with a lookahead their outputs are positions."""
 
+    model_config = ConfigDict(defer_build=True)  # controllers may register after this module
+
     engine: ClassVar[str] = "mujoco"
     type: Literal["mjcf-robot"]
     file: Annotated[str | list[str], Fills("path")] = Field(
@@ -123,9 +126,9 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
         description="joint or velocity sensor that is y_i, or of y = q + tau v; or a table that"
         " says what; of vectors a list of these, for all agents or each"
     )
-    input: str | InputTable | list[str | InputTable] | list[list[str | InputTable]] = Field(
-        description="actuator that u_i drives, or a table of several, or of a force at a body;"
-        " likewise"
+    input: str | InputGiven | list[str | InputGiven] | list[list[str | InputGiven]] = Field(
+        description="actuator that u_i drives, or a table of several, of a force at a body, or of a"
+        " low-level controller; likewise"
     )
 
     spacing: Annotated[float | None, Unit("m")] = Field(

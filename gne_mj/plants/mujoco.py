@@ -111,6 +111,11 @@ def drive(at, data, parameter_block, u, on):
 
 
 @kernel
+def drive_again(at, model, data, parameter_block, u):
+    """What is to be done where another step begins under the same inputs: nothing."""
+
+
+@kernel
 def stored(channels, state, userdata):
     """V^{x*} of all robots, with the arctangents that the passive callback has just kept."""
     return stored_of(flexible_robot, channels, state, userdata)

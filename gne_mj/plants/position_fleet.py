@@ -18,6 +18,7 @@ from gne_mj.plants.mujoco import (
     MujocoPlant,
     add_atan_forces,
     drive,
+    drive_again,
     place_of,
     refresh,
     sizes_in,
@@ -26,7 +27,7 @@ from gne_mj.plants.mujoco import (
 from gne_mj.plants.native_mujoco import field, number
 from gne_mj.plants.position_robot import LOCAL_DAMPING, LOOKAHEAD, REFERENCE_VELOCITY
 
-__all__ = ["AGENT", "PLANT", "add_forces", "drive", "gather", "refresh", "stored"]
+__all__ = ["AGENT", "PLANT", "add_forces", "drive", "drive_again", "gather", "refresh", "stored"]
 
 AGENT = position_robot
 

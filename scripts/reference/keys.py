@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from gne_mj.controllers.table import DiscTable, EventTable, SwitchingTable
-from gne_mj.registry import TIMES, Names, Registry
+from gne_mj.registry import LOW_LEVEL, TIMES, Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.scenario_tables.interventions import InterventionTable, PushTable
 from gne_mj.toml_table import Table, Unit
@@ -46,6 +46,10 @@ TIME = """In the place of any number of a game, those within lists and of `param
 ([moving problems](moving-problems.md)):
 `reference_velocity = {type = "ramp", from = 3.0, to = 5.0, start = 1.0, rate = 0.5}`.
 """
+LOW = """`input` of `type = "mjcf-robot"` may be the table of one of these
+([what they do](robots.md#low-level-controllers)):
+`input = {controller = "quadrotor", rotors = ["a", "b", "c", "d"]}`.
+"""
 TIMES_OF = {tag: TIMES[tag] for tag in sorted(TIMES) if TIMES[tag].__module__.startswith("gne_mj.")}
 
 
@@ -74,6 +78,10 @@ def page() -> str:
                 parts += [f'### `{registry.key} = "{tag}"`\n', _about(table), _rows(table)]
                 parts += [text for key, inner in _inner(table)
                           for text in (f"`{key}` has\n", _rows(inner))]  # fmt: skip
+    parts += ["## Low-level controllers\n", LOW]
+    for tag, table in sorted(LOW_LEVEL._tables.items()):
+        if table.__module__.startswith("gne_mj."):
+            parts += [f'### `controller = "{tag}"`\n', _about(table), _rows(table)]
     parts += ["## Functions of time\n", TIME]
     for tag, table in TIMES_OF.items():
         parts += [f'### `type = "{tag}"`\n', _about(table), _rows(table)]
@@ -89,7 +97,8 @@ def _rows(table: type[Table]) -> str:
     """The keys of a table, but the one that chooses it."""
     lines = ["| key | type | unit | default | range | |", "|---|---|---|---|---|---|"]
     for key, field in table.model_fields.items():
-        if key in ("type", "information"):
+        chooses = key == LOW_LEVEL.key and get_origin(field.annotation) is Literal
+        if chooses or key in ("type", "information"):
             continue
         unit = next((each for each in field.metadata if isinstance(each, Unit)), Unit(""))
         number = _is_number(field)
@@ -176,7 +185,7 @@ def _inner(table: type[Table]) -> Iterator[tuple[str, type[Table]]]:
     """Tables in a table, such as a region; not those that have a name of their own."""
     for key, field in table.model_fields.items():
         for inner in dict.fromkeys(_tables(field.annotation)):
-            if "type" not in inner.model_fields:
+            if inner.model_fields and "type" not in inner.model_fields:
                 yield key, inner
 
 

@@ -1,0 +1,147 @@
+"""Low-level controllers, each against bare MuJoCo with the same law in plain Python."""
+
+import mujoco
+import numpy as np
+import pytest
+from builders import run_loop
+from low_level_robots import CAR, QUADROTOR, fleet, quadrotor_law
+
+from gne_mj.controllers import FullInformation
+from gne_mj.games import velocity_game
+from gne_mj.plants.mjcf_robot import MjcfAgents
+from gne_mj.system import System
+
+ROTORS = {"controller": "quadrotor", "rotors": ["m1", "m2", "m3", "m4"]}
+WHEELS = {"controller": "differential-drive", "wheels": ["left", "right"]}
+
+
+def bare(path, timestep, integrator="EULER"):
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.timestep = timestep
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.mark.parametrize("axes", ["xyz", "x"])
+def test_a_quadrotor_is_that_of_plain_python(tmp_path, axes):
+    """600 steps with a wish that changes, from a heading of 40 degrees."""
+    path, given = tmp_path / "q.xml", {**ROTORS, "axes": list(axes)}
+    output = {"body": "frame", "axes": list(axes)}
+    plant = fleet(path, QUADROTOR, given, output, len(axes))
+    plant.reset(np.zeros((len(axes), 2)))
+    model, data = bare(path, 0.002)
+    place, heading = data.qpos[:3].copy(), data.xmat[1].reshape(3, 3)[:, 0].copy()
+    for wish in ([0.9, -0.8, 0.5], [-2.0, 3.0, 40.0], [-7.0, 2.0, 0.0]):
+        u = np.where([axis in axes for axis in "xyz"], wish, np.nan)
+        plant.step(u[: len(axes)], 200)
+        for _ in range(200):
+            mujoco.mj_forward(model, data)
+            data.ctrl[:] = quadrotor_law(model, data, u, place, heading)
+            mujoco.mj_step(model, data)
+        assert np.allclose(plant.data.qpos, data.qpos, rtol=0, atol=1e-12)
+        assert np.allclose(plant.data.qvel, data.qvel, rtol=0, atol=1e-11)
+    # upwards and tilted as asked for, it wants more than the rotors give
+    met = plant.limits_met[0]
+    assert ("m3" in met) == (axes == "xyz")
+    assert met["controller"] == pytest.approx(1 / 3)  # the last wish is beyond the tilt
+
+
+def test_a_quadrotor_hovers_and_comes_back_to_its_attitude(tmp_path):
+    """At rest to rounding; pushed out of it by 0.2 rad the tilt follows (1 + w t) exp(-w t)."""
+    plant = fleet(tmp_path / "q.xml", QUADROTOR, ROTORS, {"body": "frame"}, 3)
+    plant.reset(np.zeros((3, 2)))
+    plant.step(np.zeros(3), 500)
+    assert np.allclose(plant.data.qvel, 0, rtol=0, atol=1e-10)
+    plant.reset(np.zeros((3, 2)))
+    mujoco.mju_mulQuat(
+        plant.data.qpos[3:7], plant.data.qpos[3:7].copy(), [np.cos(0.1), np.sin(0.1), 0, 0]
+    )
+    for step in range(100):
+        up = plant.data.xmat[plant.model.body("robot_1/frame").id].reshape(3, 3)[2, 2]
+        t = 0.002 * step
+        if step:
+            assert abs(np.arccos(up) - 0.2 * (1 + 20 * t) * np.exp(-20 * t)) < 0.004
+        plant.step(np.zeros(3))
+
+
+MODES = [("rk4", "continuous", 0.002), ("euler", "sampled", 0.02), ("rk4", "implicit", 0.1)]
+
+
+@pytest.mark.parametrize(("integrator", "mode", "period"), MODES)
+def test_quadrotors_in_the_native_loops(tmp_path, integrator, mode, period):
+    """The plain law under the recorded inputs; mode implicit predicts the run's own outputs."""
+    path = tmp_path / "q.xml"
+    path.write_text(QUADROTOR)
+    agents = MjcfAgents(
+        type="mjcf-robot", count=3, file=str(path), output={"body": "frame", "axes": ["x"]},
+        input={**ROTORS, "axes": ["x"]},
+    ).build((1,) * 3)  # fmt: skip
+    y = np.array([0.3, 0.5, 0.1])
+    system = System(
+        "quadrotors", velocity_game(3, 1.0, 2.0), agents, FullInformation(), 0.1,
+        agents.equilibrium(y), engine="mujoco", mode=mode, integrator=integrator,
+    )  # fmt: skip
+    states, inputs, _, loop = run_loop(system, 0.002, 100, period)
+    if mode == "implicit":
+        assert loop.monitor.prediction < 1e-12
+    if mode == "sampled":
+        model, data = bare(path, 0.002)
+        place, heading = data.qpos[:3].copy(), data.xmat[1].reshape(3, 3)[:, 0].copy()
+        data.qvel[0] = y[0]
+        for u, at in zip(inputs[:-1, 0], states[:-1, 0, 0], strict=True):
+            assert data.qvel[0] == pytest.approx(at, abs=1e-12)
+            mujoco.mj_forward(model, data)
+            wish = np.array([u, np.nan, np.nan])
+            data.ctrl[:] = quadrotor_law(model, data, wish, place, heading)
+            mujoco.mj_step(model, data)
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_a_cars_wheels_give_the_power_that_is_asked_for(tmp_path, planar):
+    """u . y is the sum of tau omega where wheels roll; y is the site's own velocity."""
+    given = {**WHEELS, "site": "nose"} if planar else WHEELS
+    output = (
+        {"site": "nose", "axes": ["x", "y"]} if planar
+        else {"body": "car", "frame": "own", "axes": ["x"]}
+    )  # fmt: skip
+    plant = fleet(tmp_path / "car.xml", CAR, given, output, 1 + planar, timestep=0.001)
+    plant.reset(np.zeros((1 + planar, 2)))
+    plant.step(np.zeros(1 + planar), 500)
+    u, data, supplied, missed = np.array([2.0, 1.5])[: 1 + planar], plant.data, 0.0, 0.0
+    wheels = [plant.model.joint(f"robot_1/{side}").dofadr[0] for side in ("left", "right")]
+    for _ in range(500):
+        y, rates = plant.output, data.qvel[wheels].copy()
+        plant.step(u)
+        supplied += u @ y
+        missed += u @ y - data.qfrc_actuator[wheels] @ rates
+    assert supplied * 0.001 > 0.1
+    assert abs(missed) < 0.02 * supplied
+    # where they roll without any slip, it is so to rounding
+    plant.reset(np.zeros((1 + planar, 2)))
+    v, turning = 0.7, -1.1
+    ahead, left = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    data.qvel[:2] = v * ahead + 0.05 * turning * left  # the axle is 0.05 m behind
+    data.qvel[5] = turning
+    data.qpos[3:7] = np.cos(0.15), 0.0, 0.0, np.sin(0.15)
+    data.qvel[wheels] = (v - 0.15 * turning) / 0.1, -(v + 0.15 * turning) / 0.1
+    mujoco.mj_forward(plant.model, data)
+    y, rates = plant.output, data.qvel[wheels].copy()
+    plant.step(u)
+    assert data.qfrc_actuator[wheels] @ rates == pytest.approx(u @ y, rel=1e-12)
+
+
+def test_a_cars_heading_is_held(tmp_path):
+    """Against a push that turns it; without holding it turns away."""
+    turned = []
+    for more in ({}, {"hold_heading": 15.0}):
+        plant = fleet(
+            tmp_path / "car.xml", CAR, {**WHEELS, **more},
+            {"body": "car", "frame": "own", "axes": ["x"]}, 1,
+        )  # fmt: skip
+        plant.reset(np.zeros((1, 2)))
+        plant.data.qfrc_applied[5] = 0.3
+        plant.step([0.5], 500)
+        turned.append(np.arcsin(plant.data.xmat[plant.model.body("robot_1/car").id][3]))
+    assert abs(turned[1]) < 0.2 * abs(turned[0])
