@@ -57,7 +57,7 @@ def replay_html(shown: "Shown") -> str:
 
     page = escape(html_page(shown), quote=True)
     return (
-        f'<iframe title="replay" sandbox="allow-scripts" srcdoc="{page}"'
+        f'<iframe title="replay" sandbox="allow-scripts allow-downloads" srcdoc="{page}"'
         f' style="width:100%;height:{HEIGHT}px;border:1px solid #8888"></iframe>'
     )
 

@@ -2,7 +2,7 @@ import js from "@eslint/js";
 
 // What browsers have and the page uses; any other name is one that was not imported.
 const BROWSER = [
-  "Blob", "DecompressionStream", "Element", "HTMLInputElement", "ResizeObserver", "Response", "TextDecoder",
+  "Blob", "DecompressionStream", "Element", "HTMLInputElement", "IntersectionObserver", "ResizeObserver", "Response", "TextDecoder",
   "URL", "WebSocket", "addEventListener", "atob", "clearTimeout", "devicePixelRatio", "document",
   "fetch", "getComputedStyle", "innerHeight", "innerWidth", "localStorage", "location",
   "matchMedia", "navigator", "performance", "requestAnimationFrame", "setTimeout", "window",

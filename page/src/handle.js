@@ -32,6 +32,10 @@ export const handleOf = (page) => ({
   get framesReceived() {
     return page.live?.framesReceived ?? 0;
   },
+  /** How far the camera is, in distances at which all fits. */
+  zoom: () => page.scene.camera.zoom,
+  /** Whether the 3-D view has a context, and a picture. */
+  alive: () => page.scene.alive,
   /** What the page is doing. */
   state: () => stateOf(page),
 });

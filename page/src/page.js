@@ -6,6 +6,7 @@ import { Keep, momentAsked } from "./keep.js";
 import { Live } from "./live.js";
 import { Overlay } from "./overlay.js";
 import { fetchReplay, fromBase64, unpack } from "./pack.js";
+import { Pace } from "./pace.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
 import { Scene } from "./scene.js";
@@ -18,13 +19,13 @@ import { wire } from "./wiring.js";
 /** @import { Plot } from "./plot.js" */
 
 const SLOW = 100; // ms between refreshes of texts and, live, of plots
-const PICTURE = 0.016; // s between pictures, where nothing is slow
 
 export class Page {
   /** @param {"live" | "served" | "file"} mode where the page and its numbers come from */
   constructor(mode) {
     this.mode = mode;
     this.scene = new Scene(byId("pane"));
+    this.pace = new Pace(this.scene);
     this.overlay = new Overlay(byId("overlay"), this.scene);
     this.plots = new Plots(byId("plots"), {
       seek: (time) => this.seek(time),
@@ -44,9 +45,9 @@ export class Page {
     /** @type {Instant | null} */
     this.instant = null; // what is drawn
     this.drawn = false; // whether anything was
+    this.seen = true; // or out of sight, in a page around
     this.wasMoving = false;
     this.before = NaN; // ms, of the picture before
-    this.usual = PICTURE; // s between pictures
     this.slowDue = 0; // ms, when texts are refreshed
     wire(this);
     if (mode === "live") this.startLive();
@@ -238,31 +239,31 @@ export class Page {
 
   // ---- pictures
 
+  /**
+   * Out of sight nothing is drawn, and time stands still.
+   * @param {boolean} seen
+   */
+  setSeen(seen) {
+    if (seen === this.seen) return;
+    this.seen = seen;
+    this.before = NaN;
+    if (seen) this.scene.wake();
+    else this.scene.rest();
+  }
+
   /** @param {number} now ms */
   loop(now) {
     requestAnimationFrame((next) => this.loop(next));
+    if (!this.seen) return;
     const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1000;
     this.before = now;
     const { source } = this;
-    this.watchPace(passed, source?.playing ?? false);
+    this.pace.watch(passed, source?.playing ?? false);
     source?.advance(passed);
     if (!this.meta || !source) return;
     if (source.playing) this.overlay.links.flow(this.meta.systems.filter(isSolid), now);
     this.draw(source, now);
     if (now >= this.slowDue) this.slow(this.meta, source, now);
-  }
-
-  /**
-   * @param {number} passed s
-   * @param {boolean} playing
-   */
-  watchPace(passed, playing) {
-    if (!playing) {
-      this.usual = PICTURE;
-      return this.scene.setQuality(1);
-    }
-    this.usual += 0.1 * (passed - this.usual);
-    if (this.usual > 0.05) this.scene.setQuality(0.6);
   }
 
   /**

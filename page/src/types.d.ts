@@ -235,6 +235,7 @@ export interface Elements {
   "keep-run": HTMLAnchorElement;
   tuning: HTMLDetailsElement;
   "tuning-body": HTMLElement;
+  main: HTMLElement;
   pane: HTMLElement;
   overlay: HTMLCanvasElement;
   waiting: HTMLElement;

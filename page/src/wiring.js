@@ -1,6 +1,7 @@
 // What keys, buttons and the mouse do.
 import { byId, press } from "./dom.js";
 import { onKeys } from "./keys.js";
+import { leaveWheel } from "./sight.js";
 /** @import { Page } from "./page.js" */
 
 const NARROWEST = 280; // px of the plots
@@ -39,6 +40,7 @@ export const wire = (page) => {
   byId("banner-close").onclick = () => (byId("banner").hidden = true);
   byId("banner-show").onclick = () => page.seekExit();
   wirePane(page);
+  leaveWheel();
   wireDivider();
   leaveKeys();
 };

@@ -88,35 +88,39 @@
   };
 
   // src/handle.js
-  var handleOf = (page) => ({
+  var handleOf = (page2) => ({
     /** Whether something has been drawn. */
     get ready() {
-      return page.drawn;
+      return page2.drawn;
     },
     /** Simulated time that is shown, s. */
-    time: () => page.source?.time ?? 0,
+    time: () => page2.source?.time ?? 0,
     /** Shows a time of a replay, at once. */
     seek(time) {
-      page.seek(time);
-      if (page.source) page.draw(page.source, performance.now());
+      page2.seek(time);
+      if (page2.source) page2.draw(page2.source, performance.now());
     },
     /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
-    position: (path) => page.scene.position(path),
+    position: (path) => page2.scene.position(path),
     /** CSS colour of an agent (from 0) as it is drawn. */
-    tint: (agent, system) => tintOf(page, agent, system),
+    tint: (agent, system) => tintOf(page2, agent, system),
     /** What lies on the ground under a system's robots: outputs, the region's middle, strips. */
-    plan: (system) => planOf(page, system),
+    plan: (system) => planOf(page2, system),
     /** How each system is drawn, beside those of other runs or over them. */
-    compared: () => comparedOf(page),
+    compared: () => comparedOf(page2),
     /** What is plotted. */
     get plots() {
-      return page.plots.describe();
+      return page2.plots.describe();
     },
     get framesReceived() {
-      return page.live?.framesReceived ?? 0;
+      return page2.live?.framesReceived ?? 0;
     },
+    /** How far the camera is, in distances at which all fits. */
+    zoom: () => page2.scene.camera.zoom,
+    /** Whether the 3-D view has a context, and a picture. */
+    alive: () => page2.scene.alive,
     /** What the page is doing. */
-    state: () => stateOf(page)
+    state: () => stateOf(page2)
   });
   var tintOf = ({ scene }, agent, name) => {
     const bars2 = scene.bars.find(({ system }) => system.name === name);
@@ -310,9 +314,9 @@
   var offsetOf = ({ shift, beside }, ghosts) => ghosts ? shift : [shift[0] + beside[0], shift[1] + beside[1]];
   var Comparison = class {
     /** @param {Page} page */
-    constructor(page) {
-      this.page = page;
-      this.hidden = page.plots.hiddenRuns;
+    constructor(page2) {
+      this.page = page2;
+      this.hidden = page2.plots.hiddenRuns;
       this.ghosts = false;
       this.meta = null;
       byId("compare").onchange = () => this.setGhosts(byId("compare").value === "ghosts");
@@ -596,8 +600,8 @@
   };
   var Keep = class {
     /** @param {Page} page */
-    constructor(page) {
-      this.page = page;
+    constructor(page2) {
+      this.page = page2;
       byId("keep-link").onclick = () => this.link();
       byId("keep-scenario").onclick = () => this.scenario();
       addEventListener("hashchange", () => this.go());
@@ -1485,6 +1489,30 @@
         if (away < nearest) [best, nearest] = [{ system: mark.system, agent: mark.agent }, away];
       }
       return best;
+    }
+  };
+
+  // src/pace.js
+  var PICTURE = 0.016;
+  var SLOW = 0.05;
+  var COARSE = 0.6;
+  var Pace = class {
+    /** @param {Scene} scene */
+    constructor(scene) {
+      this.scene = scene;
+      this.usual = PICTURE;
+    }
+    /**
+     * @param {number} passed s since the picture before
+     * @param {boolean} playing
+     */
+    watch(passed, playing) {
+      if (!playing) {
+        this.usual = PICTURE;
+        return this.scene.setQuality(1);
+      }
+      this.usual += 0.1 * (passed - this.usual);
+      if (this.usual > SLOW) this.scene.setQuality(COARSE);
     }
   };
 
@@ -8521,6 +8549,24 @@
       this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
       camera.render();
     }
+    /** Gives the graphics context up, of which a browser has some sixteen for all its pages. */
+    rest() {
+      this.viewer.renderer.forceContextLoss();
+    }
+    /** Gets it back; three.js then sends everything again. */
+    wake() {
+      this.viewer.renderer.forceContextRestore();
+      this.dirty();
+    }
+    /** Whether there is a context, and a picture with more than one colour in it. */
+    get alive() {
+      const gl = this.viewer.renderer.getContext();
+      if (gl.isContextLost()) return false;
+      this.camera.render();
+      const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+      gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return new Set(new Uint32Array(pixels.buffer)).size > 16;
+    }
     get needsRender() {
       return this.viewer.needs_render;
     }
@@ -8687,17 +8733,17 @@
     speedKey = "";
     // of what the menu of speeds has
     /** @param {Page} page which is driven */
-    constructor(page) {
+    constructor(page2) {
       this.play = byId("play");
       this.speed = byId("speed");
       this.slider = byId("time-slider");
-      this.play.onclick = () => page.playPause();
-      byId("step").onclick = (event) => page.step(1, event.shiftKey);
-      byId("back").onclick = (event) => page.step(-1, event.shiftKey);
-      byId("restart").onclick = () => page.restart();
-      this.speed.onchange = () => page.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
-      this.slider.oninput = () => page.seek(Number(this.slider.value));
-      this.lead = (time) => page.lead(time);
+      this.play.onclick = () => page2.playPause();
+      byId("step").onclick = (event) => page2.step(1, event.shiftKey);
+      byId("back").onclick = (event) => page2.step(-1, event.shiftKey);
+      byId("restart").onclick = () => page2.restart();
+      this.speed.onchange = () => page2.setSpeed(this.speed.value === "max" ? null : Number(this.speed.value));
+      this.slider.oninput = () => page2.seek(Number(this.slider.value));
+      this.lead = (time) => page2.lead(time);
     }
     /**
      * @param {Source} source what is shown
@@ -9001,23 +9047,48 @@
     return slides || target.getAttribute("role") === "separator";
   };
 
+  // src/sight.js
+  var inside = window.parent !== window;
+  var watchSight = (tell) => {
+    if (!inside) return tell(true);
+    const watch = new IntersectionObserver((entries) => tell(entries[entries.length - 1].isIntersecting));
+    watch.observe(document.documentElement);
+  };
+  var scrolls = () => inside || byId("main").scrollHeight > byId("main").clientHeight;
+  var leaveWheel = () => {
+    const pane = byId("pane");
+    const has = () => document.hasFocus() && document.activeElement === pane;
+    document.body.classList.toggle("inside", inside);
+    pane.addEventListener("pointerdown", () => pane.focus({ preventScroll: true }), true);
+    pane.addEventListener(
+      "wheel",
+      (event) => {
+        if (scrolls() && !has() && !event.ctrlKey) event.stopPropagation();
+      },
+      true
+    );
+    pane.addEventListener("keydown", ({ key }) => {
+      if (key === "Escape") pane.blur();
+    });
+  };
+
   // src/wiring.js
   var NARROWEST2 = 280;
   var VIEW = 380;
-  var wire = (page) => {
-    const { scene, toolbar } = page;
+  var wire = (page2) => {
+    const { scene, toolbar } = page2;
     const actions = {
-      " ": () => page.playPause(),
-      ArrowRight: ({ shiftKey }) => page.step(1, shiftKey),
-      ArrowLeft: ({ shiftKey }) => page.step(-1, shiftKey),
-      r: () => page.restart(),
+      " ": () => page2.playPause(),
+      ArrowRight: ({ shiftKey }) => page2.step(1, shiftKey),
+      ArrowLeft: ({ shiftKey }) => page2.step(-1, shiftKey),
+      r: () => page2.restart(),
       f: () => toolbar.fit(),
       l: () => toolbar.toggleLabels(),
       c: () => toolbar.toggleLinks(),
       g: () => toolbar.toggleGhosts(),
       p: fold,
-      b: () => page.comparison.toggle(),
-      d: () => page.switchTheme(),
+      b: () => page2.comparison.toggle(),
+      d: () => page2.switchTheme(),
       "?": () => byId("help").showModal(),
       "[": () => scene.camera.nudge(-6, 1),
       "]": () => scene.camera.nudge(6, 1),
@@ -9034,8 +9105,9 @@
     byId("theme").onclick = actions.d;
     byId("help-open").onclick = actions["?"];
     byId("banner-close").onclick = () => byId("banner").hidden = true;
-    byId("banner-show").onclick = () => page.seekExit();
-    wirePane(page);
+    byId("banner-show").onclick = () => page2.seekExit();
+    wirePane(page2);
+    leaveWheel();
     wireDivider();
     leaveKeys();
   };
@@ -9054,19 +9126,19 @@
       if (pressed?.tagName !== "SELECT") release(pressed);
     });
   };
-  var wirePane = (page) => {
+  var wirePane = (page2) => {
     const pane = byId("pane");
     const near = (event) => {
       const box = pane.getBoundingClientRect();
-      return page.overlay.agentNear(event.clientX - box.left, event.clientY - box.top);
+      return page2.overlay.agentNear(event.clientX - box.left, event.clientY - box.top);
     };
     pane.addEventListener("mousemove", (event) => {
       if (event.buttons) return;
       const which = near(event);
-      if (JSON.stringify(which) !== JSON.stringify(page.overlay.highlighted)) page.highlight(which);
+      if (JSON.stringify(which) !== JSON.stringify(page2.overlay.highlighted)) page2.highlight(which);
     });
-    pane.addEventListener("mouseleave", () => page.highlight(null));
-    pane.addEventListener("dblclick", (event) => page.toolbar.followAgent(near(event)));
+    pane.addEventListener("mouseleave", () => page2.highlight(null));
+    pane.addEventListener("dblclick", (event) => page2.toolbar.followAgent(near(event)));
   };
   var wireDivider = () => {
     const divider = byId("divider");
@@ -9088,13 +9160,13 @@
   };
 
   // src/page.js
-  var SLOW = 100;
-  var PICTURE = 0.016;
+  var SLOW2 = 100;
   var Page = class {
     /** @param {"live" | "served" | "file"} mode where the page and its numbers come from */
     constructor(mode2) {
       this.mode = mode2;
       this.scene = new Scene(byId("pane"));
+      this.pace = new Pace(this.scene);
       this.overlay = new Overlay(byId("overlay"), this.scene);
       this.plots = new Plots(byId("plots"), {
         seek: (time) => this.seek(time),
@@ -9110,9 +9182,9 @@
       this.meta = null;
       this.instant = null;
       this.drawn = false;
+      this.seen = true;
       this.wasMoving = false;
       this.before = NaN;
-      this.usual = PICTURE;
       this.slowDue = 0;
       wire(this);
       if (mode2 === "live") this.startLive();
@@ -9283,30 +9355,30 @@
       this.comparison.restyle();
     }
     // ---- pictures
+    /**
+     * Out of sight nothing is drawn, and time stands still.
+     * @param {boolean} seen
+     */
+    setSeen(seen) {
+      if (seen === this.seen) return;
+      this.seen = seen;
+      this.before = NaN;
+      if (seen) this.scene.wake();
+      else this.scene.rest();
+    }
     /** @param {number} now ms */
     loop(now) {
       requestAnimationFrame((next) => this.loop(next));
+      if (!this.seen) return;
       const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1e3;
       this.before = now;
       const { source } = this;
-      this.watchPace(passed, source?.playing ?? false);
+      this.pace.watch(passed, source?.playing ?? false);
       source?.advance(passed);
       if (!this.meta || !source) return;
       if (source.playing) this.overlay.links.flow(this.meta.systems.filter(isSolid), now);
       this.draw(source, now);
       if (now >= this.slowDue) this.slow(this.meta, source, now);
-    }
-    /**
-     * @param {number} passed s
-     * @param {boolean} playing
-     */
-    watchPace(passed, playing) {
-      if (!playing) {
-        this.usual = PICTURE;
-        return this.scene.setQuality(1);
-      }
-      this.usual += 0.1 * (passed - this.usual);
-      if (this.usual > 0.05) this.scene.setQuality(0.6);
     }
     /**
      * @param {Source} source
@@ -9344,11 +9416,17 @@
       this.toolbar.showLegend(this.instant);
       this.transport.show(source, this.live);
       this.keep.show();
-      this.slowDue = now + Math.max(SLOW, 6 * (performance.now() - began));
+      this.slowDue = now + Math.max(SLOW2, 6 * (performance.now() - began));
     }
   };
 
   // src/main.js
   var { mode = "served" } = JSON.parse(byId("settings").textContent || "{}");
-  window.gne = handleOf(new Page(mode));
+  var page = null;
+  watchSight((seen) => {
+    if (page) return page.setSeen(seen);
+    if (!seen) return;
+    page = new Page(mode);
+    window.gne = handleOf(page);
+  });
 })();
