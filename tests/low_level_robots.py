@@ -60,6 +60,52 @@ CAR = """
 </mujoco>
 """
 
+BOAT = """
+<mujoco>
+  <option density="1000" viscosity="0.001" gravity="0 0 0"/>
+  <worldbody>
+    <body name="hull" euler="0 0 25">
+      <joint name="surge" type="slide" axis="1 0 0"/>
+      <joint name="sway" type="slide" axis="0 1 0"/>
+      <joint name="yaw" type="hinge" axis="0 0 1"/>
+      <geom type="ellipsoid" size="0.6 0.2 0.1" mass="25"/>
+      <site name="bow" pos="0.5 0 0"/>
+      <site name="port" pos="-0.5 0.15 0"/>
+      <site name="starboard" pos="-0.5 -0.2 0"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <general name="port" site="port" gear="1 0 0 0 0 0" gainprm="20" ctrlrange="-1 1"/>
+    <motor name="starboard" site="starboard" gear="2 0 0 0 0 0" ctrlrange="-10 10"/>
+  </actuator>
+</mujoco>
+"""
+
+ARM = """
+<mujoco>
+  <worldbody>
+    <body name="rail">
+      <joint name="rail" type="slide" axis="0.6 0.8 0"/>
+      <geom size="0.1" mass="2"/>
+      <body name="upper" pos="0.1 0 0.1">
+        <joint name="turn" axis="0 0 1"/>
+        <joint name="lift" axis="0 1 0" pos="0.02 0 0"/>
+        <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.03" mass="1"/>
+        <body name="lower" pos="0.4 0 0" euler="10 20 0">
+          <joint name="elbow" axis="0 1 0.2"/>
+          <geom type="capsule" fromto="0 0 0 0.3 0 0.1" size="0.03" mass="0.6"/>
+          <site name="hand" pos="0.3 0 0.1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="a" joint="rail"/><motor name="b" joint="turn" gear="5"/>
+    <velocity name="c" joint="lift" kv="3"/><motor name="d" joint="elbow" gear="-2"/>
+  </actuator>
+</mujoco>
+"""
+
 
 def fleet(path, text, given, output, axes, count=1, timestep=0.002, integrator="euler", **keys):
     """A plant of such robots."""

@@ -4,9 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 from builders import run_loop
-from low_level_robots import CAR, QUADROTOR, fleet, quadrotor_law
+from low_level_robots import ARM, BOAT, CAR, QUADROTOR, fleet, quadrotor_law
 
 from gne_mj.controllers import FullInformation
+from gne_mj.errors import InvalidInput
 from gne_mj.games import velocity_game
 from gne_mj.plants.mjcf_robot import MjcfAgents
 from gne_mj.system import System
@@ -145,3 +146,82 @@ def test_a_cars_heading_is_held(tmp_path):
         plant.step([0.5], 500)
         turned.append(np.arcsin(plant.data.xmat[plant.model.body("robot_1/car").id][3]))
     assert abs(turned[1]) < 0.2 * abs(turned[0])
+
+
+HAND = {"controller": "hand", "joints": list("abcd"), "site": "hand"}
+SCREWS = {"controller": "two-screws", "screws": ["port", "starboard"], "body": "hull"}
+
+
+def test_a_boats_screws_give_the_power_that_is_asked_for(tmp_path):
+    """F v + M omega is that of thrusts at their sites; at the bow but for what sways."""
+    output = [
+        {"body": "hull", "frame": "own", "axes": ["x"]},
+        {"body": "hull", "velocity": "angular", "axes": ["z"]},
+    ]
+    plant = fleet(tmp_path / "boat.xml", BOAT, SCREWS, output, 2)
+    plant.reset([[0.5, 0.0], [0.2, 0.0]])
+    data, u = plant.data, np.array([8.0, -1.5])
+    for _ in range(300):
+        y, rates = plant.output, data.actuator_velocity.copy()
+        plant.step(u)
+        rates = data.actuator_velocity  # of the step's start, with the gears
+        assert data.actuator_force @ rates == pytest.approx(u @ y, rel=1e-9)
+    assert abs(data.qvel[1]) > 1e-4  # it sways, which the water and the turn do
+    plant = fleet(
+        tmp_path / "boat.xml", BOAT, {**SCREWS, "site": "bow"},
+        {"site": "bow", "axes": ["x", "y"]}, 2,
+    )  # fmt: skip
+    plant.reset(np.zeros((2, 2)))
+    plant.step(u, 300)
+    y, hull = plant.output, plant.model.body("robot_1/hull").id
+    sway = plant.data.xmat[hull].reshape(3, 3)[:2, 1]
+    plant.step(u)
+    supplied = plant.data.actuator_force @ plant.data.actuator_velocity
+    aside = u @ sway * (plant.data.cvel[hull, 3:5] @ sway)
+    assert supplied == pytest.approx(u @ y - aside, rel=1e-3)
+
+
+def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
+    """Joint torques against mj_jacSite and mj_jacSubtreeCom; at no force the arm stays."""
+    given = HAND
+    plant = fleet(tmp_path / "arm.xml", ARM, given, {"site": "hand"}, 3)
+    model, data, rng = plant.model, plant.data, np.random.default_rng(1)
+    plant.reset(np.zeros((3, 2)))
+    plant.step(np.zeros(3), 500)
+    assert np.allclose(data.qvel, 0, rtol=0, atol=1e-11)
+    jacobian, of_mass = np.zeros((3, 4)), np.zeros((3, 4))
+    for _ in range(5):
+        data.qpos[:], data.qvel[:] = rng.normal(size=(2, 4))
+        mujoco.mj_forward(model, data)
+        mujoco.mj_jacSite(model, data, jacobian, None, model.site("robot_1/hand").id)
+        mujoco.mj_jacSubtreeCom(model, data, of_mass, model.body("robot_1/rail").id)
+        u, y = rng.normal(size=3), plant.output
+        expected = jacobian.T @ u - of_mass.T @ model.opt.gravity * 3.6
+        assert u @ y == pytest.approx(u @ jacobian @ data.qvel, rel=1e-12)
+        plant.step(u)
+        assert np.allclose(data.qfrc_actuator, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "axes", "key", "words"),
+    [
+        (QUADROTOR, {**ROTORS, "rotors": ["m1", "m2", "m3", "m3"]}, 3, "rotors", "three moments"),
+        (QUADROTOR, {**ROTORS, "rotors": ["m1", "m2", "m3", "m5"]}, 3, "rotors", "did you mean"),
+        (QUADROTOR, {**ROTORS, "axes": ["x"]}, 3, "axes", "name as many axes"),
+        (
+            CAR,
+            {**WHEELS, "wheels": ["right", "left"]},
+            1,
+            "wheels",
+            "first one must be on its left",
+        ),
+        (CAR, {**WHEELS, "hold_heading": 1.0}, 2, "hold_heading", "one entry"),
+        (CAR, {**WHEELS, "site": "nose"}, 1, "site", "two entries"),
+        (BOAT, {**SCREWS, "screws": ["port", "port"]}, 1, "screws", "left of the other"),
+        (BOAT, {**SCREWS, "body": None}, 1, "body", "has 0 free joints"),
+        (ARM, {**HAND, "joints": ["a", "b"]}, 2, "joints", "'elbow'"),
+    ],
+)
+def test_what_does_not_fit_is_told(tmp_path, text, given, axes, key, words):
+    with pytest.raises(InvalidInput, match=rf"agents.input.{key}: .*{words}"):
+        fleet(tmp_path / "robot.xml", text, given, {"site": "any"}, axes)

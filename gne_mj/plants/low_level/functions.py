@@ -24,7 +24,7 @@ def _compiled(module: ModuleType) -> Any:
     ``seen`` is the address of readings, input and memory, ``out`` that of controls and rates.
     """
     source = source_key(module)
-    moves = hasattr(module, "rate")
+    moves, counts = hasattr(module, "rate"), getattr(module, "COUNTS_LIMITS", False)
     rate = module.rate if moves else _still
 
     def function(q, count, seen, readings, inputs, moving, held, out, controls):
@@ -34,7 +34,10 @@ def _compiled(module: ModuleType) -> Any:
         memory = floats_at(seen + 8 * (readings + inputs), moving + held)
         if moves:
             rate(numbers, read, memory, u, floats_at(out + 8 * controls, moving))
-        return module.control(numbers, read, memory, u, floats_at(out, controls))
+        if counts:
+            return module.control(numbers, read, memory, u, floats_at(out, controls))
+        module.control(numbers, read, memory, u, floats_at(out, controls))
+        return 0
 
     return callback(_FUNCTION, function)
 

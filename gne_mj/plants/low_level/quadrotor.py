@@ -26,6 +26,7 @@ from gne_mj.toml_table import Unit
 if TYPE_CHECKING:
     from gne_mj.plants.low_level.robot import Robot
 
+COUNTS_LIMITS = True
 LEAST_LIFT = 0.2  # part of the weight that F has upwards at least
 # q: mass, weight, tan of the greatest tilt, w_n, zeta, k, for x, y, z the input's entry (-1: held)
 _MASS, _WEIGHT, _TILT, _FREQUENCY, _DAMPING, _HOLD, _AXES = 0, 1, 2, 3, 4, 5, 6

@@ -85,6 +85,20 @@ class Robot(NamedTuple):
             raise self.refused(key, actuator, f"it must drive a {what} joint")
         return joint
 
+    def joints_above(self, body: int) -> list[int]:
+        """The joints of a body and of all that carry it."""
+        model = self.model
+        found: list[int] = []
+        while body:
+            first = int(model.body_jntadr[body])
+            found += range(first, first + int(model.body_jntnum[body]))
+            body = int(model.body_parentid[body])
+        return found
+
+    def slides(self, joint: int) -> bool:
+        """Whether it is a slide and no hinge."""
+        return bool(self.model.jnt_type[joint] == _JOINT.mjJNT_SLIDE)
+
     def carries(self, body: int, other: int) -> bool:
         """Whether a body is another one, or that is attached to it."""
         while other > body:

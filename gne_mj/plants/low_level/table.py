@@ -4,8 +4,9 @@ It takes all entries of one agent's input u at once, reads the robot, and says w
 actuators that it names shall give; it may have a memory, whose rate it says too. Each kind is one
 module (``low_level/quadrotor.py``) with its registered table and its kernels:
 
-    control(q, readings, memory, u, out)   fills out (controls,), of actuators that are forces; 1 if
-                                           it gave less than u asks for, by limits of its own
+    control(q, readings, memory, u, out)   fills out (controls,), of actuators that are forces; with
+                                           COUNTS_LIMITS = True it returns 1 where it gave less than
+                                           u asks for, by limits of its own, and else 0
     rate(q, readings, memory, u, out)      fills out (moving,); only with a memory that moves
     start(q, readings, out)                fills out (memory,) at a run's start; called in Python
 
