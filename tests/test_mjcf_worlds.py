@@ -206,6 +206,9 @@ def test_contacts_that_do_not_fit_are_told():
     assert said
     with pytest.raises(EngineError, match="left out con"):
         check_warnings(data)
+    # where the motion had diverged before, that is the reason, and what runs say
+    data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number = 1
+    check_warnings(data)
 
 
 def test_memory_that_files_ask_for_is_given(tmp_path):

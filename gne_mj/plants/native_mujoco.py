@@ -344,6 +344,7 @@ LOST = {
     int(mujoco.mjtWarning.mjWARN_CNSTRFULL): "ran out of memory, left out constraints",
 }
 _LOST = tuple(LOST)
+_DIVERGED = int(mujoco.mjtWarning.mjWARN_BADQACC)  # accelerations that are no numbers, or huge
 
 
 def lost_text(kind: int) -> str:
@@ -358,10 +359,13 @@ def lost_text(kind: int) -> str:
 def forces_lost(at, data, nv):
     """Of which of LOST MuJoCo has warned, or -1. A warning is a pair of int: what of, how often.
 
-    -1 too where velocities (nv) are no longer finite: then that is the reason.
+    -1 too where accelerations were huge or velocities (nv) are no longer finite: then that is the
+    reason, as thousands of contacts of what flies through itself may be.
     """
     for kind in _LOST:
         if word(data, at.warning + kind) >> 32 != 0:
+            if word(data, at.warning + _DIVERGED) >> 32 != 0:
+                return -1
             qvel = field(data, at.qvel, nv)
             for r in range(nv):
                 if not np.isfinite(qvel[r]):
@@ -376,6 +380,7 @@ def check_warnings(data: mujoco.MjData) -> None:
     Raises:
         EngineError: contacts or constraints did not fit, or an inertia is singular.
     """
+    diverged = data.warning[_DIVERGED].number or not np.all(np.isfinite(data.qvel))
     for kind in LOST:
-        if data.warning[kind].number and np.all(np.isfinite(data.qvel)):
+        if data.warning[kind].number and not diverged:
             raise EngineError(f"by {data.time:.6g} s {lost_text(kind)}")
