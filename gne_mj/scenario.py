@@ -14,7 +14,7 @@ from gne_mj.bounds import check_nesting, check_text, read_file
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.game_model import Game
 from gne_mj.games.table import functions_in
-from gne_mj.plants.mjcf_source import is_named
+from gne_mj.plants.mjcf_source import FILES, is_named
 from gne_mj.scenario_tables import Scenario, SystemTable
 from gne_mj.scenario_tables.changes import change, complaint, full_key, plain, validated
 from gne_mj.scenario_tables.interventions import tables_of
@@ -159,11 +159,12 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _resolve_in(table: Any, folder: Path) -> None:
-    given = table.get("file") if isinstance(table, dict) else None
-    if isinstance(given, str):
-        table["file"] = _absolute(folder, given)
-    elif isinstance(given, list):
-        table["file"] = [_absolute(folder, str(name)) for name in given]
+    for key in FILES if isinstance(table, dict) else ():
+        given = table.get(key)
+        if isinstance(given, str):
+            table[key] = _absolute(folder, given)
+        elif isinstance(given, list):
+            table[key] = [_absolute(folder, str(name)) for name in given]
 
 
 def _absolute(folder: Path, name: str) -> str:

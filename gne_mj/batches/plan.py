@@ -22,7 +22,7 @@ from gne_mj.batches.sweep import Sweep
 from gne_mj.bounds import MOST_RECORDED, MOST_RUNS, check_room
 from gne_mj.equilibrium import middle
 from gne_mj.errors import InfeasibleStart, InvalidInput, part_of
-from gne_mj.plants.mjcf_source import located
+from gne_mj.plants.mjcf_source import FILES, located
 from gne_mj.scenario import Scenario, full_key, load_scenario
 from gne_mj.starts import random_starts, separated_starts
 from gne_mj.system import Clock, System
@@ -394,13 +394,16 @@ def _digests(scenario: Mapping[str, Any]) -> dict[str, str]:
     """Of the user's own files that a scenario names."""
     found = {}
     for system, tables in scenario["systems"].items():
-        for key, table in tables.items():
-            given = table.get("file", []) if isinstance(table, dict) else []
+        named = [
+            (f"scenario.systems.{system}.{part}.{key}", table.get(key, []))
+            for part, table in tables.items()
+            for key in (FILES if isinstance(table, dict) else ())
+        ]
+        for where, given in named:
             for name in [given] if isinstance(given, str) else given:
                 try:
                     found[name] = hashlib.sha256(located(name).read_bytes()).hexdigest()
                 except OSError as error:
-                    where = f"scenario.systems.{system}.{key}.file"
                     why = f"it cannot be read: {error.strerror}"
                     raise InvalidInput(where, name, why) from None
     return found

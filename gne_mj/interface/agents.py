@@ -142,6 +142,8 @@ def mjcf_robots(
     local_damping: ArrayLike | None = None,
     reference_velocity: ArrayLike | None = None,
     spacing: float | None = None,
+    poses: Sequence[Any] | None = None,
+    terrain: str | Path | None = None,
     contacts: str = "all",
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
@@ -157,6 +159,9 @@ def mjcf_robots(
         local_damping: d in N s/m, then: the force is u - d v.
         reference_velocity: v_0 in m/s, to which q and v are relative; 0 if left out.
         spacing: in m along y from one robot to the next; 2 if left out.
+        poses: of each agent's robot, in place of a spacing: x, y, z in m, or a table with
+            ``position``, and ``yaw`` in rad or ``quaternion`` (w first).
+        terrain: an MJCF file, or its text, of what they stand on, in place of their own floors.
         contacts: "all" as files say, or but those with the "floor", of "agents", or "none".
         input_limit: in N or N m.
     """
@@ -173,6 +178,8 @@ def mjcf_robots(
         local_damping=local_damping,
         reference_velocity=reference_velocity,
         spacing=spacing,
+        poses=poses,
+        terrain=None if terrain is None else _path(terrain),
         contacts=contacts,
         input_limit=input_limit,
     )

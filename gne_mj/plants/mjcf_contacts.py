@@ -27,14 +27,15 @@ def sizes_of(spec: Any) -> tuple[int, int]:
 
 
 def owners_of(model: mujoco.MjModel, robots: Sequence[tuple[int, int]]) -> list[set[int]]:
-    """The robots, from 0, that each geom belongs to; none for the lane's own.
+    """The robots, from 0, that each geom belongs to; none for the lane's or the terrain's own.
 
     Args:
-        model: of the fleet, its robots one behind the other.
+        model: of the fleet, its robots one behind the other, and behind the terrain.
         robots: their :func:`sizes_of`.
     """
     bodies, geoms = np.array(robots).T
-    of_body = np.concatenate([[-1], np.repeat(np.arange(len(robots)), bodies)])
+    of_body = np.full(model.nbody, -1)
+    of_body[model.nbody - bodies.sum() :] = np.repeat(np.arange(len(robots)), bodies)
     of_geom = of_body[model.geom_bodyid]
     (world,) = np.nonzero(model.geom_bodyid == 0)
     of_geom[world[len(world) - geoms.sum() :]] = np.repeat(np.arange(len(robots)), geoms)
@@ -75,11 +76,12 @@ def share_floors(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[in
             owners[kept] |= owners[geom]
 
 
-def let_touch(model: mujoco.MjModel, which: str) -> None:
+def let_touch(model: mujoco.MjModel, owners: list[set[int]], which: str) -> None:
     """Leave but some contacts of a fleet.
 
     Args:
         model: of the fleet; collision bits are changed, or contacts switched off.
+        owners: of each geom; what is nobody's stands in the world, wherever it is in a terrain.
         which: "all" as files say; "floor": of robots with what stands in the world, neither with
             each other nor within one; "agents": all but those with what stands in the world;
             "none". Pairs that a file names stay, but for "none".
@@ -87,7 +89,7 @@ def let_touch(model: mujoco.MjModel, which: str) -> None:
     if which == "none":
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     stands, contype, conaffinity = (
-        model.geom_bodyid == 0,
+        (model.geom_bodyid == 0) | [not of for of in owners],
         model.geom_contype,
         model.geom_conaffinity,
     )
@@ -124,9 +126,10 @@ def check_apart(
     """
     overlaps = data.contact.dist < 0.0
     for one, other in data.contact.geom[overlaps].tolist():
-        if min(one, other) < 0 or owners[one] & owners[other]:
+        own, others = owners[one], owners[other]
+        if min(one, other) < 0 or own & others or not (own and others):
             continue
-        i, j = min(owners[one]), min(owners[other])
+        i, j = min(own), min(others)
         names = [model.geom(geom).name or "a nameless geom" for geom in (one, other)]
         raise InvalidInput(
             "robots",

@@ -17,6 +17,7 @@ import numpy as np
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.c_layout import arrays
 from gne_mj.plants.callbacks import quiet
+from gne_mj.plants.mjcf_pose import Pose
 
 # Options that a scenario gives, and MJCF's words for others
 CLOCK = ("timestep", "integrator")
@@ -38,7 +39,7 @@ def read(path: Path) -> Any:
         spec = mujoco.MjSpec.from_file(str(path))
     if any("NaN" in message for message in heard):  # which it takes for a number not given
         raise _refusal(path, "every number must be finite, and one of its is nan")
-    for name in _options(spec):
+    for name in options_of(spec):
         _check_finite(path, name, getattr(spec.option, name))
     if spec.compiler.settotalmass > 0:
         raise _refusal(path, "settotalmass would be that of the fleet: scale its masses instead")
@@ -84,19 +85,20 @@ def of_text(text: str, path: Path | str) -> Any:
         return mujoco.MjSpec.from_string(text)
 
 
-def attach(world: Any, spec: Any, path: Path, *, prefix: str, at: tuple[float, ...]) -> None:
-    """Attach a file to a fleet's world, at a place (m), its names behind a prefix.
+def attach(world: Any, spec: Any, path: Path, *, prefix: str, at: Pose) -> None:
+    """Attach a file to a fleet's world, at a pose, its names behind a prefix.
 
     Raises:
         InvalidInput: it cannot be.
     """
     with _refusing(path, "attach"):
-        world.attach(spec, prefix=prefix, frame=world.worldbody.add_frame(pos=at))
+        frame = world.worldbody.add_frame(pos=at.position, quat=at.quaternion)
+        world.attach(spec, prefix=prefix, frame=frame)
 
 
 def adopt_options(world: Any, spec: Any) -> None:
     """Give a fleet's world all options of a file but those that the scenario gives."""
-    for name in _options(spec):
+    for name in options_of(spec):
         if name not in CLOCK:
             setattr(world.option, name, getattr(spec.option, name))
 
@@ -107,16 +109,23 @@ def check_options(world: Any, spec: Any, path: Path) -> None:
     Raises:
         InvalidInput: names the option.
     """
-    for name in _options(spec):
-        own, others = getattr(spec.option, name), getattr(world.option, name)
-        if name not in CLOCK and np.any(own != others):
-            word, shown = WORDS.get(name, name), ""
-            if word == name:
-                shown = f", {np.array2string(np.asarray(others))}"
-            raise _refusal(path, f"its {word} must be that of the first file{shown}")
+    for name in options_of(spec):
+        if name not in CLOCK:
+            check_option(world, spec, path, name)
 
 
-def _options(spec: Any) -> list[str]:
+def check_option(world: Any, spec: Any, path: Path, name: str) -> None:
+    """The same, of one option."""
+    own, others = getattr(spec.option, name), getattr(world.option, name)
+    if np.any(own != others):
+        word, shown = WORDS.get(name, name), ""
+        if word == name:
+            shown = f", {np.array2string(np.asarray(others))}"
+        raise _refusal(path, f"its {word} must be that of the first file{shown}")
+
+
+def options_of(spec: Any) -> list[str]:
+    """The names of all options."""
     return [name for name in dir(spec.option) if not name.startswith("_")]
 
 

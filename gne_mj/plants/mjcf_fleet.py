@@ -15,7 +15,7 @@ from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
-from gne_mj.plants.fleet import compile_model, read_model
+from gne_mj.plants.fleet import compile_model
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.low_level.table import Controller
 from gne_mj.plants.mjcf_contacts import (
@@ -36,6 +36,7 @@ from gne_mj.plants.mjcf_control import (
     read_all,
 )
 from gne_mj.plants.mjcf_drive import add_effort, driving
+from gne_mj.plants.mjcf_pose import check_leaves
 from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
     Prediction,
@@ -49,6 +50,7 @@ from gne_mj.plants.mjcf_prediction import (
 )
 from gne_mj.plants.mjcf_reading import Term, array_word, fresh_by, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
+from gne_mj.plants.mjcf_terrain import check_options, ground, without_floors
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
@@ -80,6 +82,7 @@ BESIDE = (
     ", {:g} m beside it: give more spacing, make its file narrower, or its floor a plane, which all"
     " share"
 )
+POSED = ": let their poses lie farther apart, or make its floor a plane, which all share"
 TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
 AGENT = mjcf_robot
 
@@ -93,8 +96,8 @@ def stored(channels, state, userdata):
 class MjcfPlant(FleetPlant):
     """A fleet of the user's own robots in MuJoCo.
 
-    Each file's bodies are attached to one world, side by side, or at one place where their
-    positions are what they decide; all must have the same options
+    Each file's bodies are attached to one world, where poses say, side by side, or at one place
+    where their positions are what they decide; all must have the same options
     (gravity, density, flags and so on); contacts are between a robot's own geoms and whatever its
     file brings along, a floor that several bring being one. A fleet starts from the models'
     reference pose at the given outputs. An input is the force of its actuator, gain and gear
@@ -147,7 +150,7 @@ class MjcfPlant(FleetPlant):
             mujoco.mj_fwdPosition(self.model, self.data)
         self._owners = owners_of(self.model, sizes_of_robots)
         share_floors(self.model, self.data, self._owners)
-        let_touch(self.model, agents.touching)
+        let_touch(self.model, self._owners, agents.touching)
         self._terms: list[Term] = []  # of all outputs that are no joint's
         with named(input="agents.input", output="agents.output"):
             self._driving = driving(self.model, self.data, agents)
@@ -235,6 +238,9 @@ class MjcfPlant(FleetPlant):
             terms = terms_of(model, prefix, robot.output)
         only = terms[0]
         if len(terms) == 1 and only.source == "qvel" and only.factor == 1.0:
+            if self.passive is not None:
+                agent = i // self.agents.dimension
+                check_leaves(model, self.data, only.entry, agent, self.agents.places[agent])
             return only.entry, only.place_entry, 0
         self._check_ahead(i, robot, terms)
         self._terms += terms
@@ -297,7 +303,9 @@ class MjcfPlant(FleetPlant):
         self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
         with quiet():
             mujoco.mj_forward(self.model, self.data)
-        advice = TOGETHER if self.agents.together else BESIDE.format(self.agents.spacing)
+        advice = BESIDE.format(self.agents.spacing)
+        if self.agents.together or self.agents.poses:
+            advice = TOGETHER if self.agents.together else POSED
         with named(robots="agents.path"):
             check_apart(self.model, self.data, self._owners, self.agents.files, advice)
         missed = np.abs(self.state[:, 0] - state[:, 0])
@@ -372,10 +380,8 @@ def _world(
     agents: MjcfRobots, controllers: dict[int, Controller]
 ) -> tuple[Any, list[tuple[int, int]], int]:
     """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
-    world = mujoco.MjSpec.from_string(read_model("lane.xml"))
-    robots, spacing = agents.files, 0.0 if agents.together else agents.spacing
-    floor, across = world.geom("floor"), 0.5 * spacing * (len(robots) - 1)
-    floor.pos[1], floor.size[1] = across, floor.size[1] + across
+    robots, places, terrain = agents.files, agents.places, agents.terrain
+    world = ground(terrain, places)
     for path in dict.fromkeys(robot.path for robot in robots):
         mjcf_file.alone(path)  # which finds what is wrong with it
     sizes, memory = [], 0
@@ -383,15 +389,18 @@ def _world(
         spec = mjcf_file.read(robot.path)
         if i == 0:
             mjcf_file.adopt_options(world, spec)
+            if terrain is not None:
+                check_options(world, terrain)
         mjcf_file.check_options(world, spec, robot.path)
+        if terrain is not None:
+            without_floors(spec, robot.path)
         for channel in range(i * agents.dimension, (i + 1) * agents.dimension):
             add_effort(spec, agents.robots[channel].input, channel, robot.path)
         if i in controllers:
             add_memory(spec, controllers[i])
         sizes.append(sizes_of(spec))
         memory += max(spec.memory, 0)
-        place = (0.0, spacing * i, 0.0)
-        mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=place)
+        mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=places[i])
     return world, sizes, memory
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, named
 from gne_mj.native import kernel
 from gne_mj.plants import mjcf_position
 from gne_mj.plants.agents import Agents
@@ -21,6 +21,7 @@ from gne_mj.plants.lookahead import LookaheadKeys
 from gne_mj.plants.low_level.table import Controlled, InputGiven
 from gne_mj.plants.mjcf_input import Input, inputs_of
 from gne_mj.plants.mjcf_output import Output, OutputTable, channels_of
+from gne_mj.plants.mjcf_pose import APART, Pose, PoseTable, beside, poses_of, repeated
 from gne_mj.plants.mjcf_source import located
 from gne_mj.plants.table import AgentsTable, check_sizes
 from gne_mj.registry import AGENTS
@@ -32,7 +33,6 @@ STATES = (("output", ""), ("position", "m or rad"))
 OUTPUT = 0
 INPUT_UNIT = "N or N m"
 KNOWS_STORAGE = False
-SPACING = 2.0  # m between robots, so that they do not touch
 FLEET = "gne_mj.plants.mjcf_fleet"
 
 
@@ -62,19 +62,28 @@ class MjcfRobots(Agents):
         robots: one a channel; those of an agent name the same file.
         together: whether all are put at one place, since their positions are what they decide;
             else beside each other.
+        poses: of each agent's robot; empty where ``together`` or ``spacing`` say them.
         spacing: in m from one to the next, then.
+        terrain: a file that they stand on; None for the floors of their own files.
         touching: which contacts there are, see :func:`gne_mj.plants.mjcf_contacts.let_touch`.
     """
 
     robots: tuple[RobotFile, ...] = ()
     together: bool = False
-    spacing: float = SPACING
+    poses: tuple[Pose, ...] = ()
+    spacing: float = APART
+    terrain: Path | None = None
     touching: str = "all"
 
     @property
     def world(self) -> tuple[object, ...]:
         """What tells their model from others of the same kind."""
-        return self.robots, self.together, self.spacing, self.touching
+        return self.robots, self.places, self.terrain, self.touching
+
+    @property
+    def places(self) -> tuple[Pose, ...]:
+        """Where each agent's robot is attached."""
+        return self.poses or beside(self.count, 0.0 if self.together else self.spacing)
 
     @property
     def files(self) -> tuple[RobotFile, ...]:
@@ -82,9 +91,21 @@ class MjcfRobots(Agents):
         return self.robots[:: self.dimension]
 
     def repeated(self, copies: int) -> Self:
-        """See the base class; several copies are put beside each other."""
-        apart = self.together and copies == 1
-        return replace(super().repeated(copies), robots=self.robots * copies, together=apart)
+        """See the base class; several copies are put beside each other.
+
+        Raises:
+            InvalidInput: on a terrain, which is another ground there.
+        """
+        if self.terrain is not None and copies > 1:
+            raise InvalidInput(
+                "agents.terrain", str(self.terrain), "trials put copies of a fleet beside each"
+                " other, where it is another ground: leave it out of them",
+            )  # fmt: skip
+        poses = repeated(self.poses, copies) if self.poses else ()
+        return replace(
+            super().repeated(copies), robots=self.robots * copies, poses=poses,
+            together=self.together and copies == 1,
+        )  # fmt: skip
 
 
 def mjcf_robots(robots: tuple[RobotFile, ...], input_limit: np.ndarray) -> MjcfRobots:
@@ -134,6 +155,12 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
     spacing: Annotated[float | None, Unit("m")] = Field(
         None, ge=0, description="along y from one robot to the next; 2 if left out"
     )
+    poses: list[PoseTable | list[float]] | None = Field(
+        None, description="in place of a spacing: of each agent's robot, or lists of x, y, z"
+    )
+    terrain: str | None = Field(
+        None, description="MJCF file of what they stand on, in place of their own files' floors"
+    )
     contacts: Literal["all", "floor", "agents", "none"] = Field(
         "all",
         description="of robots with the floor and each other, as files say; or but one of these",
@@ -164,12 +191,18 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
             kind, numbers = mjcf_position, np.column_stack(parts)
         else:
             self.check_unused("it is for robots with a lookahead, whose outputs are positions")
-        if self.positions and self.spacing is not None:
-            raise InvalidInput(
-                "spacing", self.spacing, "with a lookahead positions say where they are"
-            )
+        if self.spacing is not None and (self.positions or self.poses is not None):
+            say = "with a lookahead positions" if self.positions else "poses"
+            raise InvalidInput("spacing", self.spacing, f"{say} say where they are")
         return MjcfRobots(
             kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions,
-            spacing=SPACING if self.spacing is None else self.spacing, touching=self.contacts,
+            poses=() if self.poses is None else poses_of(self.poses, self.count),
+            spacing=APART if self.spacing is None else self.spacing, touching=self.contacts,
+            terrain=self._terrain,
             contacts=self.contacts in ("all", "agents"),
         )  # fmt: skip
+
+    @property
+    def _terrain(self) -> Path | None:
+        with named(file="terrain"):
+            return None if self.terrain is None else located(self.terrain)

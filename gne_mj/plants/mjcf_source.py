@@ -5,6 +5,7 @@ from pathlib import Path
 
 from gne_mj.errors import InvalidInput, nearest
 
+FILES = ("file", "terrain")  # keys that name files, of any table of a system
 SHIPPED = "gne_mj:"  # before the name of a file in models/
 
 

@@ -1,0 +1,269 @@
+"""Where a fleet's robots stand, and on what."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import gne_mj as gm
+from gne_mj.errors import InvalidInput
+from gne_mj.plants.mjcf_fleet import MjcfPlant
+from gne_mj.plants.mjcf_robot import MjcfAgents
+from gne_mj.scenario import load_scenario
+
+# A cart on a free joint and four wheels; its floor is its own
+CART = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002"/>
+  <worldbody>
+    <geom name="ground" type="plane" size="5 5 1"/>
+    <body name="cart" pos="0 0 0.12">
+      <freejoint/>
+      <geom name="hull" type="box" size="0.2 0.1 0.05" mass="3"/>
+      {wheels}
+      <site name="tip" pos="0.2 0 0"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="left" joint="w0"/><motor name="right" joint="w1"/></actuator>
+  {extra}
+</mujoco>
+"""
+WHEEL = """
+<body name="w{0}" pos="{1} {2} -0.05"><joint name="w{0}" axis="0 1 0" damping="0.01"/>
+  <geom name="w{0}" type="ellipsoid" size="0.06 0.02 0.06" mass="0.2"/></body>"""
+WHEELS = "".join(
+    WHEEL.format(k, x, y)
+    for k, (x, y) in enumerate([(0.15, 0.12), (0.15, -0.12), (-0.15, 0.12), (-0.15, -0.12)])
+)
+HILLS = """
+<mujoco>
+  <asset>
+    <hfield name="hills" nrow="3" ncol="3" size="6 6 0.5 0.1" elevation="0 0 1 0 0 1 0 0 1"/>
+    <texture name="dusk" type="skybox" builtin="gradient" width="8" height="48"/>
+  </asset>
+  <worldbody>
+    <light name="lamp" pos="0 0 5"/>
+    <geom name="hills" type="hfield" hfield="hills"/>
+    <body name="rock" pos="2 2 0"><geom name="rock" size="0.3"/></body>
+    {extra}
+  </worldbody>
+</mujoco>
+"""
+
+
+def cart(folder, extra="", name="cart.xml"):
+    path = folder / name
+    path.write_text(CART.format(wheels=WHEELS, extra=extra))
+    return path
+
+
+def hills(folder, extra="", name="hills.xml"):
+    path = folder / name
+    path.write_text(HILLS.format(extra=extra))
+    return path
+
+
+def agents(path, count=2, axes=1, **more):
+    table = {
+        "type": "mjcf-robot", "count": count, "file": str(path), "output": {"body": "cart"},
+        "input": {"body": "cart"}, **more,
+    }  # fmt: skip
+    return MjcfAgents.model_validate(table).build((axes,) * count)
+
+
+def plant_of(*args, **more):
+    return MjcfPlant(agents(*args, **more), 0.002, "euler")
+
+
+POSES = [
+    {"position": [1.0, -2.0, 0.5], "yaw": 0.7},
+    {"quaternion": [2.0, 0.0, 2.0, 0.0]},
+]
+
+
+def by_hand(path, poses, terrain=None):
+    """The same world by MuJoCo's own functions alone."""
+    world = mujoco.MjSpec()
+    world.option.timestep = 0.002
+    if terrain is not None:
+        world.attach(
+            mujoco.MjSpec.from_file(str(terrain)), prefix="terrain/",
+            frame=world.worldbody.add_frame(),
+        )  # fmt: skip
+    for i, (position, quaternion) in enumerate(poses):
+        spec = mujoco.MjSpec.from_file(str(path))
+        if terrain is not None:
+            spec.delete(spec.geom("ground"))
+        frame = world.worldbody.add_frame(pos=position, quat=quaternion)
+        world.attach(spec, prefix=f"robot_{i + 1}/", frame=frame)
+    model = world.compile()
+    return model, mujoco.MjData(model)
+
+
+def test_robots_stand_where_their_poses_say(tmp_path):
+    path = cart(tmp_path)
+    plant = plant_of(path, poses=POSES, contacts="none")
+    turned = [np.cos(0.35), 0.0, 0.0, np.sin(0.35)]
+    model, data = by_hand(path, [([1.0, -2.0, 0.5], turned), ([0.0, 0.0, 0.0], [1, 0, 1, 0])])
+    plant.reset(np.zeros((2, 2)))
+    mujoco.mj_forward(model, data)
+    assert np.allclose(plant.data.qpos, data.qpos, rtol=0, atol=1e-15)
+    for name in ("robot_1/w2", "robot_2/w3"):
+        for what in ("xpos", "xmat"):
+            ours, theirs = (getattr(each.body(name), what) for each in (plant.data, data))
+            assert np.allclose(ours, theirs, rtol=0, atol=1e-14)
+    floor = plant.model.geom("floor")
+    assert floor.pos[1] == -1.0
+    assert floor.size[1] == 3.0
+
+
+def test_lists_are_positions_and_a_spacing_is_the_short_form(tmp_path):
+    path = cart(tmp_path)
+    lists = plant_of(path, poses=[[0, 0, 0], [0, 3, 0]])
+    short = plant_of(path, spacing=3.0)
+    assert np.array_equal(lists.data.qpos, short.data.qpos)
+
+
+def test_with_positions_poses_say_what_these_leave_open(tmp_path):
+    """A plane's outputs are x and y; heading and height are the poses'."""
+    path = cart(tmp_path)
+    plant = plant_of(
+        path, axes=2, lookahead=1.0, local_damping=0.0, output={"body": "cart", "axes": ["x", "y"]},
+        poses=[{"position": [0, 0, 0.01], "yaw": 1.0}, {"yaw": -0.5}], contacts="none",
+    )  # fmt: skip
+    places = np.array([1.0, 2.0, -1.0, 0.5])
+    plant.reset(np.column_stack([places, places]))
+    assert np.allclose(plant.data.qpos.reshape(2, -1)[:, :2].ravel(), places, rtol=0, atol=1e-12)
+    assert np.allclose(plant.data.qpos.reshape(2, -1)[:, 2], [0.13, 0.12], rtol=0, atol=1e-12)
+    heading = [np.arctan2(*plant.data.body(f"robot_{i}/cart").xmat[[3, 0]]) for i in (1, 2)]
+    assert np.allclose(heading, [1.0, -0.5], rtol=0, atol=1e-12)
+
+
+SLIDE = """<mujoco><option gravity="0 0 0"/><worldbody><body name="cart">
+  <joint name="x" type="slide" axis="1 0 0"/><geom name="hull" size="0.1"/></body></worldbody>
+  <actuator><motor name="u" joint="x"/></actuator></mujoco>"""
+
+
+def test_a_pose_along_a_slide_whose_position_is_the_output_is_refused(tmp_path):
+    path = tmp_path / "slide.xml"
+    path.write_text(SLIDE)
+    more = {"output": "x", "input": "u", "lookahead": 1.0, "local_damping": 0.0}
+    plant_of(path, poses=[[0, 0, 0], [0, 1, 0.5]], **more)
+    for pose in ({"position": [0.5, 0, 0]}, {"yaw": 0.1}):
+        with pytest.raises(InvalidInput, match="position of joint 'x' says where agent 2") as told:
+            plant_of(path, poses=[[0, 0, 0], pose], **more)
+        assert told.value.key == "agents.poses"
+
+
+BAD_POSES = [
+    ([[0, 0, 0]], "poses", "there must be 2"),
+    ([[0, 0, 0], [0, 1]], "poses", "x, y, z"),
+    ([[0, 0, 0], {"yaw": 1.0, "quaternion": [1, 0, 0, 0]}], "poses.1.yaw", "or a quaternion"),
+    ([[0, 0, 0], {"quaternion": [0, 0, 0, 0]}], "poses.1.quaternion", "must not be 0"),
+]
+
+
+@pytest.mark.parametrize(("poses", "key", "words"), BAD_POSES)
+def test_poses_that_are_none_are_refused(tmp_path, poses, key, words):
+    with pytest.raises(InvalidInput, match=words) as told:
+        agents(cart(tmp_path), poses=poses)
+    assert told.value.key == key
+    assert "\n" not in str(told.value)
+
+
+def test_poses_and_a_spacing_do_not_go_together(tmp_path):
+    with pytest.raises(InvalidInput, match="poses say where they are"):
+        agents(cart(tmp_path), poses=POSES, spacing=1.0)
+
+
+def test_a_terrain_is_attached_once_and_robots_leave_their_floors_out(tmp_path):
+    path, ground = cart(tmp_path), hills(tmp_path)
+    places = [[-1.0, -1.0, 0.3], [-1.0, 1.0, 0.3]]
+    plant = plant_of(path, poses=places, terrain=str(ground))
+    model, data = by_hand(path, [(place, [1, 0, 0, 0]) for place in places], ground)
+    plant.step(np.zeros(2), 400)
+    mujoco.mj_step(model, data, 400)
+    assert np.allclose(plant.data.qpos, data.qpos, rtol=0, atol=1e-6)
+    assert plant.data.ncon == data.ncon >= 4
+    own = plant.model
+    named = [own.geom(k).name for k in range(own.ngeom)]
+    assert "floor" not in named
+    assert not any("ground" in name for name in named)
+    assert named.count("terrain/hills") == 1
+    assert own.nhfield == 1
+    assert [own.light(k).name for k in range(own.nlight)] == ["terrain/lamp"]
+    assert [own.texture(k).name for k in range(own.ntex) if own.tex_type[k] == 2] == [
+        "terrain/dusk"
+    ]
+
+
+def test_contacts_with_the_floor_are_those_with_all_of_a_terrain(tmp_path):
+    path, ground = cart(tmp_path), hills(tmp_path)
+    for which, touches in (("floor", True), ("agents", False)):
+        plant = plant_of(
+            path, poses=[[2, 2, 0.1], [-2, 2, 0.5]], terrain=str(ground), contacts=which
+        )
+        rock = plant.model.geom("terrain/rock").id
+        assert bool(plant.model.geom_contype[rock] | plant.model.geom_conaffinity[rock]) == touches
+        mujoco.mj_forward(plant.model, plant.data)
+        assert np.any(plant.data.contact.geom == rock) == touches
+
+
+BAD_TERRAINS = [
+    ({"extra": '<body name="ball"><joint name="spin"/><geom size="1"/></body>'}, {},
+     "it has joint 'spin'"),
+    ({"extra": '<body name="m" mocap="true"><geom size="1"/></body>'}, {}, "mocap body 'm'"),
+    ({"extra": '</worldbody><option gravity="0 0 -1"/><worldbody>'}, {}, "its gravity must be"),
+    ({}, {"extra": '<contact><pair geom1="ground" geom2="w0"/></contact>'}, "floor 'ground'"),
+    ({"extra": "<geom/>"}, {}, "MuJoCo must"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("ground", "robot", "words"), BAD_TERRAINS)
+def test_terrains_that_are_none_are_refused_in_one_sentence(tmp_path, ground, robot, words):
+    path, ground = cart(tmp_path, **robot), hills(tmp_path, **ground)
+    with pytest.raises(InvalidInput, match=words) as told:
+        plant_of(path, terrain=str(ground), spacing=3.0)
+    assert told.value.key == ("agents.path" if robot else "agents.terrain")
+    assert "\n" not in str(told.value)
+
+
+def test_a_terrain_that_says_nothing_of_physics_takes_the_robots(tmp_path):
+    path = cart(tmp_path, "<option gravity='0 0 -2' density='1'/>")
+    plant = plant_of(path, terrain=str(hills(tmp_path)), contacts="none")
+    assert plant.model.opt.gravity[2] == -2.0
+
+
+def test_a_scenario_names_its_terrain_relative_to_itself(tmp_path):
+    cart(tmp_path)
+    hills(tmp_path)
+    scenario = tmp_path / "s.toml"
+    scenario.write_text(
+        """[simulation]
+duration = 0.1
+timestep = 0.002
+integrator = "euler"
+[systems.carts.game]
+type = "expressions"
+cost = "(y[i] - 1)**2"
+constraints = { low = "y[i] >= -2", high = "y[i] <= 2" }
+[systems.carts.agents]
+type = "mjcf-robot"
+count = 2
+file = "cart.xml"
+output = { body = "cart" }
+input = { body = "cart" }
+poses = [[-1, -1, 0.3], { position = [-1, 1, 0.3], yaw = 0.1 }]
+terrain = "hills.xml"
+[systems.carts.initial]
+action = 0.0
+"""
+    )
+    run = gm.run(scenario)
+    start = run["carts"]["configuration"].to_numpy()[0].reshape(2, -1)
+    assert np.allclose(start[:, :3], [[-1, -1, 0.42], [-1, 1, 0.42]], rtol=0, atol=1e-12)
+    assert run.status == "completed"
+    with pytest.raises(InvalidInput, match="MuJoCo must read"):
+        load_scenario(scenario, {"agents.terrain": "none.xml"}).system_objects()[0].mujoco_plant(
+            load_scenario(scenario).clock()
+        )
