@@ -2,8 +2,8 @@ import js from "@eslint/js";
 
 // What browsers have and the page uses; any other name is one that was not imported.
 const BROWSER = [
-  "Blob", "DecompressionStream", "Element", "HTMLInputElement", "IntersectionObserver", "ResizeObserver", "Response", "TextDecoder",
-  "URL", "WebSocket", "addEventListener", "atob", "clearTimeout", "devicePixelRatio", "document",
+  "Blob", "DecompressionStream", "Element", "HTMLInputElement", "IntersectionObserver", "ResizeObserver", "Response", "TextDecoder", "TextEncoder",
+  "URL", "VideoEncoder", "VideoFrame", "WebSocket", "addEventListener", "atob", "clearTimeout", "devicePixelRatio", "document",
   "fetch", "getComputedStyle", "innerHeight", "innerWidth", "localStorage", "location",
   "matchMedia", "navigator", "performance", "requestAnimationFrame", "setTimeout", "window",
 ];

@@ -152,6 +152,10 @@ def test_two_runs_in_a_browser(page, recorded, runs):
             until(page, "window.gne.plots[0].width > 200")
             assert page.locator("#run-keys button").count() == 2
             assert page.locator("#compare").is_visible()
+            page.locator("#keep summary").click()
+            box = page.locator("#keep-video").bounding_box()
+            assert 0 <= box["x"] <= box["x"] + box["width"] <= width
+            page.locator("#keep summary").click()
             assert page.evaluate("document.documentElement.scrollWidth") <= width
         names = ["rho = 0.1", "rho = 0.5"]
         plots = page.evaluate("window.gne.plots")

@@ -17,6 +17,10 @@ export const handleOf = (page) => ({
     page.seek(time);
     if (page.source) page.draw(page.source, performance.now());
   },
+  /** Shows a stretch of time in the plots, s. */
+  show: (/** @type {number} */ from, /** @type {number} */ to) => page.plots.show([from, to]),
+  /** How fast a replay plays, times real time. */
+  speed: (/** @type {number} */ speed) => page.setSpeed(speed),
   /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
   position: (/** @type {string} */ path) => page.scene.position(path),
   /** CSS colour of an agent (from 0) as it is drawn. */
@@ -35,7 +39,7 @@ export const handleOf = (page) => ({
   /** How far the camera is, in distances at which all fits. */
   zoom: () => page.scene.camera.zoom,
   /** Whether the 3-D view has a context, and a picture. */
-  alive: () => page.scene.alive,
+  alive: () => isAlive(page),
   /** What the page is doing. */
   state: () => stateOf(page),
 });
@@ -67,6 +71,17 @@ const planOf = ({ scene }, name) => {
     strips: plan.distances.map(({ strip }) => css(strip.material.color.toArray())),
     discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius),
   };
+};
+
+/** @param {Page} page */
+const isAlive = ({ scene }) => {
+  const gl = scene.viewer.renderer.getContext();
+  if (gl.isContextLost()) return false;
+  scene.camera.render(); // what was drawn before is gone by now
+  const { drawingBufferWidth: w, drawingBufferHeight: h } = gl;
+  const pixels = new Uint8Array(4 * w * h);
+  gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  return new Set(new Uint32Array(pixels.buffer)).size > 16; // colours
 };
 
 /** @param {Page} page */

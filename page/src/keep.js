@@ -65,6 +65,7 @@ export class Keep {
   show() {
     const { mode, playback } = this.page;
     byId("keep-run").hidden = mode === "file" || !playback;
-    byId("keep-link").hidden = !playback;
+    byId("keep-link").hidden = byId("keep-video").hidden = !playback;
+    byId("keep-scenario").hidden = Boolean(playback?.meta.runs);
   }
 }

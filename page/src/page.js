@@ -14,6 +14,7 @@ import { setTheme, theme } from "./theme.js";
 import { Toolbar } from "./toolbar.js";
 import { marksOf, Transport } from "./transport.js";
 import { Tuning } from "./tuning.js";
+import { Video } from "./video.js";
 import { wire } from "./wiring.js";
 /** @import { Agent, Instant, Numbers, Pack, Scene as Meta, Source, System } from "./types.d.ts" */
 /** @import { Plot } from "./plot.js" */
@@ -36,6 +37,7 @@ export class Page {
     this.toolbar = new Toolbar(this.scene, this.overlay);
     this.transport = new Transport(this);
     this.keep = new Keep(this);
+    new Video(this);
     /** @type {Live | null} */
     this.live = null; // the simulation, in mode "live"
     /** @type {Playback | null} */
@@ -45,6 +47,8 @@ export class Page {
     /** @type {Instant | null} */
     this.instant = null; // what is drawn
     this.drawn = false; // whether anything was
+    /** @type {number | null} */
+    this.recording = null; // ms of a video's own clock, while one is made
     this.seen = true; // or out of sight, in a page around
     this.wasMoving = false;
     this.before = NaN; // ms, of the picture before
@@ -155,7 +159,8 @@ export class Page {
    */
   messages = (system, counts) => {
     const drawn = this.meta?.systems.find(({ name }) => name === system.name);
-    if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, performance.now());
+    const now = this.recording ?? performance.now();
+    if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, now);
   };
 
   /**
@@ -254,7 +259,7 @@ export class Page {
   /** @param {number} now ms */
   loop(now) {
     requestAnimationFrame((next) => this.loop(next));
-    if (!this.seen) return;
+    if (!this.seen || this.recording !== null) return;
     const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1000;
     this.before = now;
     const { source } = this;

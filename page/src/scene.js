@@ -302,16 +302,6 @@ export class Scene {
     this.dirty();
   }
 
-  /** Whether there is a context, and a picture with more than one colour in it. */
-  get alive() {
-    const gl = this.viewer.renderer.getContext();
-    if (gl.isContextLost()) return false;
-    this.camera.render(); // what was drawn before is gone by now
-    const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
-    gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    return new Set(new Uint32Array(pixels.buffer)).size > 16;
-  }
-
   get needsRender() {
     return this.viewer.needs_render;
   }

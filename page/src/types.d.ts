@@ -233,6 +233,10 @@ export interface Elements {
   "keep-link": HTMLButtonElement;
   "keep-scenario": HTMLButtonElement;
   "keep-run": HTMLAnchorElement;
+  "keep-video": HTMLButtonElement;
+  recording: HTMLElement;
+  "recording-text": HTMLElement;
+  "recording-stop": HTMLButtonElement;
   tuning: HTMLDetailsElement;
   "tuning-body": HTMLElement;
   main: HTMLElement;

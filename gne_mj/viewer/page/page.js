@@ -100,6 +100,10 @@
       page2.seek(time);
       if (page2.source) page2.draw(page2.source, performance.now());
     },
+    /** Shows a stretch of time in the plots, s. */
+    show: (from, to) => page2.plots.show([from, to]),
+    /** How fast a replay plays, times real time. */
+    speed: (speed) => page2.setSpeed(speed),
     /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
     position: (path) => page2.scene.position(path),
     /** CSS colour of an agent (from 0) as it is drawn. */
@@ -118,7 +122,7 @@
     /** How far the camera is, in distances at which all fits. */
     zoom: () => page2.scene.camera.zoom,
     /** Whether the 3-D view has a context, and a picture. */
-    alive: () => page2.scene.alive,
+    alive: () => isAlive(page2),
     /** What the page is doing. */
     state: () => stateOf(page2)
   });
@@ -137,6 +141,15 @@
       strips: plan.distances.map(({ strip }) => css(strip.material.color.toArray())),
       discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius)
     };
+  };
+  var isAlive = ({ scene }) => {
+    const gl = scene.viewer.renderer.getContext();
+    if (gl.isContextLost()) return false;
+    scene.camera.render();
+    const { drawingBufferWidth: w, drawingBufferHeight: h } = gl;
+    const pixels = new Uint8Array(4 * w * h);
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    return new Set(new Uint32Array(pixels.buffer)).size > 16;
   };
   var comparedOf = ({ meta, scene }) => (meta?.systems ?? []).map(({ name, items: [first], drawn_as: as, shown: shown2 }) => {
     const object = as === "fleet" ? scene.objects[first] : scene.bars.find(({ system }) => system.name === name)?.group;
@@ -175,7 +188,7 @@
     setTimeout(() => URL.revokeObjectURL(url), 1e4);
   };
   var fileOf = ({ spec }) => [spec.whose, spec.name, spec.axis].filter(Boolean).join("-").replace(/[^\w-]+/g, "_");
-  var quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  var quoted = (text2) => /[",\n]/.test(text2) ? `"${text2.replaceAll('"', '""')}"` : text2;
   var csvOf = (plot) => {
     const { spec, plots } = plot;
     const [from, to] = plots.window;
@@ -250,7 +263,7 @@
   var captionOf = (plot) => {
     const { spec } = plot;
     const what = `${spec.whose} ${spec.title}`.trim();
-    const tool = (text, title, act) => element("button", { type: "button", text, title, "aria-label": `${title}: ${what}`, onclick: act });
+    const tool = (text2, title, act) => element("button", { type: "button", text: text2, title, "aria-label": `${title}: ${what}`, onclick: act });
     const log = tool("log", "Logarithmic scale", () => {
       plot.setLogarithmic(!plot.look.log);
       press(log, plot.look.log);
@@ -290,10 +303,10 @@
   var number = (value, digits = 3) => {
     if (value === null || value === void 0 || Number.isNaN(value)) return "–";
     const size = Math.abs(value);
-    let text;
-    if (size !== 0 && (size < 1e-3 || size >= 1e5)) text = value.toExponential(digits - 1);
-    else text = String(Number(value.toPrecision(digits)));
-    return text.replace("-", "−").replace("e+", "e");
+    let text2;
+    if (size !== 0 && (size < 1e-3 || size >= 1e5)) text2 = value.toExponential(digits - 1);
+    else text2 = String(Number(value.toPrecision(digits)));
+    return text2.replace("-", "−").replace("e+", "e");
   };
   var fixed = (value, decimals2) => value === null || Number.isNaN(value) ? "–" : value.toFixed(decimals2).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   var decimals = (greatest) => greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
@@ -491,16 +504,16 @@
      */
     showBanner(systems, source) {
       const out = systems.filter((system) => outside(source.stateOf(system).status));
-      const text = out.map((system) => exitText(system, source)).join("   ");
+      const text2 = out.map((system) => exitText(system, source)).join("   ");
       byId("banner-show").hidden = !source.seekable || !(out[0]?.name in source.exits);
-      if (text === this.bannerText) return;
-      this.bannerText = text;
-      byId("banner").hidden = !text;
-      byId("banner-text").textContent = text;
+      if (text2 === this.bannerText) return;
+      this.bannerText = text2;
+      byId("banner").hidden = !text2;
+      byId("banner-text").textContent = text2;
     }
   };
-  var warn = (text) => {
-    byId("banner-text").textContent = text;
+  var warn = (text2) => {
+    byId("banner-text").textContent = text2;
     byId("banner").hidden = false;
     byId("waiting").hidden = true;
   };
@@ -508,9 +521,9 @@
     const words = systems.map(
       (system) => `${system.name}: ${status(source.stateOf(system).status).words}`
     );
-    const text = words.join(", ");
+    const text2 = words.join(", ");
     const place = byId("announcement");
-    if (place.textContent !== text) place.textContent = text;
+    if (place.textContent !== text2) place.textContent = text2;
   };
   var chipOf = (system, state, of, lead) => {
     const { kind, symbol, words } = status(state.status);
@@ -534,12 +547,12 @@
   };
   var marginOf = ({ margin, margin_name: name, margin_time: time }, of, lead) => {
     if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
-    const text = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
-    if (typeof time !== "number") return element("span", { class: "margin", text });
+    const text2 = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
+    if (typeof time !== "number") return element("span", { class: "margin", text: text2 });
     const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;
     const onclick = () => lead(time);
     const title = "Show it";
-    return element("button", { type: "button", class: "margin", text: text + when, title, onclick });
+    return element("button", { type: "button", class: "margin", text: text2 + when, title, onclick });
   };
   var exitText = (system, source) => {
     const { status: word, message } = source.stateOf(system);
@@ -552,14 +565,14 @@
   var MOST = 3;
   var STAYS = { info: 5e3, error: 12e3 };
   var shown = /* @__PURE__ */ new Map();
-  var notify = (text, level = "info", about = text) => {
+  var notify = (text2, level = "info", about = text2) => {
     shown.get(about)?.();
     const error = level === "error";
     const notice = element(
       "div",
       { class: `toast ${error ? "error" : ""}` },
       element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
-      element("span", { class: "said", text }),
+      element("span", { class: "said", text: text2 }),
       element("button", {
         type: "button",
         class: "icon",
@@ -585,17 +598,17 @@
     const found = /^#t=(\d+(?:\.\d+)?)$/.exec(location.hash);
     return found ? Number(found[1]) : null;
   };
-  var copy = async (text, what, file) => {
+  var copy = async (text2, what, file) => {
     try {
-      await navigator.clipboard.writeText(text);
+      await navigator.clipboard.writeText(text2);
       notify(`${what} is copied.`, "info", what);
     } catch {
-      download(file, new Blob([text], { type: "text/plain" }));
+      download(file, new Blob([text2], { type: "text/plain" }));
       notify(`${what} is saved as ${file}.`, "info", what);
     }
   };
-  var keepScenario = (text) => {
-    if (text) copy(text, "The scenario with what was done", "scenario.toml");
+  var keepScenario = (text2) => {
+    if (text2) copy(text2, "The scenario with what was done", "scenario.toml");
     else notify("What was done to this run is not said by any keys of a scenario.", "error");
   };
   var Keep = class {
@@ -627,7 +640,8 @@
     show() {
       const { mode: mode2, playback } = this.page;
       byId("keep-run").hidden = mode2 === "file" || !playback;
-      byId("keep-link").hidden = !playback;
+      byId("keep-link").hidden = byId("keep-video").hidden = !playback;
+      byId("keep-scenario").hidden = Boolean(playback?.meta.runs);
     }
   };
 
@@ -786,7 +800,7 @@
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   };
-  var fromBase64 = (text) => Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+  var fromBase64 = (text2) => Uint8Array.from(atob(text2.trim()), (c) => c.charCodeAt(0));
   var unpack = async (bytes) => decodePack(await inflate(bytes));
   var fetchReplay = async () => {
     const answer = await fetch("replay");
@@ -1289,7 +1303,7 @@
       const solid = this.systems.filter(isSolid);
       this.links.draw(solid, instant, now);
       if (this.runs.length && solid.length === this.systems.length)
-        for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
+        for (const text2 of headingTexts(solid, this.runs, this.scene.layout)) this.text(text2);
       for (const system of solid)
         if (system.drawn_as === "bars") this.barTexts(system);
         else if (this.labelled) this.labels(system, instant);
@@ -1360,8 +1374,8 @@
       const digits = out && share < 1.1 ? 1 : 0;
       const used2 = out ? "outside" : "";
       const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
-      for (const text of percent ? [percent, ""] : [""]) {
-        const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
+      for (const text2 of percent ? [percent, ""] : [""]) {
+        const box = this.pillBox(p, name, out ? `⚠ ${text2}` : text2);
         if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
         this.taken.push(box);
         return this.pill(box, { name, system, agent, out });
@@ -1372,14 +1386,14 @@
      * @param {string} name
      * @param {string} text
      */
-    pillBox(p, name, text) {
+    pillBox(p, name, text2) {
       const context = this.context;
       context.font = "600 13px system-ui, sans-serif";
       const wide = context.measureText(name).width;
       context.font = "12px system-ui, sans-serif";
-      const more = text ? context.measureText(text).width + 7 : 0;
+      const more = text2 ? context.measureText(text2).width + 7 : 0;
       const w = wide + more + 14;
-      return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text };
+      return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text: text2 };
     }
     /**
      * @param {Pill} box
@@ -1425,7 +1439,7 @@
     /** @param {System} system */
     barTexts(system) {
       const bars2 = this.scene.layout.barsOf(system);
-      for (const text of [bars2.title(), ...bars2.gaugeTexts()]) this.text(text);
+      for (const text2 of [bars2.title(), ...bars2.gaugeTexts()]) this.text(text2);
       const owners = system.action.owner;
       const digits = decimals(bars2.reference);
       owners.forEach((owner, k) => {
@@ -1447,12 +1461,12 @@
      * A text at a point of the scene, where there is room.
      * @param {Text} about
      */
-    text({ point, text, shift = 0, align = "center", ...kind }) {
+    text({ point, text: text2, shift = 0, align = "center", ...kind }) {
       const p = this.scene.camera.project(point);
       if (!p) return;
       const context = this.context;
       context.font = `${kind.bold || kind.title ? "600 " : ""}12px system-ui, sans-serif`;
-      const w = context.measureText(text).width;
+      const w = context.measureText(text2).width;
       const left = align === "center" ? p.x - w / 2 : p.x + 4;
       const box = { x: left - 2, y: p.y + shift - 7, w: w + 4, h: 14 };
       if (!this.free(box) && !kind.chosen) return;
@@ -1460,7 +1474,7 @@
       context.textAlign = "left";
       context.textBaseline = "middle";
       context.fillStyle = colour(colourOf(kind));
-      this.haloed(text, left, p.y + shift);
+      this.haloed(text2, left, p.y + shift);
     }
     /**
      * Text that can be read on anything.
@@ -1468,13 +1482,13 @@
      * @param {number} x
      * @param {number} y
      */
-    haloed(text, x, y) {
+    haloed(text2, x, y) {
       const context = this.context;
       context.lineWidth = 3;
       context.lineJoin = "round";
       context.strokeStyle = colour("halo");
-      context.strokeText(text, x, y);
-      context.fillText(text, x, y);
+      context.strokeText(text2, x, y);
+      context.fillText(text2, x, y);
     }
     /**
      * The agent whose label or head is near a point of the pane.
@@ -4004,14 +4018,14 @@
           indic.style.background = markers.fill(self, i);
         }
       }
-      let text = placeDiv(LEGEND_LABEL, label);
+      let text2 = placeDiv(LEGEND_LABEL, label);
       if (s.label instanceof HTMLElement)
-        text.appendChild(s.label);
+        text2.appendChild(s.label);
       else
-        text.textContent = s.label;
+        text2.textContent = s.label;
       if (i > 0) {
         if (!markers.show)
-          text.style.color = s.width > 0 ? markers.stroke(self, i) : markers.fill(self, i);
+          text2.style.color = s.width > 0 ? markers.stroke(self, i) : markers.fill(self, i);
         onMouse("click", label, (e) => {
           if (cursor._lock)
             return;
@@ -4985,15 +4999,15 @@
             val = "" + val;
             let _parts = val.indexOf("\n") == -1 ? [val] : val.split(/\n/gm);
             for (let j = 0; j < _parts.length; j++) {
-              let text = _parts[j];
+              let text2 = _parts[j];
               if (angle) {
                 ctx.save();
                 ctx.translate(x, y + j * lineHeight);
                 ctx.rotate(angle);
-                ctx.fillText(text, 0, 0);
+                ctx.fillText(text2, 0, 0);
                 ctx.restore();
               } else
-                ctx.fillText(text, x, y + j * lineHeight);
+                ctx.fillText(text2, x, y + j * lineHeight);
             }
           }
         }
@@ -6204,8 +6218,8 @@
       context.stroke();
       if (last - y < LABEL * ratio) continue;
       last = y;
-      const text = `bound ${withUnit(value, unit)}${note}`;
-      context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+      const text2 = `bound ${withUnit(value, unit)}${note}`;
+      context.fillText(text2, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
     }
   };
   var drawMovingBounds = (u, bounds) => {
@@ -6939,14 +6953,14 @@
       const key = [whose(whole.systems[0]), whole.name, whole.axis, whole.unit].join("\n");
       found.set(key, [...found.get(key) ?? [], whole]);
     }
-    const joined = [...found.values()].map((wholes) => joinedOf(wholes, runs, whose(wholes[0].systems[0])));
-    const common = joined.flatMap(({ whole }) => whole ? [thinned(whole, runs.length)] : []);
+    const joined2 = [...found.values()].map((wholes) => joinedOf(wholes, runs, whose(wholes[0].systems[0])));
+    const common = joined2.flatMap(({ whole }) => whole ? [thinned(whole, runs.length)] : []);
     if (!common.length)
       return {
         specs: all.map((whole) => thinned(whole)),
         left: "These runs have no variable in common; each has plots of its own."
       };
-    const left = joined.flatMap((each) => each.left);
+    const left = joined2.flatMap((each) => each.left);
     return { specs: common, left: left.length ? `Of one run alone, and not plotted: ${left.join("; ")}.` : "" };
   };
   var joinedOf = (wholes, runs, whose) => {
@@ -7035,8 +7049,8 @@
      * @param {string} title
      * @param {() => void} onclick
      */
-    tool(text, title, onclick) {
-      return element("button", { type: "button", class: "tool", text, title, onclick });
+    tool(text2, title, onclick) {
+      return element("button", { type: "button", class: "tool", text: text2, title, onclick });
     }
     /**
      * Plots for a scene.
@@ -8558,15 +8572,6 @@
       this.viewer.renderer.forceContextRestore();
       this.dirty();
     }
-    /** Whether there is a context, and a picture with more than one colour in it. */
-    get alive() {
-      const gl = this.viewer.renderer.getContext();
-      if (gl.isContextLost()) return false;
-      this.camera.render();
-      const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
-      gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-      return new Set(new Uint32Array(pixels.buffer)).size > 16;
-    }
     get needsRender() {
       return this.viewer.needs_render;
     }
@@ -9024,6 +9029,285 @@
     }
   };
 
+  // src/webm.js
+  var TIME = 1e6;
+  var uint = (value, bytes = 8) => {
+    const out = new Uint8Array(bytes);
+    for (let k = bytes - 1, rest = value; k >= 0; k--, rest = Math.floor(rest / 256)) out[k] = rest % 256;
+    return out;
+  };
+  var float = (value) => {
+    const out = new Uint8Array(8);
+    new DataView(out.buffer).setFloat64(0, value);
+    return out;
+  };
+  var text = (value) => new TextEncoder().encode(value);
+  var joined = (parts) => {
+    const out = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+    let at = 0;
+    for (const part of parts) {
+      out.set(part, at);
+      at += part.length;
+    }
+    return out;
+  };
+  var element2 = (id, ...content) => {
+    const size = uint(content.reduce((sum, part) => sum + part.length, 0));
+    size[0] = 1;
+    const width = id > 16777215 ? 4 : id > 65535 ? 3 : id > 255 ? 2 : 1;
+    return joined([uint(id, width), size, ...content]);
+  };
+  var HEAD = element2(
+    440786851,
+    element2(17030, uint(1, 1)),
+    // version
+    element2(17143, uint(1, 1)),
+    // that readers need
+    element2(17138, uint(4, 1)),
+    // bytes of the longest number
+    element2(17139, uint(8, 1)),
+    // of the longest size
+    element2(17026, text("webm")),
+    element2(17031, uint(4, 1)),
+    // version of that
+    element2(17029, uint(2, 1))
+  );
+  var clusterOf = (pictures) => {
+    const begin = pictures[0].time;
+    const blocks = pictures.map(
+      ({ data, time, key }) => element2(163, uint(129, 1), uint(time - begin, 2), uint(key ? 128 : 0, 1), data)
+    );
+    return element2(524531317, element2(231, uint(begin)), ...blocks);
+  };
+  var cuesOf = (times, places) => element2(
+    475249515,
+    ...times.map(
+      (time, k) => element2(
+        187,
+        element2(179, uint(time)),
+        element2(183, element2(247, uint(1, 1)), element2(241, uint(places[k])))
+      )
+    )
+  );
+  var webmOf = (pictures, { codec, width, height, duration }) => {
+    const groups = [];
+    for (const picture of pictures)
+      if (picture.key) groups.push([picture]);
+      else groups[groups.length - 1].push(picture);
+    const info = element2(
+      357149030,
+      element2(2807729, uint(TIME)),
+      element2(19840, text("gne_mj")),
+      element2(22337, text("gne_mj")),
+      element2(17545, float(duration))
+    );
+    const track = element2(
+      374648427,
+      element2(
+        174,
+        element2(215, uint(1, 1)),
+        // its number
+        element2(29637, uint(1, 1)),
+        element2(131, uint(1, 1)),
+        // of pictures
+        element2(156, uint(0, 1)),
+        // a picture a block
+        element2(134, text(codec)),
+        element2(224, element2(176, uint(width)), element2(186, uint(height)))
+      )
+    );
+    const clusters = groups.map(clusterOf);
+    const times = groups.map(([{ time }]) => time);
+    const before = info.length + track.length + cuesOf(times, times).length;
+    const places = clusters.map(
+      (_2, k) => clusters.slice(0, k).reduce((sum, { length }) => sum + length, before)
+    );
+    return joined([HEAD, element2(408125543, info, track, cuesOf(times, places), ...clusters)]);
+  };
+
+  // src/video.js
+  var RATE = 30;
+  var KEY2 = 2 * RATE;
+  var LONGEST = 120;
+  var LARGEST = 64e6;
+  var WIDEST = 1280;
+  var BITS = 0.15;
+  var WAITING = 3;
+  var ABOUT = "video";
+  var pause = () => new Promise((resolve) => setTimeout(resolve, 0));
+  var even = (value) => 2 * Math.max(1, Math.round(value / 2));
+  var Film = class {
+    /** @param {HTMLCanvasElement} canvas */
+    constructor(canvas) {
+      this.canvas = canvas;
+      this.pictures = [];
+      this.bytes = 0;
+      this.error = null;
+      this.encoder = new VideoEncoder({
+        output: (chunk) => this.take(chunk),
+        error: (error) => this.error = error
+      });
+      const { width, height } = canvas;
+      const bitrate = Math.round(BITS * RATE * width * height);
+      this.encoder.configure({ codec: "vp8", width, height, bitrate, framerate: RATE });
+    }
+    /** @param {EncodedVideoChunk} chunk */
+    take(chunk) {
+      const data = new Uint8Array(chunk.byteLength);
+      chunk.copyTo(data);
+      const time = Math.round(chunk.timestamp / 1e3);
+      this.pictures.push({ data, time, key: chunk.type === "key" });
+      this.bytes += data.length;
+    }
+    /** @param {number} n number of the picture that the canvas has now */
+    async add(n) {
+      const frame = new VideoFrame(this.canvas, { timestamp: Math.round(1e6 * n / RATE) });
+      this.encoder.encode(frame, { keyFrame: n % KEY2 === 0 });
+      frame.close();
+      do
+        await pause();
+      while (this.encoder.encodeQueueSize > WAITING && !this.error);
+      if (this.error) throw this.error;
+    }
+    /** The whole file. */
+    async end() {
+      await this.encoder.flush();
+      this.encoder.close();
+      const { width, height } = this.canvas;
+      const duration = 1e3 * this.pictures.length / RATE;
+      return webmOf(this.pictures, { codec: "V_VP8", width, height, duration });
+    }
+  };
+  var Video = class {
+    /** @param {Page} page */
+    constructor(page2) {
+      this.page = page2;
+      this.stopped = false;
+      byId("keep-video").onclick = () => this.start();
+      byId("recording-stop").onclick = () => this.stopped = true;
+    }
+    /** Of the stretch of time that plots show, at the speed that is chosen. */
+    async start() {
+      const { playback, plots } = this.page;
+      if (!playback || this.page.recording !== null) return;
+      const [from, to] = plots.window;
+      const stretch = (
+        /** @type {Stretch} */
+        [from, Math.min(to, playback.end)]
+      );
+      const refused = this.refusal(stretch, playback.speed ?? 1);
+      if (refused) return notify(refused, "error", ABOUT);
+      const before = playback.time;
+      this.stopped = playback.playing = false;
+      byId("recording").hidden = false;
+      try {
+        await this.record(playback, stretch);
+      } catch (error) {
+        notify(`The video could not be made: ${error.message}`, "error", ABOUT);
+      } finally {
+        byId("recording").hidden = true;
+        this.page.recording = null;
+        this.page.overlay.links.begin();
+        playback.seek(before);
+      }
+    }
+    /**
+     * Why there can be no video, in a sentence.
+     * @param {Stretch} stretch
+     * @param {number} speed
+     */
+    refusal([from, to], speed) {
+      if (!("VideoEncoder" in window))
+        return "This browser cannot make videos (it has no VideoEncoder); current Chromium, Edge, Firefox and Safari can.";
+      const seconds = (to - from) / speed;
+      if (seconds > LONGEST)
+        return `A video has at most ${LONGEST} s, and this one would have ${number(seconds)} s: show a shorter stretch in the plots (drag there with shift) or choose a higher speed.`;
+      return seconds > 0 ? "" : "The plots show no stretch of this run.";
+    }
+    /**
+     * @param {Playback} playback
+     * @param {Stretch} stretch
+     */
+    async record(playback, [from, to]) {
+      const { page: page2 } = this;
+      const speed = playback.speed ?? 1;
+      const canvas = this.canvas();
+      const film = new Film(canvas);
+      const count = Math.max(1, Math.round((to - from) / speed * RATE));
+      page2.scene.setQuality(1);
+      let n = 0;
+      for (; n < count && !this.stopped && film.bytes < LARGEST; n++) {
+        const time = from + n * speed / RATE;
+        this.picture(playback, time, 1e3 * n / RATE);
+        this.compose(canvas, time);
+        await film.add(n);
+        byId("recording-text").textContent = `Video: ${Math.round(100 * n / count)} %`;
+      }
+      if (this.stopped) return film.encoder.close();
+      const bytes = await film.end();
+      const end = from + n * speed / RATE;
+      const name = `${page2.meta?.title ?? "run"} ${from.toFixed(2)}-${end.toFixed(2)} s`;
+      const file = `${name.replace(/[^\w.-]+/g, "_")}.webm`;
+      download(file, new Blob([bytes], { type: "video/webm" }));
+      const short = n < count ? `, and ends at ${number(end)} s, as it has ${LARGEST / 1e6} MB` : "";
+      notify(`The video is saved as ${file}${short}.`, "info", ABOUT);
+    }
+    /**
+     * Draws a moment; messages go on as if the video's time had passed.
+     * @param {Playback} playback
+     * @param {number} time s
+     * @param {number} now ms of the video
+     */
+    picture(playback, time, now) {
+      const { page: page2 } = this;
+      const { links } = page2.overlay;
+      if (now === 0) links.begin();
+      page2.recording = now;
+      playback.seek(time, now > 0);
+      links.flow(page2.meta?.systems.filter(isSolid) ?? [], now);
+      page2.scene.dirty();
+      page2.draw(playback, now);
+    }
+    /** As large as the view, or as videos should be. */
+    canvas() {
+      const { clientWidth: w, clientHeight: h } = byId("pane");
+      const ratio = Math.min(devicePixelRatio, WIDEST / w);
+      return Object.assign(document.createElement("canvas"), {
+        width: even(ratio * w),
+        height: even(ratio * h)
+      });
+    }
+    /**
+     * The view as it is seen, with what it is of and the time.
+     * @param {HTMLCanvasElement} canvas
+     * @param {number} time s
+     */
+    compose(canvas, time) {
+      const context = (
+        /** @type {CanvasRenderingContext2D} */
+        canvas.getContext("2d")
+      );
+      const { width, height } = canvas;
+      const sky = context.createLinearGradient(0, 0, 0, height);
+      sky.addColorStop(0, colour("sky-top"));
+      sky.addColorStop(0.5, colour("sky-middle"));
+      sky.addColorStop(1, colour("sky-bottom"));
+      context.fillStyle = sky;
+      context.fillRect(0, 0, width, height);
+      context.drawImage(this.page.scene.viewer.renderer.domElement, 0, 0, width, height);
+      context.drawImage(byId("overlay"), 0, 0, width, height);
+      const size = Math.max(12, Math.round(height / 36));
+      Object.assign(context, {
+        font: `600 ${size}px system-ui, sans-serif`,
+        textBaseline: "top",
+        fillStyle: colour("text")
+      });
+      const text2 = `${time.toFixed(2)} s`;
+      context.fillText(this.page.meta?.title ?? "", size, size, width - 8 * size);
+      context.fillText(text2, width - size - context.measureText(text2).width, size);
+    }
+  };
+
   // src/keys.js
   var onKeys = (actions) => addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -9177,11 +9461,13 @@
       this.toolbar = new Toolbar(this.scene, this.overlay);
       this.transport = new Transport(this);
       this.keep = new Keep(this);
+      new Video(this);
       this.live = null;
       this.playback = null;
       this.meta = null;
       this.instant = null;
       this.drawn = false;
+      this.recording = null;
       this.seen = true;
       this.wasMoving = false;
       this.before = NaN;
@@ -9284,7 +9570,8 @@
      */
     messages = (system, counts) => {
       const drawn = this.meta?.systems.find(({ name }) => name === system.name);
-      if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, performance.now());
+      const now = this.recording ?? performance.now();
+      if (drawn && isSolid(drawn)) this.overlay.links.messages(system, counts, now);
     };
     /**
      * @param {Meta} meta
@@ -9369,7 +9656,7 @@
     /** @param {number} now ms */
     loop(now) {
       requestAnimationFrame((next) => this.loop(next));
-      if (!this.seen) return;
+      if (!this.seen || this.recording !== null) return;
       const passed = Number.isNaN(this.before) ? 0 : Math.min(now - this.before, 250) / 1e3;
       this.before = now;
       const { source } = this;
