@@ -68,8 +68,8 @@
     if (share > 1) return OUTSIDE;
     const above = RAMP.findIndex(([stop]) => share <= stop);
     if (above <= 0) return RAMP[0][1];
-    const [[from, a], [to, b]] = [RAMP[above - 1], RAMP[above]];
-    return a.map((v, k) => v + (b[k] - v) * (share - from) / (to - from));
+    const [[from, a], [to2, b]] = [RAMP[above - 1], RAMP[above]];
+    return a.map((v, k) => v + (b[k] - v) * (share - from) / (to2 - from));
   };
   var css = (rgb) => `rgb(${rgb.map((v) => Math.round(255 * v)).join(", ")})`;
   var rampGradient = () => `linear-gradient(to right, ${RAMP.map(([s, c]) => `${css(c)} ${100 * s}%`).join(", ")})`;
@@ -101,7 +101,7 @@
       if (page2.source) page2.draw(page2.source, performance.now());
     },
     /** Shows a stretch of time in the plots, s. */
-    show: (from, to) => page2.plots.show([from, to]),
+    show: (from, to2) => page2.plots.show([from, to2]),
     /** How fast a replay plays, times real time. */
     speed: (speed) => page2.setSpeed(speed),
     /** Where the scene graph has an object, in MuJoCo's coordinates, by its path in meshcat. */
@@ -127,8 +127,8 @@
     state: () => stateOf(page2)
   });
   var tintOf = ({ scene }, agent, name) => {
-    const bars2 = scene.bars.find(({ system }) => system.name === name);
-    const drawn = bars2 ? bars2.bars[bars2.system.action.owner.indexOf(agent + 1)] : scene.tinted.get(name)?.[agent]?.[0];
+    const bars = scene.bars.find(({ system }) => system.name === name);
+    const drawn = bars ? bars.bars[bars.system.action.owner.indexOf(agent + 1)] : scene.tinted.get(name)?.[agent]?.[0];
     return drawn ? css(drawn.material.color.toArray()) : null;
   };
   var planOf = ({ scene }, name) => {
@@ -151,8 +151,8 @@
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     return new Set(new Uint32Array(pixels.buffer)).size > 16;
   };
-  var comparedOf = ({ meta, scene }) => (meta?.systems ?? []).map(({ name, items: [first], drawn_as: as, shown: shown2 }) => {
-    const object = as === "fleet" ? scene.objects[first] : scene.bars.find(({ system }) => system.name === name)?.group;
+  var comparedOf = ({ meta, scene }) => (meta?.systems ?? []).map(({ name, items: [first], drawn_as: as2, shown: shown2 }) => {
+    const object = as2 === "fleet" ? scene.objects[first] : scene.bars.find(({ system }) => system.name === name)?.group;
     let opacity = 1;
     object?.traverse(({ material }) => {
       if (material?.color) opacity = Math.min(opacity, material.opacity);
@@ -191,7 +191,7 @@
   var quoted = (text2) => /[",\n]/.test(text2) ? `"${text2.replaceAll('"', '""')}"` : text2;
   var csvOf = (plot) => {
     const { spec, plots } = plot;
-    const [from, to] = plots.window;
+    const [from, to2] = plots.window;
     const { time } = plots.source.store;
     const columns = plot.columns();
     const { on: on2 } = plot.lines;
@@ -199,7 +199,7 @@
     const names = on2.map((k) => quoted(plot.lines.nameOf(k) + unit));
     const rows = [["time (s)", ...names].join(",")];
     time.forEach((t, i) => {
-      if (t < from || t > to) return;
+      if (t < from || t > to2) return;
       const values = on2.map((k) => columns[k][i]);
       const texts = [t, ...values].map((v) => v === null ? "" : Number(v.toPrecision(DIGITS)));
       rows.push(texts.join(","));
@@ -353,12 +353,12 @@
       const first = systems.find(({ run }) => !this.hidden.has(run))?.run ?? 0;
       for (const system of systems) {
         const alike = systems.filter((each) => this.comparedBy(each) === this.comparedBy(system));
-        const off2 = this.hidden.has(system.run);
-        const faint = this.ghosts && !off2 && system.run !== first;
+        const off = this.hidden.has(system.run);
+        const faint = this.ghosts && !off && system.run !== first;
         system.shown = {
           offset: offsetOf(system, this.ghosts),
           faint,
-          off: off2,
+          off,
           over: faint && alike.find(({ run }) => run === first) || null,
           alike: alike.map(({ name }) => name)
         };
@@ -435,7 +435,7 @@
     tell() {
       const note = byId("compare-note");
       note.hidden = !this.ghosts || !this.runs.length;
-      const seen = this.runs.filter((_2, k) => !this.hidden.has(k)).map(({ heading }) => heading);
+      const seen = this.runs.filter((_, k) => !this.hidden.has(k)).map(({ heading }) => heading);
       const others = seen.length > 1 ? `; translucent: ${seen.slice(1).join("; ")}` : "";
       note.textContent = `solid: ${seen[0] ?? "none"}${others}`;
     }
@@ -493,8 +493,8 @@
       const key = JSON.stringify(systems.map((system) => source.stateOf(system)));
       if (key === this.chipKey) return;
       this.chipKey = key;
-      const of = source.seekable ? "closest approach" : "closest approach so far";
-      const chips = systems.map((system) => chipOf(system, source.stateOf(system), of, this.lead));
+      const of2 = source.seekable ? "closest approach" : "closest approach so far";
+      const chips = systems.map((system) => chipOf(system, source.stateOf(system), of2, this.lead));
       byId("chips").replaceChildren(...chips);
       announce(systems, source);
     }
@@ -525,7 +525,7 @@
     const place = byId("announcement");
     if (place.textContent !== text2) place.textContent = text2;
   };
-  var chipOf = (system, state, of, lead) => {
+  var chipOf = (system, state, of2, lead) => {
     const { kind, symbol, words } = status(state.status);
     const about = [
       system.game,
@@ -542,12 +542,12 @@
       },
       element("span", { class: "sign", "aria-hidden": true, text: symbol }),
       element("span", {}, element("b", { text: system.name }), `: ${words}`),
-      marginOf(state, of, lead)
+      marginOf(state, of2, lead)
     );
   };
-  var marginOf = ({ margin, margin_name: name, margin_time: time }, of, lead) => {
+  var marginOf = ({ margin, margin_name: name, margin_time: time }, of2, lead) => {
     if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
-    const text2 = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
+    const text2 = `${of2}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
     if (typeof time !== "number") return element("span", { class: "margin", text: text2 });
     const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;
     const onclick = () => lead(time);
@@ -701,7 +701,7 @@
         if (!data || time.length === 0) continue;
         const width = data.length / time.length;
         this.columns[name] = [...Array(width).keys()].map(
-          (k) => Array.from(time, (_2, i) => orNull(data[i * width + k]))
+          (k) => Array.from(time, (_, i) => orNull(data[i * width + k]))
         );
         this.notePeak(name, data);
       }
@@ -747,7 +747,7 @@
     }
     thin() {
       while (this.time.length > this.most) {
-        const keep = (values) => values.filter((_2, i) => i % 2 === 0);
+        const keep = (values) => values.filter((_, i) => i % 2 === 0);
         this.time = keep(this.time);
         for (const name of this.names) this.columns[name] = this.columns[name].map(keep);
         this.spacing = (this.time[this.time.length - 1] - this.time[0]) / this.time.length;
@@ -1157,8 +1157,8 @@
      * @param {number} b
      */
     straight(system, a, b) {
-      const [from, to] = [this.headAt(system, a), this.headAt(system, b)];
-      return from && to && [from, { x: (from.x + to.x) / 2, y: (from.y + to.y) / 2 }, to];
+      const [from, to2] = [this.headAt(system, a), this.headAt(system, b)];
+      return from && to2 && [from, { x: (from.x + to2.x) / 2, y: (from.y + to2.y) / 2 }, to2];
     }
     /**
      * Where the links of an agent begin on the screen; once a picture for each.
@@ -1204,9 +1204,9 @@
         if (!there(edge) || !this.among(system, [a, b])) continue;
         const curve = this.curve(system, a - 1, b - 1);
         if (!curve) continue;
-        const [from, bend, to] = curve;
+        const [from, bend, to2] = curve;
         context.moveTo(from.x, from.y);
-        context.quadraticCurveTo(bend.x, bend.y, to.x, to.y);
+        context.quadraticCurveTo(bend.x, bend.y, to2.x, to2.y);
       }
       context.stroke();
       context.setLineDash([]);
@@ -1216,9 +1216,9 @@
      * @param {Pulse} pulse
      * @param {number} age in times that a message is seen
      */
-    drawPulse({ system, from, to, lost }, age) {
+    drawPulse({ system, from, to: to2, lost }, age) {
       const { context } = this;
-      const curve = this.curve(system, from, to);
+      const curve = this.curve(system, from, to2);
       if (!curve) return;
       const { x, y } = along(curve, lost ? Math.min(age, 0.5) : age);
       context.fillStyle = context.strokeStyle = colour(lost ? "bad" : "pulse");
@@ -1438,20 +1438,20 @@
     }
     /** @param {System} system */
     barTexts(system) {
-      const bars2 = this.scene.layout.barsOf(system);
-      for (const text2 of [bars2.title(), ...bars2.gaugeTexts()]) this.text(text2);
+      const bars = this.scene.layout.barsOf(system);
+      for (const text2 of [bars.title(), ...bars.gaugeTexts()]) this.text(text2);
       const owners = system.action.owner;
-      const digits = decimals(bars2.reference);
+      const digits = decimals(bars.reference);
       owners.forEach((owner, k) => {
-        const p = this.scene.camera.project(bars2.top(k));
+        const p = this.scene.camera.project(bars.top(k));
         if (p) this.marks.push({ x: p.x, y: p.y, system: system.name, agent: owner - 1 });
         if (!this.labelled) return;
         const chosen = this.isHighlighted(system, owner - 1);
         const axis = system.action.axis[k] || "";
-        this.text({ point: bars2.foot(k), text: `${owner}${axis}`, shift: 11, bold: true, chosen });
+        this.text({ point: bars.foot(k), text: `${owner}${axis}`, shift: 11, bold: true, chosen });
         this.text({
-          point: bars2.top(k),
-          text: fixed(bars2.values[k] ?? null, digits),
+          point: bars.top(k),
+          text: fixed(bars.values[k] ?? null, digits),
           shift: -9,
           chosen
         });
@@ -1534,10 +1534,10 @@
   var mixQuaternion = (a, b, f, out, k) => {
     let dot = 0;
     for (let c = k; c < k + 4; c++) dot += a[c] * b[c];
-    const sign2 = dot < 0 ? -1 : 1;
+    const sign = dot < 0 ? -1 : 1;
     let norm = 0;
     for (let c = k; c < k + 4; c++) {
-      out[c] = (1 - f) * a[c] + f * sign2 * b[c];
+      out[c] = (1 - f) * a[c] + f * sign * b[c];
       norm += out[c] * out[c];
     }
     norm = Math.sqrt(norm) || 1;
@@ -1633,12 +1633,12 @@
      * @param {number} from
      * @param {number} to
      */
-    messagesBetween(name, from, to) {
+    messagesBetween(name, from, to2) {
       const array = this.arrays[`${name}/messages`];
-      if (!array || !(to > from)) return void 0;
+      if (!array || !(to2 > from)) return void 0;
       const width = array.data.length / this.time.length;
       const sum = new Float32Array(width);
-      for (let i = this.at(from).i + 1; i <= this.at(to).i; i++)
+      for (let i = this.at(from).i + 1; i <= this.at(to2).i; i++)
         for (let k = 0; k < width; k++) sum[k] += array.data[i * width + k];
       return sum;
     }
@@ -1651,7 +1651,7 @@
       const array = this.arrays[name];
       if (!array) return this.time.map(() => null);
       const width = array.data.length / this.time.length;
-      return this.time.map((_2, i) => orNull(array.data[i * width + k]));
+      return this.time.map((_, i) => orNull(array.data[i * width + k]));
     }
     /** @param {string} name */
     greatest(name) {
@@ -1712,8 +1712,8 @@
       if (second) return this.seek(this.time + direction);
       const { time } = this.replay;
       const { i, f } = this.replay.at(this.time);
-      const to = direction > 0 ? i + 1 : f > 0 ? i : i - 1;
-      this.seek(time[Math.min(Math.max(to, 0), time.length - 1)], direction > 0);
+      const to2 = direction > 0 ? i + 1 : f > 0 ? i : i - 1;
+      this.seek(time[Math.min(Math.max(to2, 0), time.length - 1)], direction > 0);
     }
     restart() {
       this.seek(this.start);
@@ -1750,4309 +1750,1844 @@
     }
   };
 
-  // node_modules/uplot/dist/uPlot.esm.js
-  var FEAT_TIME = true;
-  var pre = "u-";
-  var UPLOT = "uplot";
-  var ORI_HZ = pre + "hz";
-  var ORI_VT = pre + "vt";
-  var TITLE = pre + "title";
-  var WRAP = pre + "wrap";
-  var UNDER = pre + "under";
-  var OVER = pre + "over";
-  var AXIS = pre + "axis";
-  var OFF = pre + "off";
-  var SELECT = pre + "select";
-  var CURSOR_X = pre + "cursor-x";
-  var CURSOR_Y = pre + "cursor-y";
-  var CURSOR_PT = pre + "cursor-pt";
-  var LEGEND = pre + "legend";
-  var LEGEND_LIVE = pre + "live";
-  var LEGEND_INLINE = pre + "inline";
-  var LEGEND_SERIES = pre + "series";
-  var LEGEND_MARKER = pre + "marker";
-  var LEGEND_LABEL = pre + "label";
-  var LEGEND_VALUE = pre + "value";
-  var WIDTH = "width";
-  var HEIGHT = "height";
-  var TOP = "top";
-  var BOTTOM = "bottom";
-  var LEFT = "left";
-  var RIGHT = "right";
-  var hexBlack = "#000";
-  var transparent = hexBlack + "0";
-  var mousemove = "mousemove";
-  var mousedown = "mousedown";
-  var mouseup = "mouseup";
-  var mouseenter = "mouseenter";
-  var mouseleave = "mouseleave";
-  var dblclick = "dblclick";
-  var resize = "resize";
-  var scroll = "scroll";
-  var change = "change";
-  var dppxchange = "dppxchange";
-  var LEGEND_DISP = "--";
-  var domEnv = typeof window != "undefined";
-  var doc = domEnv ? document : null;
-  var win = domEnv ? window : null;
-  var nav = domEnv ? navigator : null;
-  var pxRatio;
-  var query;
-  function setPxRatio() {
-    let _pxRatio = devicePixelRatio;
-    if (pxRatio != _pxRatio) {
-      pxRatio = _pxRatio;
-      query && off(change, query, setPxRatio);
-      query = matchMedia(`(min-resolution: ${pxRatio - 1e-3}dppx) and (max-resolution: ${pxRatio + 1e-3}dppx)`);
-      on(change, query, setPxRatio);
-      win.dispatchEvent(new CustomEvent(dppxchange));
+  // node_modules/uplot-small.js
+  var Js = "uplot";
+  var Zs = "u-hz";
+  var Qs = "u-vt";
+  var Xs = "u-title";
+  var er = "u-wrap";
+  var tr = "u-under";
+  var lr = "u-over";
+  var nr = "u-axis";
+  var Zt = "u-off";
+  var ir = "u-select";
+  var or = "u-cursor-x";
+  var sr = "u-cursor-y";
+  var rr = "u-cursor-pt";
+  var fr = "u-legend";
+  var ur = "u-live";
+  var cr = "u-inline";
+  var ar = "u-series";
+  var pr = "u-marker";
+  var ji = "u-label";
+  var hr = "u-value";
+  var Nl = "width";
+  var Wl = "height";
+  var qi = "bottom";
+  var yl = "left";
+  var Wn = "right";
+  var ni = "#000";
+  var $i = ni + "0";
+  var Gn = "mousemove";
+  var Ji = "mousedown";
+  var In = "mouseup";
+  var Zi = "mouseenter";
+  var Qi = "mouseleave";
+  var Xi = "dblclick";
+  var mr = "resize";
+  var gr = "scroll";
+  var eo = "change";
+  var sn = "dppxchange";
+  var ii = "--";
+  var Al = typeof window < "u";
+  var jn = Al ? document : null;
+  var kl = Al ? window : null;
+  var dr = Al ? navigator : null;
+  var oe;
+  var tn;
+  function qn() {
+    let e = devicePixelRatio;
+    oe != e && (oe = e, tn && Jn(eo, tn, qn), tn = matchMedia(`(min-resolution: ${oe - 1e-3}dppx) and (max-resolution: ${oe + 1e-3}dppx)`), Qt(eo, tn, qn), kl.dispatchEvent(new CustomEvent(sn)));
+  }
+  function Xe(e, i) {
+    if (i != null) {
+      let o = e.classList;
+      !o.contains(i) && o.add(i);
     }
   }
-  function addClass(el, c) {
-    if (c != null) {
-      let cl = el.classList;
-      !cl.contains(c) && cl.add(c);
-    }
+  function $n(e, i) {
+    let o = e.classList;
+    o.contains(i) && o.remove(i);
   }
-  function remClass(el, c) {
-    let cl = el.classList;
-    cl.contains(c) && cl.remove(c);
+  function de(e, i, o) {
+    e.style[i] = o + "px";
   }
-  function setStylePx(el, name, value) {
-    el.style[name] = value + "px";
+  function gt(e, i, o, n) {
+    let s = jn.createElement(e);
+    return i != null && Xe(s, i), o?.insertBefore(s, n), s;
   }
-  function placeTag(tag, cls, targ, refEl) {
-    let el = doc.createElement(tag);
-    if (cls != null)
-      addClass(el, cls);
-    if (targ != null)
-      targ.insertBefore(el, refEl);
-    return el;
+  function ft(e, i) {
+    return gt("div", e, i);
   }
-  function placeDiv(cls, targ) {
-    return placeTag("div", cls, targ);
+  var to = /* @__PURE__ */ new WeakMap();
+  function bt(e, i, o, n, s) {
+    let a = "translate(" + i + "px," + o + "px)", u = to.get(e);
+    a != u && (e.style.transform = a, to.set(e, a), i < 0 || o < 0 || i > n || o > s ? Xe(e, Zt) : $n(e, Zt));
   }
-  var xformCache = /* @__PURE__ */ new WeakMap();
-  function elTrans(el, xPos, yPos, xMax, yMax) {
-    let xform = "translate(" + xPos + "px," + yPos + "px)";
-    let xformOld = xformCache.get(el);
-    if (xform != xformOld) {
-      el.style.transform = xform;
-      xformCache.set(el, xform);
-      if (xPos < 0 || yPos < 0 || xPos > xMax || yPos > yMax)
-        addClass(el, OFF);
-      else
-        remClass(el, OFF);
-    }
+  var lo = /* @__PURE__ */ new WeakMap();
+  function no(e, i, o) {
+    let n = i + o, s = lo.get(e);
+    n != s && (lo.set(e, n), e.style.background = i, e.style.borderColor = o);
   }
-  var colorCache = /* @__PURE__ */ new WeakMap();
-  function elColor(el, background, borderColor) {
-    let newColor = background + borderColor;
-    let oldColor = colorCache.get(el);
-    if (newColor != oldColor) {
-      colorCache.set(el, newColor);
-      el.style.background = background;
-      el.style.borderColor = borderColor;
-    }
+  var io = /* @__PURE__ */ new WeakMap();
+  function oo(e, i, o, n) {
+    let s = i + "" + o, a = io.get(e);
+    s != a && (io.set(e, s), e.style.height = o + "px", e.style.width = i + "px", e.style.marginLeft = n ? -i / 2 + "px" : 0, e.style.marginTop = n ? -o / 2 + "px" : 0);
   }
-  var sizeCache = /* @__PURE__ */ new WeakMap();
-  function elSize(el, newWid, newHgt, centered) {
-    let newSize = newWid + "" + newHgt;
-    let oldSize = sizeCache.get(el);
-    if (newSize != oldSize) {
-      sizeCache.set(el, newSize);
-      el.style.height = newHgt + "px";
-      el.style.width = newWid + "px";
-      el.style.marginLeft = centered ? -newWid / 2 + "px" : 0;
-      el.style.marginTop = centered ? -newHgt / 2 + "px" : 0;
-    }
+  var oi = { passive: true };
+  var wr = { ...oi, capture: true };
+  function Qt(e, i, o, n) {
+    i.addEventListener(e, o, n ? wr : oi);
   }
-  var evOpts = { passive: true };
-  var evOpts2 = { ...evOpts, capture: true };
-  function on(ev, el, cb, capt) {
-    el.addEventListener(ev, cb, capt ? evOpts2 : evOpts);
+  function Jn(e, i, o, n) {
+    i.removeEventListener(e, o, oi);
   }
-  function off(ev, el, cb, capt) {
-    el.removeEventListener(ev, cb, evOpts);
+  Al && qn();
+  function dt(e, i, o, n) {
+    let s;
+    o = o || 0, n = n || i.length - 1;
+    let a = n <= 2147483647;
+    for (; n - o > 1; ) s = a ? o + n >> 1 : et((o + n) / 2), i[s] < e ? o = s : n = s;
+    return e - i[o] <= i[n] - e ? o : n;
   }
-  domEnv && setPxRatio();
-  function closestIdx(num, arr, lo, hi) {
-    let mid;
-    lo = lo || 0;
-    hi = hi || arr.length - 1;
-    let bitwise = hi <= 2147483647;
-    while (hi - lo > 1) {
-      mid = bitwise ? lo + hi >> 1 : floor((lo + hi) / 2);
-      if (arr[mid] < num)
-        lo = mid;
-      else
-        hi = mid;
-    }
-    if (num - arr[lo] <= arr[hi] - num)
-      return lo;
-    return hi;
-  }
-  function makeIndexOfs(predicate) {
-    let indexOfs = (data, _i0, _i1) => {
-      let i0 = -1;
-      let i1 = -1;
-      for (let i = _i0; i <= _i1; i++) {
-        if (predicate(data[i])) {
-          i0 = i;
-          break;
-        }
+  function Ro(e) {
+    return (o, n, s) => {
+      let a = -1, u = -1;
+      for (let h = n; h <= s; h++) if (e(o[h])) {
+        a = h;
+        break;
       }
-      for (let i = _i1; i >= _i0; i--) {
-        if (predicate(data[i])) {
-          i1 = i;
-          break;
-        }
+      for (let h = s; h >= n; h--) if (e(o[h])) {
+        u = h;
+        break;
       }
-      return [i0, i1];
+      return [a, u];
     };
-    return indexOfs;
   }
-  var notNullish = (v) => v != null;
-  var isPositive = (v) => v != null && v > 0;
-  var nonNullIdxs = makeIndexOfs(notNullish);
-  var positiveIdxs = makeIndexOfs(isPositive);
-  function getMinMax(data, _i0, _i1, sorted = 0, log = false) {
-    let getEdgeIdxs = log ? positiveIdxs : nonNullIdxs;
-    let predicate = log ? isPositive : notNullish;
-    [_i0, _i1] = getEdgeIdxs(data, _i0, _i1);
-    let _min = data[_i0];
-    let _max = data[_i0];
-    if (_i0 > -1) {
-      if (sorted == 1) {
-        _min = data[_i0];
-        _max = data[_i1];
-      } else if (sorted == -1) {
-        _min = data[_i1];
-        _max = data[_i0];
-      } else {
-        for (let i = _i0; i <= _i1; i++) {
-          let v = data[i];
-          if (predicate(v)) {
-            if (v < _min)
-              _min = v;
-            else if (v > _max)
-              _max = v;
-          }
-        }
-      }
+  var zo = (e) => e != null;
+  var Fo = (e) => e != null && e > 0;
+  var un = Ro(zo);
+  var Sr = Ro(Fo);
+  function _r(e, i, o, n = 0, s = false) {
+    let a = s ? Sr : un, u = s ? Fo : zo;
+    [i, o] = a(e, i, o);
+    let h = e[i], m = e[i];
+    if (i > -1) if (n == 1) h = e[i], m = e[o];
+    else if (n == -1) h = e[o], m = e[i];
+    else for (let g = i; g <= o; g++) {
+      let y = e[g];
+      u(y) && (y < h ? h = y : y > m && (m = y));
     }
-    return [_min ?? inf, _max ?? -inf];
+    return [h ?? ce, m ?? -ce];
   }
-  function rangeLog(min2, max2, base, fullMags) {
-    let minSign = sign(min2);
-    let maxSign = sign(max2);
-    if (min2 == max2) {
-      if (minSign == -1) {
-        min2 *= base;
-        max2 /= base;
-      } else {
-        min2 /= base;
-        max2 *= base;
-      }
-    }
-    let logFn = base == 10 ? log10 : log2;
-    let growMinAbs = minSign == 1 ? floor : ceil;
-    let growMaxAbs = maxSign == 1 ? ceil : floor;
-    let minExp = growMinAbs(logFn(abs(min2)));
-    let maxExp = growMaxAbs(logFn(abs(max2)));
-    let minIncr = pow(base, minExp);
-    let maxIncr = pow(base, maxExp);
-    if (base == 10) {
-      if (minExp < 0)
-        minIncr = roundDec(minIncr, -minExp);
-      if (maxExp < 0)
-        maxIncr = roundDec(maxIncr, -maxExp);
-    }
-    if (fullMags || base == 2) {
-      min2 = minIncr * minSign;
-      max2 = maxIncr * maxSign;
-    } else {
-      min2 = incrRoundDn(min2, minIncr);
-      max2 = incrRoundUp(max2, maxIncr);
-    }
-    return [min2, max2];
+  function cn(e, i, o, n) {
+    let s = fo(e), a = fo(i);
+    e == i && (s == -1 ? (e *= o, i /= o) : (e /= o, i *= o));
+    let u = o == 10 ? Pt : Oo, h = s == 1 ? et : ut, m = a == 1 ? ut : et, g = h(u(Ee(e))), y = m(u(Ee(i))), d = xl(o, g), w = xl(o, y);
+    return o == 10 && (g < 0 && (d = ae(d, -g)), y < 0 && (w = ae(w, -y))), n || o == 2 ? (e = d * s, i = w * a) : (e = Go(e, d), i = an(i, w)), [e, i];
   }
-  function rangeAsinh(min2, max2, base, fullMags) {
-    let minMax = rangeLog(min2, max2, base, fullMags);
-    if (min2 == 0)
-      minMax[0] = 0;
-    if (max2 == 0)
-      minMax[1] = 0;
-    return minMax;
+  function si(e, i, o, n) {
+    let s = cn(e, i, o, n);
+    return e == 0 && (s[0] = 0), i == 0 && (s[1] = 0), s;
   }
-  var rangePad = 0.1;
-  var autoRangePart = {
-    mode: 3,
-    pad: rangePad
-  };
-  var _eqRangePart = {
-    pad: 0,
-    soft: null,
-    mode: 0
-  };
-  var _eqRange = {
-    min: _eqRangePart,
-    max: _eqRangePart
-  };
-  function rangeNum(_min, _max, mult, extra) {
-    if (isObj(mult))
-      return _rangeNum(_min, _max, mult);
-    _eqRangePart.pad = mult;
-    _eqRangePart.soft = extra ? 0 : null;
-    _eqRangePart.mode = extra ? 3 : 0;
-    return _rangeNum(_min, _max, _eqRange);
+  var ri = 0.1;
+  var so = { mode: 3, pad: ri };
+  var Il = { pad: 0, soft: null, mode: 0 };
+  var yr = { min: Il, max: Il };
+  function rn(e, i, o, n) {
+    return pn(o) ? ro(e, i, o) : (Il.pad = o, Il.soft = n ? 0 : null, Il.mode = n ? 3 : 0, ro(e, i, yr));
   }
-  function ifNull(lh, rh) {
-    return lh == null ? rh : lh;
+  function ne(e, i) {
+    return e ?? i;
   }
-  function hasData(data, idx0, idx1) {
-    idx0 = ifNull(idx0, 0);
-    idx1 = ifNull(idx1, data.length - 1);
-    while (idx0 <= idx1) {
-      if (data[idx0] != null)
-        return true;
-      idx0++;
+  function vr(e, i, o) {
+    for (i = ne(i, 0), o = ne(o, e.length - 1); i <= o; ) {
+      if (e[i] != null) return true;
+      i++;
     }
     return false;
   }
-  function _rangeNum(_min, _max, cfg) {
-    let cmin = cfg.min;
-    let cmax = cfg.max;
-    let padMin = ifNull(cmin.pad, 0);
-    let padMax = ifNull(cmax.pad, 0);
-    let hardMin = ifNull(cmin.hard, -inf);
-    let hardMax = ifNull(cmax.hard, inf);
-    let softMin = ifNull(cmin.soft, inf);
-    let softMax = ifNull(cmax.soft, -inf);
-    let softMinMode = ifNull(cmin.mode, 0);
-    let softMaxMode = ifNull(cmax.mode, 0);
-    let delta = _max - _min;
-    let deltaMag = log10(delta);
-    let scalarMax = max(abs(_min), abs(_max));
-    let scalarMag = log10(scalarMax);
-    let scalarMagDelta = abs(scalarMag - deltaMag);
-    if (delta < 1e-24 || scalarMagDelta > 10) {
-      delta = 0;
-      if (_min == 0 || _max == 0) {
-        delta = 1e-24;
-        if (softMinMode == 2 && softMin != inf)
-          padMin = 0;
-        if (softMaxMode == 2 && softMax != -inf)
-          padMax = 0;
+  function ro(e, i, o) {
+    let n = o.min, s = o.max, a = ne(n.pad, 0), u = ne(s.pad, 0), h = ne(n.hard, -ce), m = ne(s.hard, ce), g = ne(n.soft, ce), y = ne(s.soft, -ce), d = ne(n.mode, 0), w = ne(s.mode, 0), L = i - e, D = Pt(L), O = Ye(Ee(e), Ee(i)), N = Pt(O), G = Ee(N - D);
+    (L < 1e-24 || G > 10) && (L = 0, (e == 0 || i == 0) && (L = 1e-24, d == 2 && g != ce && (a = 0), w == 2 && y != -ce && (u = 0)));
+    let k = L || O || 1e3, H = Pt(k), x = xl(10, et(H)), q = k * (L == 0 ? e == 0 ? 0.1 : 1 : a), P = ae(Go(e - q, x / 10), 24), $ = e >= g && (d == 1 || d == 3 && P <= g || d == 2 && P >= g) ? g : ce, U = Ye(h, P < $ && e >= $ ? $ : wt($, P)), Q = k * (L == 0 ? i == 0 ? 0.1 : 1 : u), B = ae(an(i + Q, x / 10), 24), T = i <= y && (w == 1 || w == 3 && B >= y || w == 2 && B <= y) ? y : -ce, j = wt(m, B > T && i <= T ? T : Ye(T, B));
+    return U == j && U == 0 && (j = 100), [U, j];
+  }
+  var kr = new Intl.NumberFormat(Al ? dr.language : "en-US");
+  var fi = (e) => kr.format(e);
+  var tt = Math;
+  var on = tt.PI;
+  var Ee = tt.abs;
+  var et = tt.floor;
+  var Ae = tt.round;
+  var ut = tt.ceil;
+  var wt = tt.min;
+  var Ye = tt.max;
+  var xl = tt.pow;
+  var fo = tt.sign;
+  var Pt = tt.log10;
+  var Oo = tt.log2;
+  var xr = (e, i = 1) => tt.sinh(e) * i;
+  var Yn = (e, i = 1) => tt.asinh(e / i);
+  var ce = 1 / 0;
+  function uo(e) {
+    return (Pt((e ^ e >> 31) - (e >> 31)) | 0) + 1;
+  }
+  function Zn(e, i, o) {
+    return wt(Ye(e, i), o);
+  }
+  function Ho(e) {
+    return typeof e == "function";
+  }
+  function X(e) {
+    return Ho(e) ? e : () => e;
+  }
+  var Tr = () => {
+  };
+  var No = (e) => e;
+  var Wo = (e, i) => i;
+  var br = (e) => null;
+  var co = (e) => true;
+  var ao = (e, i) => e == i;
+  var Mr = /\.\d*?(?=9{6,}|0{6,})/gm;
+  var Xt = (e) => {
+    if (Yo(e) || Ht.has(e)) return e;
+    let i = `${e}`, o = i.match(Mr);
+    if (o == null) return e;
+    let n = o[0].length - 1;
+    if (i.indexOf("e-") != -1) {
+      let [s, a] = i.split("e");
+      return +`${Xt(s)}e${a}`;
+    }
+    return ae(e, n);
+  };
+  function $t(e, i) {
+    return Xt(ae(Xt(e / i)) * i);
+  }
+  function an(e, i) {
+    return Xt(ut(Xt(e / i)) * i);
+  }
+  function Go(e, i) {
+    return Xt(et(Xt(e / i)) * i);
+  }
+  function ae(e, i = 0) {
+    if (Yo(e)) return e;
+    let o = 10 ** i, n = e * o * (1 + Number.EPSILON);
+    return Ae(n) / o;
+  }
+  var Ht = /* @__PURE__ */ new Map();
+  function Io(e) {
+    return (("" + e).split(".")[1] || "").length;
+  }
+  function Bl(e, i, o, n) {
+    let s = [], a = n.map(Io);
+    for (let u = i; u < o; u++) {
+      let h = Ee(u), m = ae(xl(e, u), h);
+      for (let g = 0; g < n.length; g++) {
+        let y = e == 10 ? +`${n[g]}e${u}` : n[g] * m, d = (u >= 0 ? 0 : h) + (u >= a[g] ? 0 : a[g]), w = e == 10 ? y : ae(y, d);
+        s.push(w), Ht.set(w, d);
       }
-    }
-    let nonZeroDelta = delta || scalarMax || 1e3;
-    let mag = log10(nonZeroDelta);
-    let base = pow(10, floor(mag));
-    let _padMin = nonZeroDelta * (delta == 0 ? _min == 0 ? 0.1 : 1 : padMin);
-    let _newMin = roundDec(incrRoundDn(_min - _padMin, base / 10), 24);
-    let _softMin = _min >= softMin && (softMinMode == 1 || softMinMode == 3 && _newMin <= softMin || softMinMode == 2 && _newMin >= softMin) ? softMin : inf;
-    let minLim = max(hardMin, _newMin < _softMin && _min >= _softMin ? _softMin : min(_softMin, _newMin));
-    let _padMax = nonZeroDelta * (delta == 0 ? _max == 0 ? 0.1 : 1 : padMax);
-    let _newMax = roundDec(incrRoundUp(_max + _padMax, base / 10), 24);
-    let _softMax = _max <= softMax && (softMaxMode == 1 || softMaxMode == 3 && _newMax >= softMax || softMaxMode == 2 && _newMax <= softMax) ? softMax : -inf;
-    let maxLim = min(hardMax, _newMax > _softMax && _max <= _softMax ? _softMax : max(_softMax, _newMax));
-    if (minLim == maxLim && minLim == 0)
-      maxLim = 100;
-    return [minLim, maxLim];
-  }
-  var numFormatter = new Intl.NumberFormat(domEnv ? nav.language : "en-US");
-  var fmtNum = (val) => numFormatter.format(val);
-  var M = Math;
-  var PI = M.PI;
-  var abs = M.abs;
-  var floor = M.floor;
-  var round = M.round;
-  var ceil = M.ceil;
-  var min = M.min;
-  var max = M.max;
-  var pow = M.pow;
-  var sign = M.sign;
-  var log10 = M.log10;
-  var log2 = M.log2;
-  var sinh = (v, linthresh = 1) => M.sinh(v) * linthresh;
-  var asinh = (v, linthresh = 1) => M.asinh(v / linthresh);
-  var inf = Infinity;
-  function numIntDigits(x) {
-    return (log10((x ^ x >> 31) - (x >> 31)) | 0) + 1;
-  }
-  function clamp(num, _min, _max) {
-    return min(max(num, _min), _max);
-  }
-  function isFn(v) {
-    return typeof v == "function";
-  }
-  function fnOrSelf(v) {
-    return isFn(v) ? v : () => v;
-  }
-  var noop = () => {
-  };
-  var retArg0 = (_0) => _0;
-  var retArg1 = (_0, _1) => _1;
-  var retNull = (_2) => null;
-  var retTrue = (_2) => true;
-  var retEq = (a, b) => a == b;
-  var regex6 = /\.\d*?(?=9{6,}|0{6,})/gm;
-  var fixFloat = (val) => {
-    if (isInt(val) || fixedDec.has(val))
-      return val;
-    const str = `${val}`;
-    const match = str.match(regex6);
-    if (match == null)
-      return val;
-    let len = match[0].length - 1;
-    if (str.indexOf("e-") != -1) {
-      let [num, exp] = str.split("e");
-      return +`${fixFloat(num)}e${exp}`;
-    }
-    return roundDec(val, len);
-  };
-  function incrRound(num, incr) {
-    return fixFloat(roundDec(fixFloat(num / incr)) * incr);
-  }
-  function incrRoundUp(num, incr) {
-    return fixFloat(ceil(fixFloat(num / incr)) * incr);
-  }
-  function incrRoundDn(num, incr) {
-    return fixFloat(floor(fixFloat(num / incr)) * incr);
-  }
-  function roundDec(val, dec = 0) {
-    if (isInt(val))
-      return val;
-    let p = 10 ** dec;
-    let n = val * p * (1 + Number.EPSILON);
-    return round(n) / p;
-  }
-  var fixedDec = /* @__PURE__ */ new Map();
-  function guessDec(num) {
-    return (("" + num).split(".")[1] || "").length;
-  }
-  function genIncrs(base, minExp, maxExp, mults) {
-    let incrs = [];
-    let multDec = mults.map(guessDec);
-    for (let exp = minExp; exp < maxExp; exp++) {
-      let expa = abs(exp);
-      let mag = roundDec(pow(base, exp), expa);
-      for (let i = 0; i < mults.length; i++) {
-        let _incr = base == 10 ? +`${mults[i]}e${exp}` : mults[i] * mag;
-        let dec = (exp >= 0 ? 0 : expa) + (exp >= multDec[i] ? 0 : multDec[i]);
-        let incr = base == 10 ? _incr : roundDec(_incr, dec);
-        incrs.push(incr);
-        fixedDec.set(incr, dec);
-      }
-    }
-    return incrs;
-  }
-  var EMPTY_OBJ = {};
-  var EMPTY_ARR = [];
-  var nullNullTuple = [null, null];
-  var isArr = Array.isArray;
-  var isInt = Number.isInteger;
-  var isUndef = (v) => v === void 0;
-  function isStr(v) {
-    return typeof v == "string";
-  }
-  function isObj(v) {
-    let is = false;
-    if (v != null) {
-      let c = v.constructor;
-      is = c == null || c == Object;
-    }
-    return is;
-  }
-  function fastIsObj(v) {
-    return v != null && typeof v == "object";
-  }
-  var TypedArray = Object.getPrototypeOf(Uint8Array);
-  var __proto__ = "__proto__";
-  function copy2(o, _isObj = isObj) {
-    let out;
-    if (isArr(o)) {
-      let val = o.find((v) => v != null);
-      if (isArr(val) || _isObj(val)) {
-        out = Array(o.length);
-        for (let i = 0; i < o.length; i++)
-          out[i] = copy2(o[i], _isObj);
-      } else
-        out = o.slice();
-    } else if (o instanceof TypedArray)
-      out = o.slice();
-    else if (_isObj(o)) {
-      out = {};
-      for (let k in o) {
-        if (k != __proto__)
-          out[k] = copy2(o[k], _isObj);
-      }
-    } else
-      out = o;
-    return out;
-  }
-  function assign(targ) {
-    let args = arguments;
-    for (let i = 1; i < args.length; i++) {
-      let src = args[i];
-      for (let key in src) {
-        if (key != __proto__) {
-          if (isObj(targ[key]))
-            assign(targ[key], copy2(src[key]));
-          else
-            targ[key] = copy2(src[key]);
-        }
-      }
-    }
-    return targ;
-  }
-  var NULL_REMOVE = 0;
-  var NULL_RETAIN = 1;
-  var NULL_EXPAND = 2;
-  function nullExpand(yVals, nullIdxs, alignedLen) {
-    for (let i = 0, xi, lastNullIdx = -1; i < nullIdxs.length; i++) {
-      let nullIdx = nullIdxs[i];
-      if (nullIdx > lastNullIdx) {
-        xi = nullIdx - 1;
-        while (xi >= 0 && yVals[xi] == null)
-          yVals[xi--] = null;
-        xi = nullIdx + 1;
-        while (xi < alignedLen && yVals[xi] == null)
-          yVals[lastNullIdx = xi++] = null;
-      }
-    }
-  }
-  function join(tables, nullModes) {
-    if (allHeadersSame(tables)) {
-      let table = tables[0].slice();
-      for (let i = 1; i < tables.length; i++)
-        table.push(...tables[i].slice(1));
-      if (!isAsc(table[0]))
-        table = sortCols(table);
-      return table;
-    }
-    let xVals = /* @__PURE__ */ new Set();
-    for (let ti = 0; ti < tables.length; ti++) {
-      let t = tables[ti];
-      let xs = t[0];
-      let len = xs.length;
-      for (let i = 0; i < len; i++)
-        xVals.add(xs[i]);
-    }
-    let data = [Array.from(xVals).sort((a, b) => a - b)];
-    let alignedLen = data[0].length;
-    let xIdxs = /* @__PURE__ */ new Map();
-    for (let i = 0; i < alignedLen; i++)
-      xIdxs.set(data[0][i], i);
-    for (let ti = 0; ti < tables.length; ti++) {
-      let t = tables[ti];
-      let xs = t[0];
-      for (let si = 1; si < t.length; si++) {
-        let ys = t[si];
-        let yVals = Array(alignedLen).fill(void 0);
-        let nullMode = nullModes ? nullModes[ti][si] : NULL_RETAIN;
-        let nullIdxs = [];
-        for (let i = 0; i < ys.length; i++) {
-          let yVal = ys[i];
-          let alignedIdx = xIdxs.get(xs[i]);
-          if (yVal === null) {
-            if (nullMode != NULL_REMOVE) {
-              yVals[alignedIdx] = yVal;
-              if (nullMode == NULL_EXPAND)
-                nullIdxs.push(alignedIdx);
-            }
-          } else
-            yVals[alignedIdx] = yVal;
-        }
-        nullExpand(yVals, nullIdxs, alignedLen);
-        data.push(yVals);
-      }
-    }
-    return data;
-  }
-  var microTask = typeof queueMicrotask == "undefined" ? (fn) => Promise.resolve().then(fn) : queueMicrotask;
-  function sortCols(table) {
-    let head = table[0];
-    let rlen = head.length;
-    let idxs = Array(rlen);
-    for (let i = 0; i < idxs.length; i++)
-      idxs[i] = i;
-    idxs.sort((i0, i1) => head[i0] - head[i1]);
-    let table2 = [];
-    for (let i = 0; i < table.length; i++) {
-      let row = table[i];
-      let row2 = Array(rlen);
-      for (let j = 0; j < rlen; j++)
-        row2[j] = row[idxs[j]];
-      table2.push(row2);
-    }
-    return table2;
-  }
-  function allHeadersSame(tables) {
-    let vals0 = tables[0][0];
-    let len0 = vals0.length;
-    for (let i = 1; i < tables.length; i++) {
-      let vals1 = tables[i][0];
-      if (vals1.length != len0)
-        return false;
-      if (vals1 != vals0) {
-        for (let j = 0; j < len0; j++) {
-          if (vals1[j] != vals0[j])
-            return false;
-        }
-      }
-    }
-    return true;
-  }
-  function isAsc(vals, samples = 100) {
-    const len = vals.length;
-    if (len <= 1)
-      return true;
-    let firstIdx = 0;
-    let lastIdx = len - 1;
-    while (firstIdx <= lastIdx && vals[firstIdx] == null)
-      firstIdx++;
-    while (lastIdx >= firstIdx && vals[lastIdx] == null)
-      lastIdx--;
-    if (lastIdx <= firstIdx)
-      return true;
-    const stride = max(1, floor((lastIdx - firstIdx + 1) / samples));
-    for (let prevVal = vals[firstIdx], i = firstIdx + stride; i <= lastIdx; i += stride) {
-      const v = vals[i];
-      if (v != null) {
-        if (v <= prevVal)
-          return false;
-        prevVal = v;
-      }
-    }
-    return true;
-  }
-  var months = [
-    "January",
-    "February",
-    "March",
-    "April",
-    "May",
-    "June",
-    "July",
-    "August",
-    "September",
-    "October",
-    "November",
-    "December"
-  ];
-  var days = [
-    "Sunday",
-    "Monday",
-    "Tuesday",
-    "Wednesday",
-    "Thursday",
-    "Friday",
-    "Saturday"
-  ];
-  function slice3(str) {
-    return str.slice(0, 3);
-  }
-  var days3 = days.map(slice3);
-  var months3 = months.map(slice3);
-  var engNames = {
-    MMMM: months,
-    MMM: months3,
-    WWWW: days,
-    WWW: days3
-  };
-  function zeroPad2(int) {
-    return (int < 10 ? "0" : "") + int;
-  }
-  function zeroPad3(int) {
-    return (int < 10 ? "00" : int < 100 ? "0" : "") + int;
-  }
-  var subs = {
-    // 2019
-    YYYY: (d) => d.getFullYear(),
-    // 19
-    YY: (d) => (d.getFullYear() + "").slice(2),
-    // July
-    MMMM: (d, names) => names.MMMM[d.getMonth()],
-    // Jul
-    MMM: (d, names) => names.MMM[d.getMonth()],
-    // 07
-    MM: (d) => zeroPad2(d.getMonth() + 1),
-    // 7
-    M: (d) => d.getMonth() + 1,
-    // 09
-    DD: (d) => zeroPad2(d.getDate()),
-    // 9
-    D: (d) => d.getDate(),
-    // Monday
-    WWWW: (d, names) => names.WWWW[d.getDay()],
-    // Mon
-    WWW: (d, names) => names.WWW[d.getDay()],
-    // 03
-    HH: (d) => zeroPad2(d.getHours()),
-    // 3
-    H: (d) => d.getHours(),
-    // 9 (12hr, unpadded)
-    h: (d) => {
-      let h = d.getHours();
-      return h == 0 ? 12 : h > 12 ? h - 12 : h;
-    },
-    // AM
-    AA: (d) => d.getHours() >= 12 ? "PM" : "AM",
-    // am
-    aa: (d) => d.getHours() >= 12 ? "pm" : "am",
-    // a
-    a: (d) => d.getHours() >= 12 ? "p" : "a",
-    // 09
-    mm: (d) => zeroPad2(d.getMinutes()),
-    // 9
-    m: (d) => d.getMinutes(),
-    // 09
-    ss: (d) => zeroPad2(d.getSeconds()),
-    // 9
-    s: (d) => d.getSeconds(),
-    // 374
-    fff: (d) => zeroPad3(d.getMilliseconds())
-  };
-  function fmtDate(tpl, names) {
-    names = names || engNames;
-    let parts = [];
-    let R = /\{([a-z]+)\}|[^{]+/gi, m;
-    while (m = R.exec(tpl))
-      parts.push(m[0][0] == "{" ? subs[m[1]] : m[0]);
-    return (d) => {
-      let out = "";
-      for (let i = 0; i < parts.length; i++)
-        out += typeof parts[i] == "string" ? parts[i] : parts[i](d, names);
-      return out;
-    };
-  }
-  var localTz = new Intl.DateTimeFormat().resolvedOptions().timeZone;
-  function tzDate(date, tz) {
-    let date2;
-    if (tz == "UTC" || tz == "Etc/UTC")
-      date2 = new Date(+date + date.getTimezoneOffset() * 6e4);
-    else if (tz == localTz)
-      date2 = date;
-    else {
-      date2 = new Date(date.toLocaleString("en-US", { timeZone: tz }));
-      date2.setMilliseconds(date.getMilliseconds());
-    }
-    return date2;
-  }
-  var onlyWhole = (v) => v % 1 == 0;
-  var allMults = [1, 2, 2.5, 5];
-  var decIncrs = genIncrs(10, -32, 0, allMults);
-  var oneIncrs = genIncrs(10, 0, 32, allMults);
-  var wholeIncrs = oneIncrs.filter(onlyWhole);
-  var numIncrs = decIncrs.concat(oneIncrs);
-  var NL = "\n";
-  var yyyy = "{YYYY}";
-  var NLyyyy = NL + yyyy;
-  var md = "{M}/{D}";
-  var NLmd = NL + md;
-  var NLmdyy = NLmd + "/{YY}";
-  var aa = "{aa}";
-  var hmm = "{h}:{mm}";
-  var hmmaa = hmm + aa;
-  var NLhmmaa = NL + hmmaa;
-  var ss = ":{ss}";
-  var _ = null;
-  function genTimeStuffs(ms) {
-    let s = ms * 1e3, m = s * 60, h = m * 60, d = h * 24, mo = d * 30, y = d * 365;
-    let subSecIncrs = ms == 1 ? genIncrs(10, 0, 3, allMults).filter(onlyWhole) : genIncrs(10, -3, 0, allMults);
-    let timeIncrs = subSecIncrs.concat([
-      // minute divisors (# of secs)
-      s,
-      s * 5,
-      s * 10,
-      s * 15,
-      s * 30,
-      // hour divisors (# of mins)
-      m,
-      m * 5,
-      m * 10,
-      m * 15,
-      m * 30,
-      // day divisors (# of hrs)
-      h,
-      h * 2,
-      h * 3,
-      h * 4,
-      h * 6,
-      h * 8,
-      h * 12,
-      // month divisors TODO: need more?
-      d,
-      d * 2,
-      d * 3,
-      d * 4,
-      d * 5,
-      d * 6,
-      d * 7,
-      d * 8,
-      d * 9,
-      d * 10,
-      d * 15,
-      // year divisors (# months, approx)
-      mo,
-      mo * 2,
-      mo * 3,
-      mo * 4,
-      mo * 6,
-      // century divisors
-      y,
-      y * 2,
-      y * 5,
-      y * 10,
-      y * 25,
-      y * 50,
-      y * 100
-    ]);
-    const _timeAxisStamps = [
-      //   tick incr    default          year                    month   day                   hour    min       sec   mode
-      [y, yyyy, _, _, _, _, _, _, 1],
-      [d * 28, "{MMM}", NLyyyy, _, _, _, _, _, 1],
-      [d, md, NLyyyy, _, _, _, _, _, 1],
-      [h, "{h}" + aa, NLmdyy, _, NLmd, _, _, _, 1],
-      [m, hmmaa, NLmdyy, _, NLmd, _, _, _, 1],
-      [s, ss, NLmdyy + " " + hmmaa, _, NLmd + " " + hmmaa, _, NLhmmaa, _, 1],
-      [ms, ss + ".{fff}", NLmdyy + " " + hmmaa, _, NLmd + " " + hmmaa, _, NLhmmaa, _, 1]
-    ];
-    function timeAxisSplits(tzDate2) {
-      return (self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace) => {
-        let splits = [];
-        let isYr = foundIncr >= y;
-        let isMo = foundIncr >= mo && foundIncr < y;
-        let minDate = tzDate2(scaleMin);
-        let minDateTs = roundDec(minDate * ms, 3);
-        let minMin = mkDate(minDate.getFullYear(), isYr ? 0 : minDate.getMonth(), isMo || isYr ? 1 : minDate.getDate());
-        let minMinTs = roundDec(minMin * ms, 3);
-        if (isMo || isYr) {
-          let moIncr = isMo ? foundIncr / mo : 0;
-          let yrIncr = isYr ? foundIncr / y : 0;
-          let split = minDateTs == minMinTs ? minDateTs : roundDec(mkDate(minMin.getFullYear() + yrIncr, minMin.getMonth() + moIncr, 1) * ms, 3);
-          let splitDate = new Date(round(split / ms));
-          let baseYear = splitDate.getFullYear();
-          let baseMonth = splitDate.getMonth();
-          for (let i = 0; split <= scaleMax; i++) {
-            let next = mkDate(baseYear + yrIncr * i, baseMonth + moIncr * i, 1);
-            let offs = next - tzDate2(roundDec(next * ms, 3));
-            split = roundDec((+next + offs) * ms, 3);
-            if (split <= scaleMax)
-              splits.push(split);
-          }
-        } else {
-          let incr0 = foundIncr >= d ? d : foundIncr;
-          let tzOffset = floor(scaleMin) - floor(minDateTs);
-          let split = minMinTs + tzOffset + incrRoundUp(minDateTs - minMinTs, incr0);
-          splits.push(split);
-          let date0 = tzDate2(split);
-          let prevHour = date0.getHours() + date0.getMinutes() / m + date0.getSeconds() / h;
-          let incrHours = foundIncr / h;
-          let minSpace = self.axes[axisIdx]._space;
-          let pctSpace = foundSpace / minSpace;
-          while (1) {
-            split = roundDec(split + foundIncr, ms == 1 ? 0 : 3);
-            if (split > scaleMax)
-              break;
-            if (incrHours > 1) {
-              let expectedHour = floor(roundDec(prevHour + incrHours, 6)) % 24;
-              let splitDate = tzDate2(split);
-              let actualHour = splitDate.getHours();
-              let dstShift = actualHour - expectedHour;
-              if (dstShift > 1)
-                dstShift = -1;
-              split -= dstShift * h;
-              prevHour = (prevHour + incrHours) % 24;
-              let prevSplit = splits[splits.length - 1];
-              let pctIncr = roundDec((split - prevSplit) / foundIncr, 3);
-              if (pctIncr * pctSpace >= 0.7)
-                splits.push(split);
-            } else
-              splits.push(split);
-          }
-        }
-        return splits;
-      };
-    }
-    return [
-      timeIncrs,
-      _timeAxisStamps,
-      timeAxisSplits
-    ];
-  }
-  var [timeIncrsMs, _timeAxisStampsMs, timeAxisSplitsMs] = genTimeStuffs(1);
-  var [timeIncrsS, _timeAxisStampsS, timeAxisSplitsS] = genTimeStuffs(1e-3);
-  genIncrs(2, -53, 53, [1]);
-  function timeAxisStamps(stampCfg, fmtDate2) {
-    return stampCfg.map((s) => s.map(
-      (v, i) => i == 0 || i == 8 || v == null ? v : fmtDate2(i == 1 || s[8] == 0 ? v : s[1] + v)
-    ));
-  }
-  function timeAxisVals(tzDate2, stamps) {
-    return (self, splits, axisIdx, foundSpace, foundIncr) => {
-      let s = stamps.find((s2) => foundIncr >= s2[0]) || stamps[stamps.length - 1];
-      let prevYear;
-      let prevMnth;
-      let prevDate;
-      let prevHour;
-      let prevMins;
-      let prevSecs;
-      return splits.map((split) => {
-        let date = tzDate2(split);
-        let newYear = date.getFullYear();
-        let newMnth = date.getMonth();
-        let newDate = date.getDate();
-        let newHour = date.getHours();
-        let newMins = date.getMinutes();
-        let newSecs = date.getSeconds();
-        let stamp = newYear != prevYear && s[2] || newMnth != prevMnth && s[3] || newDate != prevDate && s[4] || newHour != prevHour && s[5] || newMins != prevMins && s[6] || newSecs != prevSecs && s[7] || s[1];
-        prevYear = newYear;
-        prevMnth = newMnth;
-        prevDate = newDate;
-        prevHour = newHour;
-        prevMins = newMins;
-        prevSecs = newSecs;
-        return stamp(date);
-      });
-    };
-  }
-  function timeAxisVal(tzDate2, dateTpl) {
-    let stamp = fmtDate(dateTpl);
-    return (self, splits, axisIdx, foundSpace, foundIncr) => splits.map((split) => stamp(tzDate2(split)));
-  }
-  function mkDate(y, m, d) {
-    return new Date(y, m, d);
-  }
-  function timeSeriesStamp(stampCfg, fmtDate2) {
-    return fmtDate2(stampCfg);
-  }
-  var _timeSeriesStamp = "{YYYY}-{MM}-{DD} {h}:{mm}{aa}";
-  function timeSeriesVal(tzDate2, stamp) {
-    return (self, val, seriesIdx, dataIdx) => dataIdx == null ? LEGEND_DISP : stamp(tzDate2(val));
-  }
-  function legendStroke(self, seriesIdx) {
-    let s = self.series[seriesIdx];
-    return s.width ? s.stroke(self, seriesIdx) : s.points.width ? s.points.stroke(self, seriesIdx) : null;
-  }
-  function legendFill(self, seriesIdx) {
-    return self.series[seriesIdx].fill(self, seriesIdx);
-  }
-  var legendOpts = {
-    show: true,
-    live: true,
-    isolate: false,
-    mount: noop,
-    markers: {
-      show: true,
-      width: 2,
-      stroke: legendStroke,
-      fill: legendFill,
-      dash: "solid"
-    },
-    idx: null,
-    idxs: null,
-    values: []
-  };
-  function cursorPointShow(self, si) {
-    let o = self.cursor.points;
-    let pt = placeDiv();
-    let size = o.size(self, si);
-    setStylePx(pt, WIDTH, size);
-    setStylePx(pt, HEIGHT, size);
-    let mar = size / -2;
-    setStylePx(pt, "marginLeft", mar);
-    setStylePx(pt, "marginTop", mar);
-    let width = o.width(self, si, size);
-    width && setStylePx(pt, "borderWidth", width);
-    return pt;
-  }
-  function cursorPointFill(self, si) {
-    let sp = self.series[si].points;
-    return sp._fill || sp._stroke;
-  }
-  function cursorPointStroke(self, si) {
-    let sp = self.series[si].points;
-    return sp._stroke || sp._fill;
-  }
-  function cursorPointSize(self, si) {
-    let sp = self.series[si].points;
-    return sp.size;
-  }
-  var moveTuple = [0, 0];
-  function cursorMove(self, mouseLeft1, mouseTop1) {
-    moveTuple[0] = mouseLeft1;
-    moveTuple[1] = mouseTop1;
-    return moveTuple;
-  }
-  function filtBtn0(self, targ, handle, onlyTarg = true) {
-    return (e) => {
-      e.button == 0 && (!onlyTarg || e.target == targ) && handle(e);
-    };
-  }
-  function filtTarg(self, targ, handle, onlyTarg = true) {
-    return (e) => {
-      (!onlyTarg || e.target == targ) && handle(e);
-    };
-  }
-  var cursorOpts = {
-    show: true,
-    x: true,
-    y: true,
-    lock: false,
-    move: cursorMove,
-    points: {
-      one: false,
-      show: cursorPointShow,
-      size: cursorPointSize,
-      width: 0,
-      stroke: cursorPointStroke,
-      fill: cursorPointFill
-    },
-    bind: {
-      mousedown: filtBtn0,
-      mouseup: filtBtn0,
-      click: filtBtn0,
-      // legend clicks, not .u-over clicks
-      dblclick: filtBtn0,
-      mousemove: filtTarg,
-      mouseleave: filtTarg,
-      mouseenter: filtTarg
-    },
-    drag: {
-      setScale: true,
-      x: true,
-      y: false,
-      dist: 0,
-      uni: null,
-      click: (self, e) => {
-        e.stopPropagation();
-        e.stopImmediatePropagation();
-      },
-      _x: false,
-      _y: false
-    },
-    focus: {
-      dist: (self, seriesIdx, dataIdx, valPos, curPos) => valPos - curPos,
-      prox: -1,
-      bias: 0
-    },
-    hover: {
-      skip: [void 0],
-      prox: null,
-      bias: 0
-    },
-    left: -10,
-    top: -10,
-    idx: null,
-    dataIdx: null,
-    idxs: null,
-    event: null
-  };
-  var axisLines = {
-    show: true,
-    stroke: "rgba(0,0,0,0.07)",
-    width: 2
-    //	dash: [],
-  };
-  var grid = assign({}, axisLines, {
-    filter: retArg1
-  });
-  var ticks = assign({}, grid, {
-    size: 10
-  });
-  var border = assign({}, axisLines, {
-    show: false
-  });
-  var font = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, "Noto Sans", sans-serif, "Apple Color Emoji", "Segoe UI Emoji", "Segoe UI Symbol", "Noto Color Emoji"';
-  var labelFont = "bold " + font;
-  var lineGap = 1.5;
-  var xAxisOpts = {
-    show: true,
-    scale: "x",
-    stroke: hexBlack,
-    space: 50,
-    gap: 5,
-    alignTo: 1,
-    size: 50,
-    labelGap: 0,
-    labelSize: 30,
-    labelFont,
-    side: 2,
-    //	class: "x-vals",
-    //	incrs: timeIncrs,
-    //	values: timeVals,
-    //	filter: retArg1,
-    grid,
-    ticks,
-    border,
-    font,
-    lineGap,
-    rotate: 0
-  };
-  var numSeriesLabel = "Value";
-  var timeSeriesLabel = "Time";
-  var xSeriesOpts = {
-    show: true,
-    scale: "x",
-    auto: false,
-    sorted: 1,
-    //	label: "Time",
-    //	value: v => stamp(new Date(v * 1e3)),
-    // internal caches
-    min: inf,
-    max: -inf,
-    idxs: []
-  };
-  function numAxisVals(self, splits, axisIdx, foundSpace, foundIncr) {
-    return splits.map((v) => v == null ? "" : fmtNum(v));
-  }
-  function numAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
-    let splits = [];
-    let numDec = fixedDec.get(foundIncr) || 0;
-    scaleMin = forceMin ? scaleMin : roundDec(incrRoundUp(scaleMin, foundIncr), numDec);
-    for (let val = scaleMin; val <= scaleMax; val = roundDec(val + foundIncr, numDec))
-      splits.push(Object.is(val, -0) ? 0 : val);
-    return splits;
-  }
-  function logAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
-    const splits = [];
-    const logBase = self.scales[self.axes[axisIdx].scale].log;
-    const logFn = logBase == 10 ? log10 : log2;
-    const exp = floor(logFn(scaleMin));
-    foundIncr = pow(logBase, exp);
-    if (logBase == 10)
-      foundIncr = numIncrs[closestIdx(foundIncr, numIncrs)];
-    let split = scaleMin;
-    let nextMagIncr = foundIncr * logBase;
-    if (logBase == 10)
-      nextMagIncr = numIncrs[closestIdx(nextMagIncr, numIncrs)];
-    do {
-      splits.push(split);
-      split = split + foundIncr;
-      if (logBase == 10 && !fixedDec.has(split))
-        split = roundDec(split, fixedDec.get(foundIncr));
-      if (split >= nextMagIncr) {
-        foundIncr = split;
-        nextMagIncr = foundIncr * logBase;
-        if (logBase == 10)
-          nextMagIncr = numIncrs[closestIdx(nextMagIncr, numIncrs)];
-      }
-    } while (split <= scaleMax);
-    return splits;
-  }
-  function asinhAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
-    let sc = self.scales[self.axes[axisIdx].scale];
-    let linthresh = sc.asinh;
-    let posSplits = scaleMax > linthresh ? logAxisSplits(self, axisIdx, max(linthresh, scaleMin), scaleMax, foundIncr) : [linthresh];
-    let zero = scaleMax >= 0 && scaleMin <= 0 ? [0] : [];
-    let negSplits = scaleMin < -linthresh ? logAxisSplits(self, axisIdx, max(linthresh, -scaleMax), -scaleMin, foundIncr) : [linthresh];
-    return negSplits.reverse().map((v) => -v).concat(zero, posSplits);
-  }
-  var RE_ALL = /./;
-  var RE_12357 = /[12357]/;
-  var RE_125 = /[125]/;
-  var RE_1 = /1/;
-  var _filt = (splits, distr, re, keepMod) => splits.map((v, i) => distr == 4 && v == 0 || i % keepMod == 0 && re.test(v.toExponential()[v < 0 ? 1 : 0]) ? v : null);
-  function log10AxisValsFilt(self, splits, axisIdx, foundSpace, foundIncr) {
-    let axis = self.axes[axisIdx];
-    let scaleKey = axis.scale;
-    let sc = self.scales[scaleKey];
-    let valToPos = self.valToPos;
-    let minSpace = axis._space;
-    let _10 = valToPos(10, scaleKey);
-    let re = valToPos(9, scaleKey) - _10 >= minSpace ? RE_ALL : valToPos(7, scaleKey) - _10 >= minSpace ? RE_12357 : valToPos(5, scaleKey) - _10 >= minSpace ? RE_125 : RE_1;
-    if (re == RE_1) {
-      let magSpace = abs(valToPos(1, scaleKey) - _10);
-      if (magSpace < minSpace)
-        return _filt(splits.slice().reverse(), sc.distr, re, ceil(minSpace / magSpace)).reverse();
-    }
-    return _filt(splits, sc.distr, re, 1);
-  }
-  function log2AxisValsFilt(self, splits, axisIdx, foundSpace, foundIncr) {
-    let axis = self.axes[axisIdx];
-    let scaleKey = axis.scale;
-    let minSpace = axis._space;
-    let valToPos = self.valToPos;
-    let magSpace = abs(valToPos(1, scaleKey) - valToPos(2, scaleKey));
-    if (magSpace < minSpace)
-      return _filt(splits.slice().reverse(), 3, RE_ALL, ceil(minSpace / magSpace)).reverse();
-    return splits;
-  }
-  function numSeriesVal(self, val, seriesIdx, dataIdx) {
-    return dataIdx == null ? LEGEND_DISP : val == null ? "" : fmtNum(val);
-  }
-  var yAxisOpts = {
-    show: true,
-    scale: "y",
-    stroke: hexBlack,
-    space: 30,
-    gap: 5,
-    alignTo: 1,
-    size: 50,
-    labelGap: 0,
-    labelSize: 30,
-    labelFont,
-    side: 3,
-    //	class: "y-vals",
-    //	incrs: numIncrs,
-    //	values: (vals, space) => vals,
-    //	filter: retArg1,
-    grid,
-    ticks,
-    border,
-    font,
-    lineGap,
-    rotate: 0
-  };
-  function ptDia(width, mult) {
-    let dia = 3 + (width || 1) * 2;
-    return roundDec(dia * mult, 3);
-  }
-  function seriesPointsShow(self, si) {
-    let { scale, idxs } = self.series[0];
-    let xData = self._data[0];
-    let p0 = self.valToPos(xData[idxs[0]], scale, true);
-    let p1 = self.valToPos(xData[idxs[1]], scale, true);
-    let dim = abs(p1 - p0);
-    let s = self.series[si];
-    let maxPts = dim / (s.points.space * pxRatio);
-    return idxs[1] - idxs[0] <= maxPts;
-  }
-  var facet = {
-    scale: null,
-    auto: true,
-    sorted: 0,
-    // internal caches
-    min: inf,
-    max: -inf
-  };
-  var gaps = (self, seriesIdx, idx0, idx1, nullGaps) => nullGaps;
-  var xySeriesOpts = {
-    show: true,
-    auto: true,
-    sorted: 0,
-    gaps,
-    alpha: 1,
-    facets: [
-      assign({}, facet, { scale: "x" }),
-      assign({}, facet, { scale: "y" })
-    ]
-  };
-  var ySeriesOpts = {
-    scale: "y",
-    auto: true,
-    sorted: 0,
-    show: true,
-    spanGaps: false,
-    gaps,
-    alpha: 1,
-    points: {
-      show: seriesPointsShow,
-      filter: null
-      //  paths:
-      //	stroke: "#000",
-      //	fill: "#fff",
-      //	width: 1,
-      //	size: 10,
-    },
-    //	label: "Value",
-    //	value: v => v,
-    values: null,
-    // internal caches
-    min: inf,
-    max: -inf,
-    idxs: [],
-    path: null,
-    clip: null
-  };
-  function clampScale(self, val, scaleMin, scaleMax, scaleKey) {
-    return scaleMin / 10;
-  }
-  var xScaleOpts = {
-    time: FEAT_TIME,
-    auto: true,
-    distr: 1,
-    log: 10,
-    asinh: 1,
-    min: null,
-    max: null,
-    dir: 1,
-    ori: 0
-  };
-  var yScaleOpts = assign({}, xScaleOpts, {
-    time: false,
-    ori: 1
-  });
-  var syncs = {};
-  function _sync(key, opts) {
-    let s = syncs[key];
-    if (!s) {
-      s = {
-        key,
-        plots: [],
-        sub(plot) {
-          s.plots.push(plot);
-        },
-        unsub(plot) {
-          s.plots = s.plots.filter((c) => c != plot);
-        },
-        pub(type, self, x, y, w, h, i) {
-          for (let j = 0; j < s.plots.length; j++)
-            s.plots[j] != self && s.plots[j].pub(type, self, x, y, w, h, i);
-        }
-      };
-      if (key != null)
-        syncs[key] = s;
     }
     return s;
   }
-  var BAND_CLIP_FILL = 1 << 0;
-  var BAND_CLIP_STROKE = 1 << 1;
-  function orient(u, seriesIdx, cb) {
-    const mode2 = u.mode;
-    const series = u.series[seriesIdx];
-    const data = mode2 == 2 ? u._data[seriesIdx] : u._data;
-    const scales = u.scales;
-    const bbox = u.bbox;
-    let dx = data[0], dy = mode2 == 2 ? data[1] : data[seriesIdx], sx = mode2 == 2 ? scales[series.facets[0].scale] : scales[u.series[0].scale], sy = mode2 == 2 ? scales[series.facets[1].scale] : scales[series.scale], l = bbox.left, t = bbox.top, w = bbox.width, h = bbox.height, H = u.valToPosH, V = u.valToPosV;
-    return sx.ori == 0 ? cb(
-      series,
-      dx,
-      dy,
-      sx,
-      sy,
-      H,
-      V,
-      l,
-      t,
-      w,
-      h,
-      moveToH,
-      lineToH,
-      rectH,
-      arcH,
-      bezierCurveToH
-    ) : cb(
-      series,
-      dx,
-      dy,
-      sx,
-      sy,
-      V,
-      H,
-      t,
-      l,
-      h,
-      w,
-      moveToV,
-      lineToV,
-      rectV,
-      arcV,
-      bezierCurveToV
-    );
+  var Yl = {};
+  var ui = [];
+  var Tl = [null, null];
+  var Ot = Array.isArray;
+  var Yo = Number.isInteger;
+  var Ar = (e) => e === void 0;
+  function po(e) {
+    return typeof e == "string";
   }
-  function bandFillClipDirs(self, seriesIdx) {
-    let fillDir = 0;
-    let clipDirs = 0;
-    let bands = ifNull(self.bands, EMPTY_ARR);
-    for (let i = 0; i < bands.length; i++) {
-      let b = bands[i];
-      if (b.series[0] == seriesIdx)
-        fillDir = b.dir;
-      else if (b.series[1] == seriesIdx) {
-        if (b.dir == 1)
-          clipDirs |= 1;
-        else
-          clipDirs |= 2;
+  function pn(e) {
+    let i = false;
+    if (e != null) {
+      let o = e.constructor;
+      i = o == null || o == Object;
+    }
+    return i;
+  }
+  function Er(e) {
+    return e != null && typeof e == "object";
+  }
+  var Pr = Object.getPrototypeOf(Uint8Array);
+  var Bo = "__proto__";
+  function bl(e, i = pn) {
+    let o;
+    if (Ot(e)) {
+      let n = e.find((s) => s != null);
+      if (Ot(n) || i(n)) {
+        o = Array(e.length);
+        for (let s = 0; s < e.length; s++) o[s] = bl(e[s], i);
+      } else o = e.slice();
+    } else if (e instanceof Pr) o = e.slice();
+    else if (i(e)) {
+      o = {};
+      for (let n in e) n != Bo && (o[n] = bl(e[n], i));
+    } else o = e;
+    return o;
+  }
+  function Te(e) {
+    let i = arguments;
+    for (let o = 1; o < i.length; o++) {
+      let n = i[o];
+      for (let s in n) s != Bo && (pn(e[s]) ? Te(e[s], bl(n[s])) : e[s] = bl(n[s]));
+    }
+    return e;
+  }
+  var Dr = 0;
+  var Lr = 1;
+  var Cr = 2;
+  function Vr(e, i, o) {
+    for (let n = 0, s, a = -1; n < i.length; n++) {
+      let u = i[n];
+      if (u > a) {
+        for (s = u - 1; s >= 0 && e[s] == null; ) e[s--] = null;
+        for (s = u + 1; s < o && e[s] == null; ) e[a = s++] = null;
       }
     }
-    return [
-      fillDir,
-      clipDirs == 1 ? -1 : (
-        // neg only
-        clipDirs == 2 ? 1 : (
-          // pos only
-          clipDirs == 3 ? 2 : (
-            // both
-            0
-          )
-        )
-      )
-    ];
   }
-  function seriesFillTo(self, seriesIdx, dataMin, dataMax, bandFillDir) {
-    let mode2 = self.mode;
-    let series = self.series[seriesIdx];
-    let scaleKey = mode2 == 2 ? series.facets[1].scale : series.scale;
-    let scale = self.scales[scaleKey];
-    return bandFillDir == -1 ? scale.min : bandFillDir == 1 ? scale.max : scale.distr == 3 ? scale.dir == 1 ? scale.min : scale.max : 0;
-  }
-  function clipBandLine(self, seriesIdx, idx0, idx1, strokePath, clipDir) {
-    return orient(self, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-      let pxRound = series.pxRound;
-      const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-      const lineTo = scaleX.ori == 0 ? lineToH : lineToV;
-      let frIdx, toIdx;
-      if (dir == 1) {
-        frIdx = idx0;
-        toIdx = idx1;
-      } else {
-        frIdx = idx1;
-        toIdx = idx0;
+  function Rr(e, i) {
+    if (Or(e)) {
+      let u = e[0].slice();
+      for (let h = 1; h < e.length; h++) u.push(...e[h].slice(1));
+      return Hr(u[0]) || (u = Fr(u)), u;
+    }
+    let o = /* @__PURE__ */ new Set();
+    for (let u = 0; u < e.length; u++) {
+      let m = e[u][0], g = m.length;
+      for (let y = 0; y < g; y++) o.add(m[y]);
+    }
+    let n = [Array.from(o).sort((u, h) => u - h)], s = n[0].length, a = /* @__PURE__ */ new Map();
+    for (let u = 0; u < s; u++) a.set(n[0][u], u);
+    for (let u = 0; u < e.length; u++) {
+      let h = e[u], m = h[0];
+      for (let g = 1; g < h.length; g++) {
+        let y = h[g], d = Array(s).fill(void 0), w = i ? i[u][g] : Lr, L = [];
+        for (let D = 0; D < y.length; D++) {
+          let O = y[D], N = a.get(m[D]);
+          O === null ? w != Dr && (d[N] = O, w == Cr && L.push(N)) : d[N] = O;
+        }
+        Vr(d, L, s), n.push(d);
       }
-      let x0 = pxRound(valToPosX(dataX[frIdx], scaleX, xDim, xOff));
-      let y0 = pxRound(valToPosY(dataY[frIdx], scaleY, yDim, yOff));
-      let x1 = pxRound(valToPosX(dataX[toIdx], scaleX, xDim, xOff));
-      let yLimit = pxRound(valToPosY(clipDir == 1 ? scaleY.max : scaleY.min, scaleY, yDim, yOff));
-      let clip = new Path2D(strokePath);
-      lineTo(clip, x1, yLimit);
-      lineTo(clip, x0, yLimit);
-      lineTo(clip, x0, y0);
-      return clip;
+    }
+    return n;
+  }
+  var zr = typeof queueMicrotask > "u" ? (e) => Promise.resolve().then(e) : queueMicrotask;
+  function Fr(e) {
+    let i = e[0], o = i.length, n = Array(o);
+    for (let a = 0; a < n.length; a++) n[a] = a;
+    n.sort((a, u) => i[a] - i[u]);
+    let s = [];
+    for (let a = 0; a < e.length; a++) {
+      let u = e[a], h = Array(o);
+      for (let m = 0; m < o; m++) h[m] = u[n[m]];
+      s.push(h);
+    }
+    return s;
+  }
+  function Or(e) {
+    let i = e[0][0], o = i.length;
+    for (let n = 1; n < e.length; n++) {
+      let s = e[n][0];
+      if (s.length != o) return false;
+      if (s != i) {
+        for (let a = 0; a < o; a++) if (s[a] != i[a]) return false;
+      }
+    }
+    return true;
+  }
+  function Hr(e, i = 100) {
+    let o = e.length;
+    if (o <= 1) return true;
+    let n = 0, s = o - 1;
+    for (; n <= s && e[n] == null; ) n++;
+    for (; s >= n && e[s] == null; ) s--;
+    if (s <= n) return true;
+    let a = Ye(1, et((s - n + 1) / i));
+    for (let u = e[n], h = n + a; h <= s; h += a) {
+      let m = e[h];
+      if (m != null) {
+        if (m <= u) return false;
+        u = m;
+      }
+    }
+    return true;
+  }
+  var Uo = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November", "December"];
+  var Ko = ["Sunday", "Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday"];
+  function jo(e) {
+    return e.slice(0, 3);
+  }
+  var Nr = Ko.map(jo);
+  var Wr = Uo.map(jo);
+  var Gr = { MMMM: Uo, MMM: Wr, WWWW: Ko, WWW: Nr };
+  function Hl(e) {
+    return (e < 10 ? "0" : "") + e;
+  }
+  function Ir(e) {
+    return (e < 10 ? "00" : e < 100 ? "0" : "") + e;
+  }
+  var Yr = { YYYY: (e) => e.getFullYear(), YY: (e) => (e.getFullYear() + "").slice(2), MMMM: (e, i) => i.MMMM[e.getMonth()], MMM: (e, i) => i.MMM[e.getMonth()], MM: (e) => Hl(e.getMonth() + 1), M: (e) => e.getMonth() + 1, DD: (e) => Hl(e.getDate()), D: (e) => e.getDate(), WWWW: (e, i) => i.WWWW[e.getDay()], WWW: (e, i) => i.WWW[e.getDay()], HH: (e) => Hl(e.getHours()), H: (e) => e.getHours(), h: (e) => {
+    let i = e.getHours();
+    return i == 0 ? 12 : i > 12 ? i - 12 : i;
+  }, AA: (e) => e.getHours() >= 12 ? "PM" : "AM", aa: (e) => e.getHours() >= 12 ? "pm" : "am", a: (e) => e.getHours() >= 12 ? "p" : "a", mm: (e) => Hl(e.getMinutes()), m: (e) => e.getMinutes(), ss: (e) => Hl(e.getSeconds()), s: (e) => e.getSeconds(), fff: (e) => Ir(e.getMilliseconds()) };
+  function ci(e, i) {
+    i = i || Gr;
+    let o = [], n = /\{([a-z]+)\}|[^{]+/gi, s;
+    for (; s = n.exec(e); ) o.push(s[0][0] == "{" ? Yr[s[1]] : s[0]);
+    return (a) => {
+      let u = "";
+      for (let h = 0; h < o.length; h++) u += typeof o[h] == "string" ? o[h] : o[h](a, i);
+      return u;
+    };
+  }
+  var Br = new Intl.DateTimeFormat().resolvedOptions().timeZone;
+  function Ur(e, i) {
+    let o;
+    return i == "UTC" || i == "Etc/UTC" ? o = new Date(+e + e.getTimezoneOffset() * 6e4) : i == Br ? o = e : (o = new Date(e.toLocaleString("en-US", { timeZone: i })), o.setMilliseconds(e.getMilliseconds())), o;
+  }
+  var qo = (e) => e % 1 == 0;
+  var fn = [1, 2, 2.5, 5];
+  var Kr = Bl(10, -32, 0, fn);
+  var $o = Bl(10, 0, 32, fn);
+  var jr = $o.filter(qo);
+  var Jt = Kr.concat($o);
+  var ai = `
+`;
+  var Jo = "{YYYY}";
+  var ho = ai + Jo;
+  var Zo = "{M}/{D}";
+  var Gl = ai + Zo;
+  var ln = Gl + "/{YY}";
+  var Qo = "{aa}";
+  var qr = "{h}:{mm}";
+  var vl = qr + Qo;
+  var mo = ai + vl;
+  var go = ":{ss}";
+  var re = null;
+  function Xo(e) {
+    let i = e * 1e3, o = i * 60, n = o * 60, s = n * 24, a = s * 30, u = s * 365, m = (e == 1 ? Bl(10, 0, 3, fn).filter(qo) : Bl(10, -3, 0, fn)).concat([i, i * 5, i * 10, i * 15, i * 30, o, o * 5, o * 10, o * 15, o * 30, n, n * 2, n * 3, n * 4, n * 6, n * 8, n * 12, s, s * 2, s * 3, s * 4, s * 5, s * 6, s * 7, s * 8, s * 9, s * 10, s * 15, a, a * 2, a * 3, a * 4, a * 6, u, u * 2, u * 5, u * 10, u * 25, u * 50, u * 100]), g = [[u, Jo, re, re, re, re, re, re, 1], [s * 28, "{MMM}", ho, re, re, re, re, re, 1], [s, Zo, ho, re, re, re, re, re, 1], [n, "{h}" + Qo, ln, re, Gl, re, re, re, 1], [o, vl, ln, re, Gl, re, re, re, 1], [i, go, ln + " " + vl, re, Gl + " " + vl, re, mo, re, 1], [e, go + ".{fff}", ln + " " + vl, re, Gl + " " + vl, re, mo, re, 1]];
+    function y(d) {
+      return (w, L, D, O, N, G) => {
+        let k = [], H = N >= u, x = N >= a && N < u, q = d(D), P = ae(q * e, 3), $ = Bn(q.getFullYear(), H ? 0 : q.getMonth(), x || H ? 1 : q.getDate()), U = ae($ * e, 3);
+        if (x || H) {
+          let Q = x ? N / a : 0, B = H ? N / u : 0, T = P == U ? P : ae(Bn($.getFullYear() + B, $.getMonth() + Q, 1) * e, 3), j = new Date(Ae(T / e)), C = j.getFullYear(), I = j.getMonth();
+          for (let F = 0; T <= O; F++) {
+            let ee = Bn(C + B * F, I + Q * F, 1), z = ee - d(ae(ee * e, 3));
+            T = ae((+ee + z) * e, 3), T <= O && k.push(T);
+          }
+        } else {
+          let Q = N >= s ? s : N, B = et(D) - et(P), T = U + B + an(P - U, Q);
+          k.push(T);
+          let j = d(T), C = j.getHours() + j.getMinutes() / o + j.getSeconds() / n, I = N / n, F = w.axes[L]._space, ee = G / F;
+          for (; T = ae(T + N, e == 1 ? 0 : 3), !(T > O); ) if (I > 1) {
+            let z = et(ae(C + I, 6)) % 24, te = d(T).getHours() - z;
+            te > 1 && (te = -1), T -= te * n, C = (C + I) % 24;
+            let fe = k[k.length - 1];
+            ae((T - fe) / N, 3) * ee >= 0.7 && k.push(T);
+          } else k.push(T);
+        }
+        return k;
+      };
+    }
+    return [m, g, y];
+  }
+  var [$r, Jr, Zr] = Xo(1);
+  var [Qr, Xr, ef] = Xo(1e-3);
+  Bl(2, -53, 53, [1]);
+  function wo(e, i) {
+    return e.map((o) => o.map((n, s) => s == 0 || s == 8 || n == null ? n : i(s == 1 || o[8] == 0 ? n : o[1] + n)));
+  }
+  function So(e, i) {
+    return (o, n, s, a, u) => {
+      let h = i.find((D) => u >= D[0]) || i[i.length - 1], m, g, y, d, w, L;
+      return n.map((D) => {
+        let O = e(D), N = O.getFullYear(), G = O.getMonth(), k = O.getDate(), H = O.getHours(), x = O.getMinutes(), q = O.getSeconds(), P = N != m && h[2] || G != g && h[3] || k != y && h[4] || H != d && h[5] || x != w && h[6] || q != L && h[7] || h[1];
+        return m = N, g = G, y = k, d = H, w = x, L = q, P(O);
+      });
+    };
+  }
+  function tf(e, i) {
+    let o = ci(i);
+    return (n, s, a, u, h) => s.map((m) => o(e(m)));
+  }
+  function Bn(e, i, o) {
+    return new Date(e, i, o);
+  }
+  function _o(e, i) {
+    return i(e);
+  }
+  var lf = "{YYYY}-{MM}-{DD} {h}:{mm}{aa}";
+  function yo(e, i) {
+    return (o, n, s, a) => a == null ? ii : i(e(n));
+  }
+  function nf(e, i) {
+    let o = e.series[i];
+    return o.width ? o.stroke(e, i) : o.points.width ? o.points.stroke(e, i) : null;
+  }
+  function of(e, i) {
+    return e.series[i].fill(e, i);
+  }
+  var sf = { show: true, live: true, isolate: false, mount: Tr, markers: { show: true, width: 2, stroke: nf, fill: of, dash: "solid" }, idx: null, idxs: null, values: [] };
+  function rf(e, i) {
+    let o = e.cursor.points, n = ft(), s = o.size(e, i);
+    de(n, Nl, s), de(n, Wl, s);
+    let a = s / -2;
+    de(n, "marginLeft", a), de(n, "marginTop", a);
+    let u = o.width(e, i, s);
+    return u && de(n, "borderWidth", u), n;
+  }
+  function ff(e, i) {
+    let o = e.series[i].points;
+    return o._fill || o._stroke;
+  }
+  function uf(e, i) {
+    let o = e.series[i].points;
+    return o._stroke || o._fill;
+  }
+  function cf(e, i) {
+    return e.series[i].points.size;
+  }
+  var Un = [0, 0];
+  function af(e, i, o) {
+    return Un[0] = i, Un[1] = o, Un;
+  }
+  function nn(e, i, o, n = true) {
+    return (s) => {
+      s.button == 0 && (!n || s.target == i) && o(s);
+    };
+  }
+  function Kn(e, i, o, n = true) {
+    return (s) => {
+      (!n || s.target == i) && o(s);
+    };
+  }
+  var pf = { show: true, x: true, y: true, lock: false, move: af, points: { one: false, show: rf, size: cf, width: 0, stroke: uf, fill: ff }, bind: { mousedown: nn, mouseup: nn, click: nn, dblclick: nn, mousemove: Kn, mouseleave: Kn, mouseenter: Kn }, drag: { setScale: true, x: true, y: false, dist: 0, uni: null, click: (e, i) => {
+    i.stopPropagation(), i.stopImmediatePropagation();
+  }, _x: false, _y: false }, focus: { dist: (e, i, o, n, s) => n - s, prox: -1, bias: 0 }, hover: { skip: [void 0], prox: null, bias: 0 }, left: -10, top: -10, idx: null, dataIdx: null, idxs: null, event: null };
+  var es = { show: true, stroke: "rgba(0,0,0,0.07)", width: 2 };
+  var pi = Te({}, es, { filter: Wo });
+  var ts = Te({}, pi, { size: 10 });
+  var ls = Te({}, es, { show: false });
+  var hi = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, "Noto Sans", sans-serif, "Apple Color Emoji", "Segoe UI Emoji", "Segoe UI Symbol", "Noto Color Emoji"';
+  var ns = "bold " + hi;
+  var is = 1.5;
+  var vo = { show: true, scale: "x", stroke: ni, space: 50, gap: 5, alignTo: 1, size: 50, labelGap: 0, labelSize: 30, labelFont: ns, side: 2, grid: pi, ticks: ts, border: ls, font: hi, lineGap: is, rotate: 0 };
+  var hf = "Value";
+  var mf = "Time";
+  var ko = { show: true, scale: "x", auto: false, sorted: 1, min: ce, max: -ce, idxs: [] };
+  function gf(e, i, o, n, s) {
+    return i.map((a) => a == null ? "" : fi(a));
+  }
+  function df(e, i, o, n, s, a, u) {
+    let h = [], m = Ht.get(s) || 0;
+    o = u ? o : ae(an(o, s), m);
+    for (let g = o; g <= n; g = ae(g + s, m)) h.push(Object.is(g, -0) ? 0 : g);
+    return h;
+  }
+  function Qn(e, i, o, n, s, a, u) {
+    let h = [], m = e.scales[e.axes[i].scale].log, g = m == 10 ? Pt : Oo, y = et(g(o));
+    s = xl(m, y), m == 10 && (s = Jt[dt(s, Jt)]);
+    let d = o, w = s * m;
+    m == 10 && (w = Jt[dt(w, Jt)]);
+    do
+      h.push(d), d = d + s, m == 10 && !Ht.has(d) && (d = ae(d, Ht.get(s))), d >= w && (s = d, w = s * m, m == 10 && (w = Jt[dt(w, Jt)]));
+    while (d <= n);
+    return h;
+  }
+  function wf(e, i, o, n, s, a, u) {
+    let m = e.scales[e.axes[i].scale].asinh, g = n > m ? Qn(e, i, Ye(m, o), n, s) : [m], y = n >= 0 && o <= 0 ? [0] : [];
+    return (o < -m ? Qn(e, i, Ye(m, -n), -o, s) : [m]).reverse().map((w) => -w).concat(y, g);
+  }
+  var os = /./;
+  var Sf = /[12357]/;
+  var _f = /[125]/;
+  var xo = /1/;
+  var Xn = (e, i, o, n) => e.map((s, a) => i == 4 && s == 0 || a % n == 0 && o.test(s.toExponential()[s < 0 ? 1 : 0]) ? s : null);
+  function yf(e, i, o, n, s) {
+    let a = e.axes[o], u = a.scale, h = e.scales[u], m = e.valToPos, g = a._space, y = m(10, u), d = m(9, u) - y >= g ? os : m(7, u) - y >= g ? Sf : m(5, u) - y >= g ? _f : xo;
+    if (d == xo) {
+      let w = Ee(m(1, u) - y);
+      if (w < g) return Xn(i.slice().reverse(), h.distr, d, ut(g / w)).reverse();
+    }
+    return Xn(i, h.distr, d, 1);
+  }
+  function vf(e, i, o, n, s) {
+    let a = e.axes[o], u = a.scale, h = a._space, m = e.valToPos, g = Ee(m(1, u) - m(2, u));
+    return g < h ? Xn(i.slice().reverse(), 3, os, ut(h / g)).reverse() : i;
+  }
+  function kf(e, i, o, n) {
+    return n == null ? ii : i == null ? "" : fi(i);
+  }
+  var To = { show: true, scale: "y", stroke: ni, space: 30, gap: 5, alignTo: 1, size: 50, labelGap: 0, labelSize: 30, labelFont: ns, side: 3, grid: pi, ticks: ts, border: ls, font: hi, lineGap: is, rotate: 0 };
+  function xf(e, i) {
+    let o = 3 + (e || 1) * 2;
+    return ae(o * i, 3);
+  }
+  function Tf(e, i) {
+    let { scale: o, idxs: n } = e.series[0], s = e._data[0], a = e.valToPos(s[n[0]], o, true), u = e.valToPos(s[n[1]], o, true), h = Ee(u - a), m = e.series[i], g = h / (m.points.space * oe);
+    return n[1] - n[0] <= g;
+  }
+  var bo = { scale: null, auto: true, sorted: 0, min: ce, max: -ce };
+  var ss = (e, i, o, n, s) => s;
+  var Mo = { show: true, auto: true, sorted: 0, gaps: ss, alpha: 1, facets: [Te({}, bo, { scale: "x" }), Te({}, bo, { scale: "y" })] };
+  var Ao = { scale: "y", auto: true, sorted: 0, show: true, spanGaps: false, gaps: ss, alpha: 1, points: { show: Tf, filter: null }, values: null, min: ce, max: -ce, idxs: [], path: null, clip: null };
+  function bf(e, i, o, n, s) {
+    return o / 10;
+  }
+  var rs = { time: true, auto: true, distr: 1, log: 10, asinh: 1, min: null, max: null, dir: 1, ori: 0 };
+  var Mf = Te({}, rs, { time: false, ori: 1 });
+  var Eo = {};
+  function fs(e, i) {
+    let o = Eo[e];
+    return o || (o = { key: e, plots: [], sub(n) {
+      o.plots.push(n);
+    }, unsub(n) {
+      o.plots = o.plots.filter((s) => s != n);
+    }, pub(n, s, a, u, h, m, g) {
+      for (let y = 0; y < o.plots.length; y++) o.plots[y] != s && o.plots[y].pub(n, s, a, u, h, m, g);
+    } }, e != null && (Eo[e] = o)), o;
+  }
+  var Ml = 1;
+  var ei = 2;
+  function el(e, i, o) {
+    let n = e.mode, s = e.series[i], a = n == 2 ? e._data[i] : e._data, u = e.scales, h = e.bbox, m = a[0], g = n == 2 ? a[1] : a[i], y = n == 2 ? u[s.facets[0].scale] : u[e.series[0].scale], d = n == 2 ? u[s.facets[1].scale] : u[s.scale], w = h.left, L = h.top, D = h.width, O = h.height, N = e.valToPosH, G = e.valToPosV;
+    return y.ori == 0 ? o(s, m, g, y, d, N, G, w, L, D, O, mn, El, dn, cs, ps) : o(s, m, g, y, d, G, N, L, w, O, D, gn, Pl, di, as, hs);
+  }
+  function mi(e, i) {
+    let o = 0, n = 0, s = ne(e.bands, ui);
+    for (let a = 0; a < s.length; a++) {
+      let u = s[a];
+      u.series[0] == i ? o = u.dir : u.series[1] == i && (u.dir == 1 ? n |= 1 : n |= 2);
+    }
+    return [o, n == 1 ? -1 : n == 2 ? 1 : n == 3 ? 2 : 0];
+  }
+  function Af(e, i, o, n, s) {
+    let a = e.mode, u = e.series[i], h = a == 2 ? u.facets[1].scale : u.scale, m = e.scales[h];
+    return s == -1 ? m.min : s == 1 ? m.max : m.distr == 3 ? m.dir == 1 ? m.min : m.max : 0;
+  }
+  function Dt(e, i, o, n, s, a) {
+    return el(e, i, (u, h, m, g, y, d, w, L, D, O, N) => {
+      let G = u.pxRound, k = g.dir * (g.ori == 0 ? 1 : -1), H = g.ori == 0 ? El : Pl, x, q;
+      k == 1 ? (x = o, q = n) : (x = n, q = o);
+      let P = G(d(h[x], g, O, L)), $ = G(w(m[x], y, N, D)), U = G(d(h[q], g, O, L)), Q = G(w(a == 1 ? y.max : y.min, y, N, D)), B = new Path2D(s);
+      return H(B, U, Q), H(B, P, Q), H(B, P, $), B;
     });
   }
-  function clipGaps(gaps2, ori, plotLft, plotTop, plotWid, plotHgt) {
-    let clip = null;
-    if (gaps2.length > 0) {
-      clip = new Path2D();
-      const rect2 = ori == 0 ? rectH : rectV;
-      let prevGapEnd = plotLft;
-      for (let i = 0; i < gaps2.length; i++) {
-        let g = gaps2[i];
-        if (g[1] > g[0]) {
-          let w2 = g[0] - prevGapEnd;
-          w2 > 0 && rect2(clip, prevGapEnd, plotTop, w2, plotTop + plotHgt);
-          prevGapEnd = g[1];
+  function hn(e, i, o, n, s, a) {
+    let u = null;
+    if (e.length > 0) {
+      u = new Path2D();
+      let h = i == 0 ? dn : di, m = o;
+      for (let d = 0; d < e.length; d++) {
+        let w = e[d];
+        if (w[1] > w[0]) {
+          let L = w[0] - m;
+          L > 0 && h(u, m, n, L, n + a), m = w[1];
         }
       }
-      let w = plotLft + plotWid - prevGapEnd;
-      let maxStrokeWidth = 10;
-      w > 0 && rect2(clip, prevGapEnd, plotTop - maxStrokeWidth / 2, w, plotTop + plotHgt + maxStrokeWidth);
+      let g = o + s - m, y = 10;
+      g > 0 && h(u, m, n - y / 2, g, n + a + y);
     }
-    return clip;
+    return u;
   }
-  function addGap(gaps2, fromX, toX) {
-    let prevGap = gaps2[gaps2.length - 1];
-    if (prevGap && prevGap[0] == fromX)
-      prevGap[1] = toX;
-    else
-      gaps2.push([fromX, toX]);
+  function Ef(e, i, o) {
+    let n = e[e.length - 1];
+    n && n[0] == i ? n[1] = o : e.push([i, o]);
   }
-  function findGaps(xs, ys, idx0, idx1, dir, pixelForX, align) {
-    let gaps2 = [];
-    let len = xs.length;
-    for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
-      let yVal = ys[i];
-      if (yVal === null) {
-        let fr = i, to = i;
-        if (dir == 1) {
-          while (++i <= idx1 && ys[i] === null)
-            to = i;
-        } else {
-          while (--i >= idx0 && ys[i] === null)
-            to = i;
+  function gi(e, i, o, n, s, a, u) {
+    let h = [], m = e.length;
+    for (let g = s == 1 ? o : n; g >= o && g <= n; g += s) if (i[g] === null) {
+      let d = g, w = g;
+      if (s == 1) for (; ++g <= n && i[g] === null; ) w = g;
+      else for (; --g >= o && i[g] === null; ) w = g;
+      let L = a(e[d]), D = w == d ? L : a(e[w]), O = d - s;
+      L = u <= 0 && O >= 0 && O < m ? a(e[O]) : L;
+      let G = w + s;
+      D = u >= 0 && G >= 0 && G < m ? a(e[G]) : D, D >= L && h.push([L, D]);
+    }
+    return h;
+  }
+  function Po(e) {
+    return e == 0 ? No : e == 1 ? Ae : (i) => $t(i, e);
+  }
+  function us(e) {
+    let i = e == 0 ? mn : gn, o = e == 0 ? (s, a, u, h, m, g) => {
+      s.arcTo(a, u, h, m, g);
+    } : (s, a, u, h, m, g) => {
+      s.arcTo(u, a, m, h, g);
+    }, n = e == 0 ? (s, a, u, h, m) => {
+      s.rect(a, u, h, m);
+    } : (s, a, u, h, m) => {
+      s.rect(u, a, m, h);
+    };
+    return (s, a, u, h, m, g = 0, y = 0) => {
+      g == 0 && y == 0 ? n(s, a, u, h, m) : (g = wt(g, h / 2, m / 2), y = wt(y, h / 2, m / 2), i(s, a + g, u), o(s, a + h, u, a + h, u + m, g), o(s, a + h, u + m, a, u + m, y), o(s, a, u + m, a, u, y), o(s, a, u, a + h, u, g), s.closePath());
+    };
+  }
+  var mn = (e, i, o) => {
+    e.moveTo(i, o);
+  };
+  var gn = (e, i, o) => {
+    e.moveTo(o, i);
+  };
+  var El = (e, i, o) => {
+    e.lineTo(i, o);
+  };
+  var Pl = (e, i, o) => {
+    e.lineTo(o, i);
+  };
+  var dn = us(0);
+  var di = us(1);
+  var cs = (e, i, o, n, s, a) => {
+    e.arc(i, o, n, s, a);
+  };
+  var as = (e, i, o, n, s, a) => {
+    e.arc(o, i, n, s, a);
+  };
+  var ps = (e, i, o, n, s, a, u) => {
+    e.bezierCurveTo(i, o, n, s, a, u);
+  };
+  var hs = (e, i, o, n, s, a, u) => {
+    e.bezierCurveTo(o, i, s, n, u, a);
+  };
+  function ms(e) {
+    return (i, o, n, s, a) => el(i, o, (u, h, m, g, y, d, w, L, D, O, N) => {
+      let { pxRound: G, points: k } = u, H, x;
+      g.ori == 0 ? (H = mn, x = cs) : (H = gn, x = as);
+      let q = ae(k.width * oe, 3), P = (k.size - k.width) / 2 * oe, $ = ae(P * 2, 3), U = new Path2D(), Q = new Path2D(), { left: B, top: T, width: j, height: C } = i.bbox;
+      dn(Q, B - $, T - $, j + $ * 2, C + $ * 2);
+      let I = (F) => {
+        if (m[F] != null) {
+          let ee = G(d(h[F], g, O, L)), z = G(w(m[F], y, N, D));
+          H(U, ee + P, z), x(U, ee, z, P, 0, on * 2);
         }
-        let frPx = pixelForX(xs[fr]);
-        let toPx = to == fr ? frPx : pixelForX(xs[to]);
-        let fri2 = fr - dir;
-        let frPx2 = align <= 0 && fri2 >= 0 && fri2 < len ? pixelForX(xs[fri2]) : frPx;
-        frPx = frPx2;
-        let toi2 = to + dir;
-        let toPx2 = align >= 0 && toi2 >= 0 && toi2 < len ? pixelForX(xs[toi2]) : toPx;
-        toPx = toPx2;
-        if (toPx >= frPx)
-          gaps2.push([frPx, toPx]);
+      };
+      if (a) a.forEach(I);
+      else for (let F = n; F <= s; F++) I(F);
+      return { stroke: q > 0 ? U : null, fill: U, clip: Q, flags: Ml | ei };
+    });
+  }
+  function gs(e) {
+    return (i, o, n, s, a, u) => {
+      n != s && (a != n && u != n && e(i, o, n), a != s && u != s && e(i, o, s), e(i, o, u));
+    };
+  }
+  var Pf = gs(El);
+  var Df = gs(Pl);
+  function ds(e) {
+    let i = ne(e?.alignGaps, 0);
+    return (o, n, s, a) => el(o, n, (u, h, m, g, y, d, w, L, D, O, N) => {
+      [s, a] = un(m, s, a);
+      let G = u.pxRound, k = (C) => G(d(C, g, O, L)), H = (C) => G(w(C, y, N, D)), x, q;
+      g.ori == 0 ? (x = El, q = Pf) : (x = Pl, q = Df);
+      let P = g.dir * (g.ori == 0 ? 1 : -1), $ = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: Ml }, U = $.stroke, Q = false;
+      if (a - s >= O * 4) {
+        let C = (V) => o.posToVal(V, g.key, true), I = null, F = null, ee, z, Ue, we = k(h[P == 1 ? s : a]), te = k(h[s]), fe = k(h[a]), J = C(P == 1 ? te + 1 : fe - 1);
+        for (let V = P == 1 ? s : a; V >= s && V <= a; V += P) {
+          let be = h[V], Se = (P == 1 ? be < J : be > J) ? we : k(be), se = m[V];
+          Se == we ? se != null ? (z = se, I == null ? (x(U, Se, H(z)), ee = I = F = z) : z < I ? I = z : z > F && (F = z)) : se === null && (Q = true) : (I != null && q(U, we, H(I), H(F), H(ee), H(z)), se != null ? (z = se, x(U, Se, H(z)), I = F = ee = z) : (I = F = null, se === null && (Q = true)), we = Se, J = C(we + P));
+        }
+        I != null && I != F && Ue != we && q(U, we, H(I), H(F), H(ee), H(z));
+      } else for (let C = P == 1 ? s : a; C >= s && C <= a; C += P) {
+        let I = m[C];
+        I === null ? Q = true : I != null && x(U, k(h[C]), H(I));
+      }
+      let [T, j] = mi(o, n);
+      if (u.fill != null || T != 0) {
+        let C = $.fill = new Path2D(U), I = u.fillTo(o, n, u.min, u.max, T), F = H(I), ee = k(h[s]), z = k(h[a]);
+        P == -1 && ([z, ee] = [ee, z]), x(C, z, F), x(C, ee, F);
+      }
+      if (!u.spanGaps) {
+        let C = [];
+        Q && C.push(...gi(h, m, s, a, P, k, i)), $.gaps = C = u.gaps(o, n, s, a, C), $.clip = hn(C, g.ori, L, D, O, N);
+      }
+      return j != 0 && ($.band = j == 2 ? [Dt(o, n, s, a, U, -1), Dt(o, n, s, a, U, 1)] : Dt(o, n, s, a, U, j)), $;
+    });
+  }
+  function Lf(e) {
+    let i = ne(e.align, 1), o = ne(e.ascDesc, false), n = ne(e.alignGaps, 0), s = ne(e.extend, false);
+    return (a, u, h, m) => el(a, u, (g, y, d, w, L, D, O, N, G, k, H) => {
+      [h, m] = un(d, h, m);
+      let x = g.pxRound, { left: q, width: P } = a.bbox, $ = (te) => x(D(te, w, k, N)), U = (te) => x(O(te, L, H, G)), Q = w.ori == 0 ? El : Pl, B = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: Ml }, T = B.stroke, j = w.dir * (w.ori == 0 ? 1 : -1), C = U(d[j == 1 ? h : m]), I = $(y[j == 1 ? h : m]), F = I, ee = I;
+      s && i == -1 && (ee = q, Q(T, ee, C)), Q(T, I, C);
+      for (let te = j == 1 ? h : m; te >= h && te <= m; te += j) {
+        let fe = d[te];
+        if (fe == null) continue;
+        let J = $(y[te]), V = U(fe);
+        i == 1 ? Q(T, J, C) : Q(T, F, V), Q(T, J, V), C = V, F = J;
+      }
+      let z = F;
+      s && i == 1 && (z = q + P, Q(T, z, C));
+      let [Ue, we] = mi(a, u);
+      if (g.fill != null || Ue != 0) {
+        let te = B.fill = new Path2D(T), fe = g.fillTo(a, u, g.min, g.max, Ue), J = U(fe);
+        Q(te, z, J), Q(te, ee, J);
+      }
+      if (!g.spanGaps) {
+        let te = [];
+        te.push(...gi(y, d, h, m, j, $, n));
+        let fe = g.width * oe / 2, J = o || i == 1 ? fe : -fe, V = o || i == -1 ? -fe : fe;
+        te.forEach((be) => {
+          be[0] += J, be[1] += V;
+        }), B.gaps = te = g.gaps(a, u, h, m, te), B.clip = hn(te, w.ori, N, G, k, H);
+      }
+      return we != 0 && (B.band = we == 2 ? [Dt(a, u, h, m, T, -1), Dt(a, u, h, m, T, 1)] : Dt(a, u, h, m, T, we)), B;
+    });
+  }
+  function Do(e, i, o, n, s, a, u = ce) {
+    if (e.length > 1) {
+      let h = null;
+      for (let m = 0, g = 1 / 0; m < e.length; m++) if (i[m] !== void 0) {
+        if (h != null) {
+          let y = Ee(e[m] - e[h]);
+          y < g && (g = y, u = Ee(o(e[m], n, s, a) - o(e[h], n, s, a)));
+        }
+        h = m;
       }
     }
-    return gaps2;
+    return u;
   }
-  function pxRoundGen(pxAlign) {
-    return pxAlign == 0 ? retArg0 : pxAlign == 1 ? round : (v) => incrRound(v, pxAlign);
-  }
-  function rect(ori) {
-    let moveTo = ori == 0 ? moveToH : moveToV;
-    let arcTo = ori == 0 ? (p, x1, y1, x2, y2, r) => {
-      p.arcTo(x1, y1, x2, y2, r);
-    } : (p, y1, x1, y2, x2, r) => {
-      p.arcTo(x1, y1, x2, y2, r);
-    };
-    let rect2 = ori == 0 ? (p, x, y, w, h) => {
-      p.rect(x, y, w, h);
-    } : (p, y, x, h, w) => {
-      p.rect(x, y, w, h);
-    };
-    return (p, x, y, w, h, endRad = 0, baseRad = 0) => {
-      if (endRad == 0 && baseRad == 0)
-        rect2(p, x, y, w, h);
+  function Cf(e) {
+    e = e || Yl;
+    let i = ne(e.size, [0.6, ce, 1]), o = e.align || 0, n = e.gap || 0, s = e.radius;
+    s = s == null ? [0, 0] : typeof s == "number" ? [s, 0] : s;
+    let a = X(s), u = 1 - i[0], h = ne(i[1], ce), m = ne(i[2], 1), g = ne(e.disp, Yl), y = ne(e.each, (L) => {
+    }), { fill: d, stroke: w } = g;
+    return (L, D, O, N) => el(L, D, (G, k, H, x, q, P, $, U, Q, B, T) => {
+      let j = G.pxRound, C = o, I = n * oe, F = h * oe, ee = m * oe, z, Ue;
+      x.ori == 0 ? [z, Ue] = a(L, D) : [Ue, z] = a(L, D);
+      let we = x.dir * (x.ori == 0 ? 1 : -1), te = x.ori == 0 ? dn : di, fe = x.ori == 0 ? y : (A, pe, Me, il, Gt, _t, It) => {
+        y(A, pe, Me, Gt, il, It, _t);
+      }, J = ne(L.bands, ui).find((A) => A.series[0] == D), V = J != null ? J.dir : 0, be = G.fillTo(L, D, G.min, G.max, V), He = j($(be, q, T, Q)), Se, se, ct, qe = B, ye = j(G.width * oe), St = false, Mt = null, lt = null, Lt = null, tl = null;
+      d != null && (ye == 0 || w != null) && (St = true, Mt = d.values(L, D, O, N), lt = /* @__PURE__ */ new Map(), new Set(Mt).forEach((A) => {
+        A != null && lt.set(A, new Path2D());
+      }), ye > 0 && (Lt = w.values(L, D, O, N), tl = /* @__PURE__ */ new Map(), new Set(Lt).forEach((A) => {
+        A != null && tl.set(A, new Path2D());
+      })));
+      let { x0: ll, size: Dl } = g;
+      if (ll != null && Dl != null) {
+        C = 1, k = ll.values(L, D, O, N), ll.unit == 2 && (k = k.map((Me) => L.posToVal(U + Me * B, x.key, true)));
+        let A = Dl.values(L, D, O, N);
+        Dl.unit == 2 ? se = A[0] * B : se = P(A[0], x, B, U) - P(0, x, B, U), qe = Do(k, H, P, x, B, U, qe), ct = qe - se + I;
+      } else qe = Do(k, H, P, x, B, U, qe), ct = qe * u + I, se = qe - ct;
+      ct < 1 && (ct = 0), ye >= se / 2 && (ye = 0), ct < 5 && (j = No);
+      let Ul = ct > 0, Nt = qe - ct - (Ul ? ye : 0);
+      se = j(Zn(Nt, ee, F)), Se = (C == 0 ? se / 2 : C == we ? 0 : se) - C * we * ((C == 0 ? I / 2 : 0) + (Ul ? ye / 2 : 0));
+      let Ne = { stroke: null, fill: null, clip: null, band: null, gaps: null, flags: 0 }, nl = St ? null : new Path2D(), At = null;
+      if (J != null) At = L.data[J.series[1]];
       else {
-        endRad = min(endRad, w / 2, h / 2);
-        baseRad = min(baseRad, w / 2, h / 2);
-        moveTo(p, x + endRad, y);
-        arcTo(p, x + w, y, x + w, y + h, endRad);
-        arcTo(p, x + w, y + h, x, y + h, baseRad);
-        arcTo(p, x, y + h, x, y, baseRad);
-        arcTo(p, x, y, x + w, y, endRad);
-        p.closePath();
+        let { y0: A, y1: pe } = g;
+        A != null && pe != null && (H = pe.values(L, D, O, N), At = A.values(L, D, O, N));
       }
-    };
-  }
-  var moveToH = (p, x, y) => {
-    p.moveTo(x, y);
-  };
-  var moveToV = (p, y, x) => {
-    p.moveTo(x, y);
-  };
-  var lineToH = (p, x, y) => {
-    p.lineTo(x, y);
-  };
-  var lineToV = (p, y, x) => {
-    p.lineTo(x, y);
-  };
-  var rectH = rect(0);
-  var rectV = rect(1);
-  var arcH = (p, x, y, r, startAngle, endAngle) => {
-    p.arc(x, y, r, startAngle, endAngle);
-  };
-  var arcV = (p, y, x, r, startAngle, endAngle) => {
-    p.arc(x, y, r, startAngle, endAngle);
-  };
-  var bezierCurveToH = (p, bp1x, bp1y, bp2x, bp2y, p2x, p2y) => {
-    p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y);
-  };
-  var bezierCurveToV = (p, bp1y, bp1x, bp2y, bp2x, p2y, p2x) => {
-    p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y);
-  };
-  function points(opts) {
-    return (u, seriesIdx, idx0, idx1, filtIdxs) => {
-      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-        let { pxRound, points: points2 } = series;
-        let moveTo, arc;
-        if (scaleX.ori == 0) {
-          moveTo = moveToH;
-          arc = arcH;
-        } else {
-          moveTo = moveToV;
-          arc = arcV;
+      let Wt = z * se, K = Ue * se;
+      for (let A = we == 1 ? O : N; A >= O && A <= N; A += we) {
+        let pe = H[A];
+        if (pe == null) continue;
+        if (At != null) {
+          let Ke = At[A] ?? 0;
+          if (pe - Ke == 0) continue;
+          He = $(Ke, q, T, Q);
         }
-        const width = roundDec(points2.width * pxRatio, 3);
-        let rad = (points2.size - points2.width) / 2 * pxRatio;
-        let dia = roundDec(rad * 2, 3);
-        let fill = new Path2D();
-        let clip = new Path2D();
-        let { left: lft, top, width: wid, height: hgt } = u.bbox;
-        rectH(
-          clip,
-          lft - dia,
-          top - dia,
-          wid + dia * 2,
-          hgt + dia * 2
-        );
-        const drawPoint = (pi) => {
-          if (dataY[pi] != null) {
-            let x = pxRound(valToPosX(dataX[pi], scaleX, xDim, xOff));
-            let y = pxRound(valToPosY(dataY[pi], scaleY, yDim, yOff));
-            moveTo(fill, x + rad, y);
-            arc(fill, x, y, rad, 0, PI * 2);
-          }
-        };
-        if (filtIdxs)
-          filtIdxs.forEach(drawPoint);
-        else {
-          for (let pi = idx0; pi <= idx1; pi++)
-            drawPoint(pi);
-        }
-        return {
-          stroke: width > 0 ? fill : null,
-          fill,
-          clip,
-          flags: BAND_CLIP_FILL | BAND_CLIP_STROKE
-        };
-      });
-    };
-  }
-  function _drawAcc(lineTo) {
-    return (stroke, accX, minY, maxY, inY, outY) => {
-      if (minY != maxY) {
-        if (inY != minY && outY != minY)
-          lineTo(stroke, accX, minY);
-        if (inY != maxY && outY != maxY)
-          lineTo(stroke, accX, maxY);
-        lineTo(stroke, accX, outY);
-      }
-    };
-  }
-  var drawAccH = _drawAcc(lineToH);
-  var drawAccV = _drawAcc(lineToV);
-  function linear(opts) {
-    const alignGaps = ifNull(opts?.alignGaps, 0);
-    return (u, seriesIdx, idx0, idx1) => {
-      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
-        let pxRound = series.pxRound;
-        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
-        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
-        let lineTo, drawAcc;
-        if (scaleX.ori == 0) {
-          lineTo = lineToH;
-          drawAcc = drawAccH;
-        } else {
-          lineTo = lineToV;
-          drawAcc = drawAccV;
-        }
-        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-        const _paths = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
-        const stroke = _paths.stroke;
-        let hasGap = false;
-        const decimate = idx1 - idx0 >= xDim * 4;
-        if (decimate) {
-          let xForPixel = (pos) => u.posToVal(pos, scaleX.key, true);
-          let minY = null, maxY = null, inY, outY, drawnAtX;
-          let accX = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
-          let idx0px = pixelForX(dataX[idx0]);
-          let idx1px = pixelForX(dataX[idx1]);
-          let nextAccXVal = xForPixel(dir == 1 ? idx0px + 1 : idx1px - 1);
-          for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
-            let xVal = dataX[i];
-            let reuseAccX = dir == 1 ? xVal < nextAccXVal : xVal > nextAccXVal;
-            let x = reuseAccX ? accX : pixelForX(xVal);
-            let yVal = dataY[i];
-            if (x == accX) {
-              if (yVal != null) {
-                outY = yVal;
-                if (minY == null) {
-                  lineTo(stroke, x, pixelForY(outY));
-                  inY = minY = maxY = outY;
-                } else {
-                  if (outY < minY)
-                    minY = outY;
-                  else if (outY > maxY)
-                    maxY = outY;
-                }
-              } else {
-                if (yVal === null)
-                  hasGap = true;
-              }
-            } else {
-              if (minY != null)
-                drawAcc(stroke, accX, pixelForY(minY), pixelForY(maxY), pixelForY(inY), pixelForY(outY));
-              if (yVal != null) {
-                outY = yVal;
-                lineTo(stroke, x, pixelForY(outY));
-                minY = maxY = inY = outY;
-              } else {
-                minY = maxY = null;
-                if (yVal === null)
-                  hasGap = true;
-              }
-              accX = x;
-              nextAccXVal = xForPixel(accX + dir);
-            }
-          }
-          if (minY != null && minY != maxY && drawnAtX != accX)
-            drawAcc(stroke, accX, pixelForY(minY), pixelForY(maxY), pixelForY(inY), pixelForY(outY));
-        } else {
-          for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
-            let yVal = dataY[i];
-            if (yVal === null)
-              hasGap = true;
-            else if (yVal != null)
-              lineTo(stroke, pixelForX(dataX[i]), pixelForY(yVal));
-          }
-        }
-        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
-        if (series.fill != null || bandFillDir != 0) {
-          let fill = _paths.fill = new Path2D(stroke);
-          let fillToVal = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
-          let fillToY = pixelForY(fillToVal);
-          let frX = pixelForX(dataX[idx0]);
-          let toX = pixelForX(dataX[idx1]);
-          if (dir == -1)
-            [toX, frX] = [frX, toX];
-          lineTo(fill, toX, fillToY);
-          lineTo(fill, frX, fillToY);
-        }
-        if (!series.spanGaps) {
-          let gaps2 = [];
-          hasGap && gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
-          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
-          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
-        }
-        if (bandClipDir != 0) {
-          _paths.band = bandClipDir == 2 ? [
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
-          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
-        }
-        return _paths;
-      });
-    };
-  }
-  function stepped(opts) {
-    const align = ifNull(opts.align, 1);
-    const ascDesc = ifNull(opts.ascDesc, false);
-    const alignGaps = ifNull(opts.alignGaps, 0);
-    const extend = ifNull(opts.extend, false);
-    return (u, seriesIdx, idx0, idx1) => {
-      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
-        let pxRound = series.pxRound;
-        let { left, width } = u.bbox;
-        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
-        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
-        let lineTo = scaleX.ori == 0 ? lineToH : lineToV;
-        const _paths = { stroke: new Path2D(), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
-        const stroke = _paths.stroke;
-        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-        let prevYPos = pixelForY(dataY[dir == 1 ? idx0 : idx1]);
-        let firstXPos = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
-        let prevXPos = firstXPos;
-        let firstXPosExt = firstXPos;
-        if (extend && align == -1) {
-          firstXPosExt = left;
-          lineTo(stroke, firstXPosExt, prevYPos);
-        }
-        lineTo(stroke, firstXPos, prevYPos);
-        for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
-          let yVal1 = dataY[i];
-          if (yVal1 == null)
-            continue;
-          let x1 = pixelForX(dataX[i]);
-          let y1 = pixelForY(yVal1);
-          if (align == 1)
-            lineTo(stroke, x1, prevYPos);
-          else
-            lineTo(stroke, prevXPos, y1);
-          lineTo(stroke, x1, y1);
-          prevYPos = y1;
-          prevXPos = x1;
-        }
-        let prevXPosExt = prevXPos;
-        if (extend && align == 1) {
-          prevXPosExt = left + width;
-          lineTo(stroke, prevXPosExt, prevYPos);
-        }
-        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
-        if (series.fill != null || bandFillDir != 0) {
-          let fill = _paths.fill = new Path2D(stroke);
-          let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
-          let fillToY = pixelForY(fillTo);
-          lineTo(fill, prevXPosExt, fillToY);
-          lineTo(fill, firstXPosExt, fillToY);
-        }
-        if (!series.spanGaps) {
-          let gaps2 = [];
-          gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
-          let halfStroke = series.width * pxRatio / 2;
-          let startsOffset = ascDesc || align == 1 ? halfStroke : -halfStroke;
-          let endsOffset = ascDesc || align == -1 ? -halfStroke : halfStroke;
-          gaps2.forEach((g) => {
-            g[0] += startsOffset;
-            g[1] += endsOffset;
-          });
-          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
-          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
-        }
-        if (bandClipDir != 0) {
-          _paths.band = bandClipDir == 2 ? [
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
-          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
-        }
-        return _paths;
-      });
-    };
-  }
-  function findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid = inf) {
-    if (dataX.length > 1) {
-      let prevIdx = null;
-      for (let i = 0, minDelta = Infinity; i < dataX.length; i++) {
-        if (dataY[i] !== void 0) {
-          if (prevIdx != null) {
-            let delta = abs(dataX[i] - dataX[prevIdx]);
-            if (delta < minDelta) {
-              minDelta = delta;
-              colWid = abs(valToPosX(dataX[i], scaleX, xDim, xOff) - valToPosX(dataX[prevIdx], scaleX, xDim, xOff));
-            }
-          }
-          prevIdx = i;
+        let Me = x.distr != 2 || g != null ? k[A] : A, il = P(Me, x, B, U), Gt = $(ne(pe, be), q, T, Q), _t = j(il - Se), It = j(Ye(Gt, He)), $e = j(wt(Gt, He)), nt = It - $e;
+        if (pe != null) {
+          let Ke = pe < 0 ? K : Wt, at = pe < 0 ? Wt : K;
+          St ? (ye > 0 && Lt[A] != null && te(tl.get(Lt[A]), _t, $e + et(ye / 2), se, Ye(0, nt - ye), Ke, at), Mt[A] != null && te(lt.get(Mt[A]), _t, $e + et(ye / 2), se, Ye(0, nt - ye), Ke, at)) : te(nl, _t, $e + et(ye / 2), se, Ye(0, nt - ye), Ke, at), fe(L, D, A, _t - ye / 2, $e, se + ye, nt);
         }
       }
-    }
-    return colWid;
-  }
-  function bars(opts) {
-    opts = opts || EMPTY_OBJ;
-    const size = ifNull(opts.size, [0.6, inf, 1]);
-    const align = opts.align || 0;
-    const _extraGap = opts.gap || 0;
-    let ro = opts.radius;
-    ro = // [valueRadius, baselineRadius]
-    ro == null ? [0, 0] : typeof ro == "number" ? [ro, 0] : ro;
-    const radiusFn = fnOrSelf(ro);
-    const gapFactor = 1 - size[0];
-    const _maxWidth = ifNull(size[1], inf);
-    const _minWidth = ifNull(size[2], 1);
-    const disp = ifNull(opts.disp, EMPTY_OBJ);
-    const _each = ifNull(opts.each, (_2) => {
+      return ye > 0 ? Ne.stroke = St ? tl : nl : St || (Ne._fill = G.width == 0 ? G._fill : G._stroke ?? G._fill, Ne.width = 0), Ne.fill = St ? lt : nl, Ne;
     });
-    const { fill: dispFills, stroke: dispStrokes } = disp;
-    return (u, seriesIdx, idx0, idx1) => {
-      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-        let pxRound = series.pxRound;
-        let _align = align;
-        let extraGap = _extraGap * pxRatio;
-        let maxWidth = _maxWidth * pxRatio;
-        let minWidth = _minWidth * pxRatio;
-        let valRadius, baseRadius;
-        if (scaleX.ori == 0)
-          [valRadius, baseRadius] = radiusFn(u, seriesIdx);
-        else
-          [baseRadius, valRadius] = radiusFn(u, seriesIdx);
-        const _dirX = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-        let rect2 = scaleX.ori == 0 ? rectH : rectV;
-        let each = scaleX.ori == 0 ? _each : (u2, seriesIdx2, i, top, lft, hgt, wid) => {
-          _each(u2, seriesIdx2, i, lft, top, wid, hgt);
-        };
-        let band = ifNull(u.bands, EMPTY_ARR).find((b) => b.series[0] == seriesIdx);
-        let fillDir = band != null ? band.dir : 0;
-        let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, fillDir);
-        let fillToY = pxRound(valToPosY(fillTo, scaleY, yDim, yOff));
-        let xShift, barWid, fullGap, colWid = xDim;
-        let strokeWidth = pxRound(series.width * pxRatio);
-        let multiPath = false;
-        let fillColors = null;
-        let fillPaths = null;
-        let strokeColors = null;
-        let strokePaths = null;
-        if (dispFills != null && (strokeWidth == 0 || dispStrokes != null)) {
-          multiPath = true;
-          fillColors = dispFills.values(u, seriesIdx, idx0, idx1);
-          fillPaths = /* @__PURE__ */ new Map();
-          new Set(fillColors).forEach((color) => {
-            if (color != null)
-              fillPaths.set(color, new Path2D());
-          });
-          if (strokeWidth > 0) {
-            strokeColors = dispStrokes.values(u, seriesIdx, idx0, idx1);
-            strokePaths = /* @__PURE__ */ new Map();
-            new Set(strokeColors).forEach((color) => {
-              if (color != null)
-                strokePaths.set(color, new Path2D());
-            });
-          }
-        }
-        let { x0, size: size2 } = disp;
-        if (x0 != null && size2 != null) {
-          _align = 1;
-          dataX = x0.values(u, seriesIdx, idx0, idx1);
-          if (x0.unit == 2)
-            dataX = dataX.map((pct) => u.posToVal(xOff + pct * xDim, scaleX.key, true));
-          let sizes = size2.values(u, seriesIdx, idx0, idx1);
-          if (size2.unit == 2)
-            barWid = sizes[0] * xDim;
-          else
-            barWid = valToPosX(sizes[0], scaleX, xDim, xOff) - valToPosX(0, scaleX, xDim, xOff);
-          colWid = findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid);
-          let gapWid = colWid - barWid;
-          fullGap = gapWid + extraGap;
-        } else {
-          colWid = findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid);
-          let gapWid = colWid * gapFactor;
-          fullGap = gapWid + extraGap;
-          barWid = colWid - fullGap;
-        }
-        if (fullGap < 1)
-          fullGap = 0;
-        if (strokeWidth >= barWid / 2)
-          strokeWidth = 0;
-        if (fullGap < 5)
-          pxRound = retArg0;
-        let insetStroke = fullGap > 0;
-        let rawBarWid = colWid - fullGap - (insetStroke ? strokeWidth : 0);
-        barWid = pxRound(clamp(rawBarWid, minWidth, maxWidth));
-        xShift = (_align == 0 ? barWid / 2 : _align == _dirX ? 0 : barWid) - _align * _dirX * ((_align == 0 ? extraGap / 2 : 0) + (insetStroke ? strokeWidth / 2 : 0));
-        const _paths = { stroke: null, fill: null, clip: null, band: null, gaps: null, flags: 0 };
-        const stroke = multiPath ? null : new Path2D();
-        let dataY0 = null;
-        if (band != null)
-          dataY0 = u.data[band.series[1]];
-        else {
-          let { y0, y1 } = disp;
-          if (y0 != null && y1 != null) {
-            dataY = y1.values(u, seriesIdx, idx0, idx1);
-            dataY0 = y0.values(u, seriesIdx, idx0, idx1);
-          }
-        }
-        let radVal = valRadius * barWid;
-        let radBase = baseRadius * barWid;
-        for (let i = _dirX == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += _dirX) {
-          let yVal = dataY[i];
-          if (yVal == null)
-            continue;
-          if (dataY0 != null) {
-            let yVal0 = dataY0[i] ?? 0;
-            if (yVal - yVal0 == 0)
-              continue;
-            fillToY = valToPosY(yVal0, scaleY, yDim, yOff);
-          }
-          let xVal = scaleX.distr != 2 || disp != null ? dataX[i] : i;
-          let xPos = valToPosX(xVal, scaleX, xDim, xOff);
-          let yPos = valToPosY(ifNull(yVal, fillTo), scaleY, yDim, yOff);
-          let lft = pxRound(xPos - xShift);
-          let btm = pxRound(max(yPos, fillToY));
-          let top = pxRound(min(yPos, fillToY));
-          let barHgt = btm - top;
-          if (yVal != null) {
-            let rv = yVal < 0 ? radBase : radVal;
-            let rb = yVal < 0 ? radVal : radBase;
-            if (multiPath) {
-              if (strokeWidth > 0 && strokeColors[i] != null)
-                rect2(strokePaths.get(strokeColors[i]), lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
-              if (fillColors[i] != null)
-                rect2(fillPaths.get(fillColors[i]), lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
-            } else
-              rect2(stroke, lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
-            each(
-              u,
-              seriesIdx,
-              i,
-              lft - strokeWidth / 2,
-              top,
-              barWid + strokeWidth,
-              barHgt
-            );
-          }
-        }
-        if (strokeWidth > 0)
-          _paths.stroke = multiPath ? strokePaths : stroke;
-        else if (!multiPath) {
-          _paths._fill = series.width == 0 ? series._fill : series._stroke ?? series._fill;
-          _paths.width = 0;
-        }
-        _paths.fill = multiPath ? fillPaths : stroke;
-        return _paths;
-      });
-    };
   }
-  function splineInterp(interp, opts) {
-    const alignGaps = ifNull(opts?.alignGaps, 0);
-    return (u, seriesIdx, idx0, idx1) => {
-      return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
-        [idx0, idx1] = nonNullIdxs(dataY, idx0, idx1);
-        let pxRound = series.pxRound;
-        let pixelForX = (val) => pxRound(valToPosX(val, scaleX, xDim, xOff));
-        let pixelForY = (val) => pxRound(valToPosY(val, scaleY, yDim, yOff));
-        let moveTo, bezierCurveTo, lineTo;
-        if (scaleX.ori == 0) {
-          moveTo = moveToH;
-          lineTo = lineToH;
-          bezierCurveTo = bezierCurveToH;
-        } else {
-          moveTo = moveToV;
-          lineTo = lineToV;
-          bezierCurveTo = bezierCurveToV;
-        }
-        const dir = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-        let firstXPos = pixelForX(dataX[dir == 1 ? idx0 : idx1]);
-        let prevXPos = firstXPos;
-        let xCoords = [];
-        let yCoords = [];
-        for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
-          let yVal = dataY[i];
-          if (yVal != null) {
-            let xVal = dataX[i];
-            let xPos = pixelForX(xVal);
-            xCoords.push(prevXPos = xPos);
-            yCoords.push(pixelForY(dataY[i]));
-          }
-        }
-        const _paths = { stroke: interp(xCoords, yCoords, moveTo, lineTo, bezierCurveTo, pxRound), fill: null, clip: null, band: null, gaps: null, flags: BAND_CLIP_FILL };
-        const stroke = _paths.stroke;
-        let [bandFillDir, bandClipDir] = bandFillClipDirs(u, seriesIdx);
-        if (series.fill != null || bandFillDir != 0) {
-          let fill = _paths.fill = new Path2D(stroke);
-          let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, bandFillDir);
-          let fillToY = pixelForY(fillTo);
-          lineTo(fill, prevXPos, fillToY);
-          lineTo(fill, firstXPos, fillToY);
-        }
-        if (!series.spanGaps) {
-          let gaps2 = [];
-          gaps2.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
-          _paths.gaps = gaps2 = series.gaps(u, seriesIdx, idx0, idx1, gaps2);
-          _paths.clip = clipGaps(gaps2, scaleX.ori, xOff, yOff, xDim, yDim);
-        }
-        if (bandClipDir != 0) {
-          _paths.band = bandClipDir == 2 ? [
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-            clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1)
-          ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
-        }
-        return _paths;
-      });
-    };
+  function Vf(e, i) {
+    let o = ne(i?.alignGaps, 0);
+    return (n, s, a, u) => el(n, s, (h, m, g, y, d, w, L, D, O, N, G) => {
+      [a, u] = un(g, a, u);
+      let k = h.pxRound, H = (z) => k(w(z, y, N, D)), x = (z) => k(L(z, d, G, O)), q, P, $;
+      y.ori == 0 ? (q = mn, $ = El, P = ps) : (q = gn, $ = Pl, P = hs);
+      let U = y.dir * (y.ori == 0 ? 1 : -1), Q = H(m[U == 1 ? a : u]), B = Q, T = [], j = [];
+      for (let z = U == 1 ? a : u; z >= a && z <= u; z += U) if (g[z] != null) {
+        let we = m[z], te = H(we);
+        T.push(B = te), j.push(x(g[z]));
+      }
+      let C = { stroke: e(T, j, q, $, P, k), fill: null, clip: null, band: null, gaps: null, flags: Ml }, I = C.stroke, [F, ee] = mi(n, s);
+      if (h.fill != null || F != 0) {
+        let z = C.fill = new Path2D(I), Ue = h.fillTo(n, s, h.min, h.max, F), we = x(Ue);
+        $(z, B, we), $(z, Q, we);
+      }
+      if (!h.spanGaps) {
+        let z = [];
+        z.push(...gi(m, g, a, u, U, H, o)), C.gaps = z = h.gaps(n, s, a, u, z), C.clip = hn(z, y.ori, D, O, N, G);
+      }
+      return ee != 0 && (C.band = ee == 2 ? [Dt(n, s, a, u, I, -1), Dt(n, s, a, u, I, 1)] : Dt(n, s, a, u, I, ee)), C;
+    });
   }
-  function monotoneCubic(opts) {
-    return splineInterp(_monotoneCubic, opts);
+  function Rf(e) {
+    return Vf(zf, e);
   }
-  function _monotoneCubic(xs, ys, moveTo, lineTo, bezierCurveTo, pxRound) {
-    const n = xs.length;
-    if (n < 2)
-      return null;
-    const path = new Path2D();
-    moveTo(path, xs[0], ys[0]);
-    if (n == 2)
-      lineTo(path, xs[1], ys[1]);
+  function zf(e, i, o, n, s, a) {
+    let u = e.length;
+    if (u < 2) return null;
+    let h = new Path2D();
+    if (o(h, e[0], i[0]), u == 2) n(h, e[1], i[1]);
     else {
-      let ms = Array(n), ds = Array(n - 1), dys = Array(n - 1), dxs = Array(n - 1);
-      for (let i = 0; i < n - 1; i++) {
-        dys[i] = ys[i + 1] - ys[i];
-        dxs[i] = xs[i + 1] - xs[i];
-        ds[i] = dys[i] / dxs[i];
-      }
-      ms[0] = ds[0];
-      for (let i = 1; i < n - 1; i++) {
-        if (ds[i] === 0 || ds[i - 1] === 0 || ds[i - 1] > 0 !== ds[i] > 0)
-          ms[i] = 0;
-        else {
-          ms[i] = 3 * (dxs[i - 1] + dxs[i]) / ((2 * dxs[i] + dxs[i - 1]) / ds[i - 1] + (dxs[i] + 2 * dxs[i - 1]) / ds[i]);
-          if (!isFinite(ms[i]))
-            ms[i] = 0;
-        }
-      }
-      ms[n - 1] = ds[n - 2];
-      for (let i = 0; i < n - 1; i++) {
-        bezierCurveTo(
-          path,
-          xs[i] + dxs[i] / 3,
-          ys[i] + ms[i] * dxs[i] / 3,
-          xs[i + 1] - dxs[i] / 3,
-          ys[i + 1] - ms[i + 1] * dxs[i] / 3,
-          xs[i + 1],
-          ys[i + 1]
-        );
-      }
+      let m = Array(u), g = Array(u - 1), y = Array(u - 1), d = Array(u - 1);
+      for (let w = 0; w < u - 1; w++) y[w] = i[w + 1] - i[w], d[w] = e[w + 1] - e[w], g[w] = y[w] / d[w];
+      m[0] = g[0];
+      for (let w = 1; w < u - 1; w++) g[w] === 0 || g[w - 1] === 0 || g[w - 1] > 0 != g[w] > 0 ? m[w] = 0 : (m[w] = 3 * (d[w - 1] + d[w]) / ((2 * d[w] + d[w - 1]) / g[w - 1] + (d[w] + 2 * d[w - 1]) / g[w]), isFinite(m[w]) || (m[w] = 0));
+      m[u - 1] = g[u - 2];
+      for (let w = 0; w < u - 1; w++) s(h, e[w] + d[w] / 3, i[w] + m[w] * d[w] / 3, e[w + 1] - d[w] / 3, i[w + 1] - m[w + 1] * d[w] / 3, e[w + 1], i[w + 1]);
     }
-    return path;
+    return h;
   }
-  var cursorPlots = /* @__PURE__ */ new Set();
-  function invalidateRects() {
-    for (let u of cursorPlots)
-      u.syncRect(true);
+  var ti = /* @__PURE__ */ new Set();
+  function Lo() {
+    for (let e of ti) e.syncRect(true);
   }
-  if (domEnv) {
-    on(resize, win, invalidateRects);
-    on(scroll, win, invalidateRects, true);
-    on(dppxchange, win, () => {
-      uPlot.pxRatio = pxRatio;
-    });
+  Al && (Qt(mr, kl, Lo), Qt(gr, kl, Lo, true), Qt(sn, kl, () => {
+    Be.pxRatio = oe;
+  }));
+  var Ff = ds();
+  var Of = ms();
+  function Co(e, i, o, n) {
+    return (n ? [e[0], e[1]].concat(e.slice(2)) : [e[0]].concat(e.slice(1))).map((a, u) => li(a, u, i, o));
   }
-  var linearPath = linear();
-  var pointsPath = points();
-  function setDefaults(d, xo, yo, initY) {
-    let d2 = initY ? [d[0], d[1]].concat(d.slice(2)) : [d[0]].concat(d.slice(1));
-    return d2.map((o, i) => setDefault(o, i, xo, yo));
+  function Hf(e, i) {
+    return e.map((o, n) => n == 0 ? {} : Te({}, i, o));
   }
-  function setDefaults2(d, xyo) {
-    return d.map((o, i) => i == 0 ? {} : assign({}, xyo, o));
+  function li(e, i, o, n) {
+    return Te({}, i == 0 ? o : n, e);
   }
-  function setDefault(o, i, xo, yo) {
-    return assign({}, i == 0 ? xo : yo, o);
+  function ws(e, i, o) {
+    return i == null ? Tl : [i, o];
   }
-  function snapNumX(self, dataMin, dataMax) {
-    return dataMin == null ? nullNullTuple : [dataMin, dataMax];
+  var Nf = ws;
+  function Wf(e, i, o) {
+    return i == null ? Tl : rn(i, o, ri, true);
   }
-  var snapTimeX = snapNumX;
-  function snapNumY(self, dataMin, dataMax) {
-    return dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, rangePad, true);
+  function Ss(e, i, o, n) {
+    return i == null ? Tl : cn(i, o, e.scales[n].log, false);
   }
-  function snapLogY(self, dataMin, dataMax, scale) {
-    return dataMin == null ? nullNullTuple : rangeLog(dataMin, dataMax, self.scales[scale].log, false);
+  var Gf = Ss;
+  function _s(e, i, o, n) {
+    return i == null ? Tl : si(i, o, e.scales[n].log, false);
   }
-  var snapLogX = snapLogY;
-  function snapAsinhY(self, dataMin, dataMax, scale) {
-    return dataMin == null ? nullNullTuple : rangeAsinh(dataMin, dataMax, self.scales[scale].log, false);
-  }
-  var snapAsinhX = snapAsinhY;
-  function findIncr(minVal, maxVal, incrs, dim, minSpace) {
-    let intDigits = max(numIntDigits(minVal), numIntDigits(maxVal));
-    let delta = maxVal - minVal;
-    let incrIdx = closestIdx(minSpace / dim * delta, incrs);
+  var If = _s;
+  function Yf(e, i, o, n, s) {
+    let a = Ye(uo(e), uo(i)), u = i - e, h = dt(s / n * u, o);
     do {
-      let foundIncr = incrs[incrIdx];
-      let foundSpace = dim * foundIncr / delta;
-      if (foundSpace >= minSpace && intDigits + (foundIncr < 5 ? fixedDec.get(foundIncr) : 0) <= 17)
-        return [foundIncr, foundSpace];
-    } while (++incrIdx < incrs.length);
+      let m = o[h], g = n * m / u;
+      if (g >= s && a + (m < 5 ? Ht.get(m) : 0) <= 17) return [m, g];
+    } while (++h < o.length);
     return [0, 0];
   }
-  function pxRatioFont(font2) {
-    let fontSize, fontSizeCss;
-    font2 = font2.replace(/(\d+)px/, (m, p1) => (fontSize = round((fontSizeCss = +p1) * pxRatio)) + "px");
-    return [font2, fontSize, fontSizeCss];
+  function Vo(e) {
+    let i, o;
+    return e = e.replace(/(\d+)px/, (n, s) => (i = Ae((o = +s) * oe)) + "px"), [e, i, o];
   }
-  function syncFontSize(axis) {
-    if (axis.show) {
-      [axis.font, axis.labelFont].forEach((f) => {
-        let size = roundDec(f[2] * pxRatio, 1);
-        f[0] = f[0].replace(/[0-9.]+px/, size + "px");
-        f[1] = size;
-      });
-    }
+  function Bf(e) {
+    e.show && [e.font, e.labelFont].forEach((i) => {
+      let o = ae(i[2] * oe, 1);
+      i[0] = i[0].replace(/[0-9.]+px/, o + "px"), i[1] = o;
+    });
   }
-  function uPlot(opts, data, then) {
-    const self = {
-      mode: ifNull(opts.mode, 1)
-    };
-    const mode2 = self.mode;
-    function getHPos(val, scale, dim, off2) {
-      let pct = scale.valToPct(val);
-      return off2 + dim * (scale.dir == -1 ? 1 - pct : pct);
+  function Be(e, i, o) {
+    let n = { mode: ne(e.mode, 1) }, s = n.mode;
+    function a(t, l, r, f) {
+      let c = l.valToPct(t);
+      return f + r * (l.dir == -1 ? 1 - c : c);
     }
-    function getVPos(val, scale, dim, off2) {
-      let pct = scale.valToPct(val);
-      return off2 + dim * (scale.dir == -1 ? pct : 1 - pct);
+    function u(t, l, r, f) {
+      let c = l.valToPct(t);
+      return f + r * (l.dir == -1 ? c : 1 - c);
     }
-    function getPos(val, scale, dim, off2) {
-      return scale.ori == 0 ? getHPos(val, scale, dim, off2) : getVPos(val, scale, dim, off2);
+    function h(t, l, r, f) {
+      return l.ori == 0 ? a(t, l, r, f) : u(t, l, r, f);
     }
-    self.valToPosH = getHPos;
-    self.valToPosV = getVPos;
-    let ready = false;
-    self.status = 0;
-    const root = self.root = placeDiv(UPLOT);
-    if (opts.id != null)
-      root.id = opts.id;
-    addClass(root, opts.class);
-    if (opts.title) {
-      let title = placeDiv(TITLE, root);
-      title.textContent = opts.title;
+    n.valToPosH = a, n.valToPosV = u;
+    let m = false;
+    n.status = 0;
+    let g = n.root = ft(Js);
+    if (e.id != null && (g.id = e.id), Xe(g, e.class), e.title) {
+      let t = ft(Xs, g);
+      t.textContent = e.title;
     }
-    const can = placeTag("canvas");
-    const ctx = self.ctx = can.getContext("2d");
-    const wrap = placeDiv(WRAP, root);
-    on("click", wrap, (e) => {
-      if (e.target === over) {
-        let didDrag = mouseLeft1 != mouseLeft0 || mouseTop1 != mouseTop0;
-        didDrag && drag.click(self, e);
-      }
+    let y = gt("canvas"), d = n.ctx = y.getContext("2d"), w = ft(er, g);
+    Qt("click", w, (t) => {
+      t.target === D && (he != gl || _e != dl) && Fe.click(n, t);
     }, true);
-    const under = self.under = placeDiv(UNDER, wrap);
-    wrap.appendChild(can);
-    const over = self.over = placeDiv(OVER, wrap);
-    opts = copy2(opts);
-    const pxAlign = +ifNull(opts.pxAlign, 1);
-    const pxRound = pxRoundGen(pxAlign);
-    (opts.plugins || []).forEach((p) => {
-      if (p.opts)
-        opts = p.opts(self, opts) || opts;
+    let L = n.under = ft(tr, w);
+    w.appendChild(y);
+    let D = n.over = ft(lr, w);
+    e = bl(e);
+    let O = +ne(e.pxAlign, 1), N = Po(O);
+    (e.plugins || []).forEach((t) => {
+      t.opts && (e = t.opts(n, e) || e);
     });
-    const ms = opts.ms || 1e-3;
-    const series = self.series = mode2 == 1 ? setDefaults(opts.series || [], xSeriesOpts, ySeriesOpts, false) : setDefaults2(opts.series || [null], xySeriesOpts);
-    const axes = self.axes = setDefaults(opts.axes || [], xAxisOpts, yAxisOpts, true);
-    const scales = self.scales = {};
-    const bands = self.bands = opts.bands || [];
-    bands.forEach((b) => {
-      b.fill = fnOrSelf(b.fill || null);
-      b.dir = ifNull(b.dir, -1);
+    let G = e.ms || 1e-3, k = n.series = s == 1 ? Co(e.series || [], ko, Ao, false) : Hf(e.series || [null], Mo), H = n.axes = Co(e.axes || [], vo, To, true), x = n.scales = {}, q = n.bands = e.bands || [];
+    q.forEach((t) => {
+      t.fill = X(t.fill || null), t.dir = ne(t.dir, -1);
     });
-    const xScaleKey = mode2 == 2 ? series[1].facets[0].scale : series[0].scale;
-    const drawOrderMap = {
-      axes: drawAxesGrid,
-      series: drawSeries
-    };
-    const drawOrder = (opts.drawOrder || ["axes", "series"]).map((key2) => drawOrderMap[key2]);
-    function initValToPct(sc) {
-      const getVal = sc.distr == 3 ? (val) => log10(val > 0 ? val : sc.clamp(self, val, sc.min, sc.max, sc.key)) : sc.distr == 4 ? (val) => asinh(val, sc.asinh) : sc.distr == 100 ? (val) => sc.fwd(val) : (val) => val;
-      return (val) => {
-        let _val = getVal(val);
-        let { _min, _max } = sc;
-        let delta = _max - _min;
-        return (_val - _min) / delta;
+    let P = s == 2 ? k[1].facets[0].scale : k[0].scale, $ = { axes: zs, series: Ds }, U = (e.drawOrder || ["axes", "series"]).map((t) => $[t]);
+    function Q(t) {
+      let l = t.distr == 3 ? (r) => Pt(r > 0 ? r : t.clamp(n, r, t.min, t.max, t.key)) : t.distr == 4 ? (r) => Yn(r, t.asinh) : t.distr == 100 ? (r) => t.fwd(r) : (r) => r;
+      return (r) => {
+        let f = l(r), { _min: c, _max: p } = t, S = p - c;
+        return (f - c) / S;
       };
     }
-    function initScale(scaleKey) {
-      let sc = scales[scaleKey];
-      if (sc == null) {
-        let scaleOpts = (opts.scales || EMPTY_OBJ)[scaleKey] || EMPTY_OBJ;
-        if (scaleOpts.from != null) {
-          initScale(scaleOpts.from);
-          let sc2 = assign({}, scales[scaleOpts.from], scaleOpts, { key: scaleKey });
-          sc2.valToPct = initValToPct(sc2);
-          scales[scaleKey] = sc2;
+    function B(t) {
+      let l = x[t];
+      if (l == null) {
+        let r = (e.scales || Yl)[t] || Yl;
+        if (r.from != null) {
+          B(r.from);
+          let f = Te({}, x[r.from], r, { key: t });
+          f.valToPct = Q(f), x[t] = f;
         } else {
-          sc = scales[scaleKey] = assign({}, scaleKey == xScaleKey ? xScaleOpts : yScaleOpts, scaleOpts);
-          sc.key = scaleKey;
-          let isTime = sc.time;
-          let rn = sc.range;
-          let rangeIsArr = isArr(rn);
-          if (scaleKey != xScaleKey || mode2 == 2 && !isTime) {
-            if (rangeIsArr && (rn[0] == null || rn[1] == null)) {
-              rn = {
-                min: rn[0] == null ? autoRangePart : {
-                  mode: 1,
-                  hard: rn[0],
-                  soft: rn[0]
-                },
-                max: rn[1] == null ? autoRangePart : {
-                  mode: 1,
-                  hard: rn[1],
-                  soft: rn[1]
-                }
-              };
-              rangeIsArr = false;
-            }
-            if (!rangeIsArr && isObj(rn)) {
-              let cfg = rn;
-              rn = (self2, dataMin, dataMax) => dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, cfg);
-            }
+          l = x[t] = Te({}, t == P ? rs : Mf, r), l.key = t;
+          let f = l.time, c = l.range, p = Ot(c);
+          if ((t != P || s == 2 && !f) && (p && (c[0] == null || c[1] == null) && (c = { min: c[0] == null ? so : { mode: 1, hard: c[0], soft: c[0] }, max: c[1] == null ? so : { mode: 1, hard: c[1], soft: c[1] } }, p = false), !p && pn(c))) {
+            let S = c;
+            c = (_, v, b) => v == null ? Tl : rn(v, b, S);
           }
-          sc.range = fnOrSelf(rn || (isTime ? snapTimeX : scaleKey == xScaleKey ? sc.distr == 3 ? snapLogX : sc.distr == 4 ? snapAsinhX : snapNumX : sc.distr == 3 ? snapLogY : sc.distr == 4 ? snapAsinhY : snapNumY));
-          sc.auto = fnOrSelf(rangeIsArr ? false : sc.auto);
-          sc.clamp = fnOrSelf(sc.clamp || clampScale);
-          sc._min = sc._max = null;
-          sc.valToPct = initValToPct(sc);
+          l.range = X(c || (f ? Nf : t == P ? l.distr == 3 ? Gf : l.distr == 4 ? If : ws : l.distr == 3 ? Ss : l.distr == 4 ? _s : Wf)), l.auto = X(p ? false : l.auto), l.clamp = X(l.clamp || bf), l._min = l._max = null, l.valToPct = Q(l);
         }
       }
     }
-    initScale("x");
-    initScale("y");
-    if (mode2 == 1) {
-      series.forEach((s) => {
-        initScale(s.scale);
-      });
-    }
-    axes.forEach((a) => {
-      initScale(a.scale);
+    B("x"), B("y"), s == 1 && k.forEach((t) => {
+      B(t.scale);
+    }), H.forEach((t) => {
+      B(t.scale);
     });
-    for (let k in opts.scales)
-      initScale(k);
-    const scaleX = scales[xScaleKey];
-    const xScaleDistr = scaleX.distr;
-    let valToPosX, valToPosY;
-    if (scaleX.ori == 0) {
-      addClass(root, ORI_HZ);
-      valToPosX = getHPos;
-      valToPosY = getVPos;
-    } else {
-      addClass(root, ORI_VT);
-      valToPosX = getVPos;
-      valToPosY = getHPos;
+    for (let t in e.scales) B(t);
+    let T = x[P], j = T.distr, C, I;
+    T.ori == 0 ? (Xe(g, Zs), C = a, I = u) : (Xe(g, Qs), C = u, I = a);
+    let F = {};
+    for (let t in x) {
+      let l = x[t];
+      (l.min != null || l.max != null) && (F[t] = { min: l.min, max: l.max }, l.min = l.max = null);
     }
-    const pendScales = {};
-    for (let k in scales) {
-      let sc = scales[k];
-      if (sc.min != null || sc.max != null) {
-        pendScales[k] = { min: sc.min, max: sc.max };
-        sc.min = sc.max = null;
-      }
+    let ee = e.tzDate || ((t) => new Date(Ae(t / G))), z = e.fmtDate || ci, Ue = G == 1 ? Zr(ee) : ef(ee), we = So(ee, wo(G == 1 ? Jr : Xr, z)), te = yo(ee, _o(lf, z)), fe = [], J = n.legend = Te({}, sf, e.legend), V = n.cursor = Te({}, pf, { drag: { y: s == 2 } }, e.cursor), be = J.show, He = V.show, Se = J.markers;
+    J.idxs = fe, Se.width = X(Se.width), Se.dash = X(Se.dash), Se.stroke = X(Se.stroke), Se.fill = X(Se.fill);
+    let se, ct, qe, ye = [], St = [], Mt, lt = false, Lt = {};
+    if (J.live) {
+      let t = k[1] ? k[1].values : null;
+      lt = t != null, Mt = lt ? t(n, 1, 0) : { _: 0 };
+      for (let l in Mt) Lt[l] = ii;
     }
-    const _tzDate = opts.tzDate || ((ts) => new Date(round(ts / ms)));
-    const _fmtDate = opts.fmtDate || fmtDate;
-    const _timeAxisSplits = ms == 1 ? timeAxisSplitsMs(_tzDate) : timeAxisSplitsS(_tzDate);
-    const _timeAxisVals = timeAxisVals(_tzDate, timeAxisStamps(ms == 1 ? _timeAxisStampsMs : _timeAxisStampsS, _fmtDate));
-    const _timeSeriesVal = timeSeriesVal(_tzDate, timeSeriesStamp(_timeSeriesStamp, _fmtDate));
-    const activeIdxs = [];
-    const legend = self.legend = assign({}, legendOpts, opts.legend);
-    const cursor = self.cursor = assign({}, cursorOpts, { drag: { y: mode2 == 2 } }, opts.cursor);
-    const showLegend = legend.show;
-    const showCursor = cursor.show;
-    const markers = legend.markers;
-    {
-      legend.idxs = activeIdxs;
-      markers.width = fnOrSelf(markers.width);
-      markers.dash = fnOrSelf(markers.dash);
-      markers.stroke = fnOrSelf(markers.stroke);
-      markers.fill = fnOrSelf(markers.fill);
-    }
-    let legendTable;
-    let legendHead;
-    let legendBody;
-    let legendRows = [];
-    let legendCells = [];
-    let legendCols;
-    let multiValLegend = false;
-    let NULL_LEGEND_VALUES = {};
-    if (legend.live) {
-      const getMultiVals = series[1] ? series[1].values : null;
-      multiValLegend = getMultiVals != null;
-      legendCols = multiValLegend ? getMultiVals(self, 1, 0) : { _: 0 };
-      for (let k in legendCols)
-        NULL_LEGEND_VALUES[k] = LEGEND_DISP;
-    }
-    if (showLegend) {
-      legendTable = placeTag("table", LEGEND, root);
-      legendBody = placeTag("tbody", null, legendTable);
-      legend.mount(self, legendTable);
-      if (multiValLegend) {
-        legendHead = placeTag("thead", null, legendTable, legendBody);
-        let head = placeTag("tr", null, legendHead);
-        placeTag("th", null, head);
-        for (var key in legendCols)
-          placeTag("th", LEGEND_LABEL, head).textContent = key;
-      } else {
-        addClass(legendTable, LEGEND_INLINE);
-        legend.live && addClass(legendTable, LEGEND_LIVE);
-      }
-    }
-    const son = { show: true };
-    const soff = { show: false };
-    function initLegendRow(s, i) {
-      if (i == 0 && (multiValLegend || !legend.live || mode2 == 2))
-        return nullNullTuple;
-      let cells = [];
-      let row = placeTag("tr", LEGEND_SERIES, legendBody, legendBody.childNodes[i]);
-      addClass(row, s.class);
-      if (!s.show)
-        addClass(row, OFF);
-      let label = placeTag("th", null, row);
-      if (markers.show) {
-        let indic = placeDiv(LEGEND_MARKER, label);
-        if (i > 0) {
-          let width = markers.width(self, i);
-          if (width)
-            indic.style.border = width + "px " + markers.dash(self, i) + " " + markers.stroke(self, i);
-          indic.style.background = markers.fill(self, i);
+    if (be) if (se = gt("table", fr, g), qe = gt("tbody", null, se), J.mount(n, se), lt) {
+      ct = gt("thead", null, se, qe);
+      let t = gt("tr", null, ct);
+      gt("th", null, t);
+      for (var tl in Mt) gt("th", ji, t).textContent = tl;
+    } else Xe(se, cr), J.live && Xe(se, ur);
+    let ll = { show: true }, Dl = { show: false };
+    function Ul(t, l) {
+      if (l == 0 && (lt || !J.live || s == 2)) return Tl;
+      let r = [], f = gt("tr", ar, qe, qe.childNodes[l]);
+      Xe(f, t.class), t.show || Xe(f, Zt);
+      let c = gt("th", null, f);
+      if (Se.show) {
+        let _ = ft(pr, c);
+        if (l > 0) {
+          let v = Se.width(n, l);
+          v && (_.style.border = v + "px " + Se.dash(n, l) + " " + Se.stroke(n, l)), _.style.background = Se.fill(n, l);
         }
       }
-      let text2 = placeDiv(LEGEND_LABEL, label);
-      if (s.label instanceof HTMLElement)
-        text2.appendChild(s.label);
-      else
-        text2.textContent = s.label;
-      if (i > 0) {
-        if (!markers.show)
-          text2.style.color = s.width > 0 ? markers.stroke(self, i) : markers.fill(self, i);
-        onMouse("click", label, (e) => {
-          if (cursor._lock)
-            return;
-          setCursorEvent(e);
-          let seriesIdx = series.indexOf(s);
-          if ((e.ctrlKey || e.metaKey) != legend.isolate) {
-            let isolate = series.some((s2, i2) => i2 > 0 && i2 != seriesIdx && s2.show);
-            series.forEach((s2, i2) => {
-              i2 > 0 && setSeries(i2, isolate ? i2 == seriesIdx ? son : soff : son, true, syncOpts.setSeries);
-            });
-          } else
-            setSeries(seriesIdx, { show: !s.show }, true, syncOpts.setSeries);
-        }, false);
-        if (cursorFocus) {
-          onMouse(mouseenter, label, (e) => {
-            if (cursor._lock)
-              return;
-            setCursorEvent(e);
-            setSeries(series.indexOf(s), FOCUS_TRUE, true, syncOpts.setSeries);
-          }, false);
+      let p = ft(ji, c);
+      t.label instanceof HTMLElement ? p.appendChild(t.label) : p.textContent = t.label, l > 0 && (Se.show || (p.style.color = t.width > 0 ? Se.stroke(n, l) : Se.fill(n, l)), Ne("click", c, (_) => {
+        if (V._lock) return;
+        Bt(_);
+        let v = k.indexOf(t);
+        if ((_.ctrlKey || _.metaKey) != J.isolate) {
+          let b = k.some((M, E) => E > 0 && E != v && M.show);
+          k.forEach((M, E) => {
+            E > 0 && vt(E, b ? E == v ? ll : Dl : ll, true, xe.setSeries);
+          });
+        } else vt(v, { show: !t.show }, true, xe.setSeries);
+      }, false), sl && Ne(Zi, c, (_) => {
+        V._lock || (Bt(_), vt(k.indexOf(t), Sl, true, xe.setSeries));
+      }, false));
+      for (var S in Mt) {
+        let _ = gt("td", hr, f);
+        _.textContent = "--", r.push(_);
+      }
+      return [f, r];
+    }
+    let Nt = /* @__PURE__ */ new Map();
+    function Ne(t, l, r, f = true) {
+      let c = Nt.get(l) || {}, p = V.bind[t](n, l, r, f);
+      p && (Qt(t, l, c[t] = p), Nt.set(l, c));
+    }
+    function nl(t, l, r) {
+      let f = Nt.get(l) || {};
+      for (let c in f) (t == null || c == t) && (Jn(c, l, f[c]), delete f[c]);
+      t == null && Nt.delete(l);
+    }
+    let At = 0, Wt = 0, K = 0, A = 0, pe = 0, Me = 0, il = pe, Gt = Me, _t = K, It = A, $e = 0, nt = 0, Ke = 0, at = 0;
+    n.bbox = {};
+    let wn = false, Kl = false, ol = false, Yt = false, jl = false, it = false;
+    function Sn(t, l, r) {
+      (r || t != n.width || l != n.height) && wi(t, l), al(false), ol = true, Kl = true, pl();
+    }
+    function wi(t, l) {
+      n.width = At = K = t, n.height = Wt = A = l, pe = Me = 0, xs(), Ts();
+      let r = n.bbox;
+      $e = r.left = $t(pe * oe, 0.5), nt = r.top = $t(Me * oe, 0.5), Ke = r.width = $t(K * oe, 0.5), at = r.height = $t(A * oe, 0.5);
+    }
+    let ys = 3;
+    function vs() {
+      let t = false, l = 0;
+      for (; !t; ) {
+        l++;
+        let r = Vs(l), f = Rs(l);
+        t = l == ys || r && f, t || (wi(n.width, n.height), Kl = true);
+      }
+    }
+    function ks({ width: t, height: l }) {
+      Sn(t, l);
+    }
+    n.setSize = ks;
+    function xs() {
+      let t = false, l = false, r = false, f = false;
+      H.forEach((c, p) => {
+        if (c.show && c._show) {
+          let { side: S, _size: _ } = c, v = S % 2, b = c.label != null ? c.labelSize : 0, M = _ + b;
+          M > 0 && (v ? (K -= M, S == 3 ? (pe += M, f = true) : r = true) : (A -= M, S == 0 ? (Me += M, t = true) : l = true));
         }
-      }
-      for (var key2 in legendCols) {
-        let v = placeTag("td", LEGEND_VALUE, row);
-        v.textContent = "--";
-        cells.push(v);
-      }
-      return [row, cells];
+      }), Ut[0] = t, Ut[1] = r, Ut[2] = l, Ut[3] = f, K -= Ct[1] + Ct[3], pe += Ct[3], A -= Ct[2] + Ct[0], Me += Ct[0];
     }
-    const mouseListeners = /* @__PURE__ */ new Map();
-    function onMouse(ev, targ, fn, onlyTarg = true) {
-      const targListeners = mouseListeners.get(targ) || {};
-      const listener = cursor.bind[ev](self, targ, fn, onlyTarg);
-      if (listener) {
-        on(ev, targ, targListeners[ev] = listener);
-        mouseListeners.set(targ, targListeners);
-      }
-    }
-    function offMouse(ev, targ, fn) {
-      const targListeners = mouseListeners.get(targ) || {};
-      for (let k in targListeners) {
-        if (ev == null || k == ev) {
-          off(k, targ, targListeners[k]);
-          delete targListeners[k];
-        }
-      }
-      if (ev == null)
-        mouseListeners.delete(targ);
-    }
-    let fullWidCss = 0;
-    let fullHgtCss = 0;
-    let plotWidCss = 0;
-    let plotHgtCss = 0;
-    let plotLftCss = 0;
-    let plotTopCss = 0;
-    let _plotLftCss = plotLftCss;
-    let _plotTopCss = plotTopCss;
-    let _plotWidCss = plotWidCss;
-    let _plotHgtCss = plotHgtCss;
-    let plotLft = 0;
-    let plotTop = 0;
-    let plotWid = 0;
-    let plotHgt = 0;
-    self.bbox = {};
-    let shouldSetScales = false;
-    let shouldSetSize = false;
-    let shouldConvergeSize = false;
-    let shouldSetCursor = false;
-    let shouldSetSelect = false;
-    let shouldSetLegend = false;
-    function _setSize(width, height, force) {
-      if (force || (width != self.width || height != self.height))
-        calcSize(width, height);
-      resetYSeries(false);
-      shouldConvergeSize = true;
-      shouldSetSize = true;
-      commit();
-    }
-    function calcSize(width, height) {
-      self.width = fullWidCss = plotWidCss = width;
-      self.height = fullHgtCss = plotHgtCss = height;
-      plotLftCss = plotTopCss = 0;
-      calcPlotRect();
-      calcAxesRects();
-      let bb = self.bbox;
-      plotLft = bb.left = incrRound(plotLftCss * pxRatio, 0.5);
-      plotTop = bb.top = incrRound(plotTopCss * pxRatio, 0.5);
-      plotWid = bb.width = incrRound(plotWidCss * pxRatio, 0.5);
-      plotHgt = bb.height = incrRound(plotHgtCss * pxRatio, 0.5);
-    }
-    const CYCLE_LIMIT = 3;
-    function convergeSize() {
-      let converged = false;
-      let cycleNum = 0;
-      while (!converged) {
-        cycleNum++;
-        let axesConverged = axesCalc(cycleNum);
-        let paddingConverged = paddingCalc(cycleNum);
-        converged = cycleNum == CYCLE_LIMIT || axesConverged && paddingConverged;
-        if (!converged) {
-          calcSize(self.width, self.height);
-          shouldSetSize = true;
-        }
-      }
-    }
-    function setSize({ width, height }) {
-      _setSize(width, height);
-    }
-    self.setSize = setSize;
-    function calcPlotRect() {
-      let hasTopAxis = false;
-      let hasBtmAxis = false;
-      let hasRgtAxis = false;
-      let hasLftAxis = false;
-      axes.forEach((axis, i) => {
-        if (axis.show && axis._show) {
-          let { side, _size } = axis;
-          let isVt = side % 2;
-          let labelSize = axis.label != null ? axis.labelSize : 0;
-          let fullSize = _size + labelSize;
-          if (fullSize > 0) {
-            if (isVt) {
-              plotWidCss -= fullSize;
-              if (side == 3) {
-                plotLftCss += fullSize;
-                hasLftAxis = true;
-              } else
-                hasRgtAxis = true;
-            } else {
-              plotHgtCss -= fullSize;
-              if (side == 0) {
-                plotTopCss += fullSize;
-                hasTopAxis = true;
-              } else
-                hasBtmAxis = true;
-            }
-          }
-        }
-      });
-      sidesWithAxes[0] = hasTopAxis;
-      sidesWithAxes[1] = hasRgtAxis;
-      sidesWithAxes[2] = hasBtmAxis;
-      sidesWithAxes[3] = hasLftAxis;
-      plotWidCss -= _padding[1] + _padding[3];
-      plotLftCss += _padding[3];
-      plotHgtCss -= _padding[2] + _padding[0];
-      plotTopCss += _padding[0];
-    }
-    function calcAxesRects() {
-      let off1 = plotLftCss + plotWidCss;
-      let off2 = plotTopCss + plotHgtCss;
-      let off3 = plotLftCss;
-      let off0 = plotTopCss;
-      function incrOffset(side, size) {
-        switch (side) {
+    function Ts() {
+      let t = pe + K, l = Me + A, r = pe, f = Me;
+      function c(p, S) {
+        switch (p) {
           case 1:
-            off1 += size;
-            return off1 - size;
+            return t += S, t - S;
           case 2:
-            off2 += size;
-            return off2 - size;
+            return l += S, l - S;
           case 3:
-            off3 -= size;
-            return off3 + size;
+            return r -= S, r + S;
           case 0:
-            off0 -= size;
-            return off0 + size;
+            return f -= S, f + S;
         }
       }
-      axes.forEach((axis, i) => {
-        if (axis.show && axis._show) {
-          let side = axis.side;
-          axis._pos = incrOffset(side, axis._size);
-          if (axis.label != null)
-            axis._lpos = incrOffset(side, axis.labelSize);
+      H.forEach((p, S) => {
+        if (p.show && p._show) {
+          let _ = p.side;
+          p._pos = c(_, p._size), p.label != null && (p._lpos = c(_, p.labelSize));
         }
       });
     }
-    if (cursor.dataIdx == null) {
-      let hov = cursor.hover;
-      let skip = hov.skip = new Set(hov.skip ?? []);
-      skip.add(void 0);
-      let prox = hov.prox = fnOrSelf(hov.prox);
-      let bias = hov.bias ??= 0;
-      cursor.dataIdx = (self2, seriesIdx, cursorIdx, valAtPosX) => {
-        if (seriesIdx == 0)
-          return cursorIdx;
-        let idx2 = cursorIdx;
-        let _prox = prox(self2, seriesIdx, cursorIdx, valAtPosX) ?? inf;
-        let withProx = _prox >= 0 && _prox < inf;
-        let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
-        let cursorLft = cursor.left;
-        let xValues = data[0];
-        let yValues = data[seriesIdx];
-        if (skip.has(yValues[cursorIdx])) {
-          idx2 = null;
-          let nonNullLft = null, nonNullRgt = null, j;
-          if (bias == 0 || bias == -1) {
-            j = cursorIdx;
-            while (nonNullLft == null && j-- > 0) {
-              if (!skip.has(yValues[j]))
-                nonNullLft = j;
-            }
-          }
-          if (bias == 0 || bias == 1) {
-            j = cursorIdx;
-            while (nonNullRgt == null && j++ < yValues.length) {
-              if (!skip.has(yValues[j]))
-                nonNullRgt = j;
-            }
-          }
-          if (nonNullLft != null || nonNullRgt != null) {
-            if (withProx) {
-              let lftPos = nonNullLft == null ? -Infinity : valToPosX(xValues[nonNullLft], scaleX, xDim, 0);
-              let rgtPos = nonNullRgt == null ? Infinity : valToPosX(xValues[nonNullRgt], scaleX, xDim, 0);
-              let lftDelta = cursorLft - lftPos;
-              let rgtDelta = rgtPos - cursorLft;
-              if (lftDelta <= rgtDelta) {
-                if (lftDelta <= _prox)
-                  idx2 = nonNullLft;
-              } else {
-                if (rgtDelta <= _prox)
-                  idx2 = nonNullRgt;
-              }
-            } else {
-              idx2 = nonNullRgt == null ? nonNullLft : nonNullLft == null ? nonNullRgt : cursorIdx - nonNullLft <= nonNullRgt - cursorIdx ? nonNullLft : nonNullRgt;
-            }
-          }
-        } else if (withProx) {
-          let dist = abs(cursorLft - valToPosX(xValues[cursorIdx], scaleX, xDim, 0));
-          if (dist > _prox)
-            idx2 = null;
-        }
-        return idx2;
+    if (V.dataIdx == null) {
+      let t = V.hover, l = t.skip = new Set(t.skip ?? []);
+      l.add(void 0);
+      let r = t.prox = X(t.prox), f = t.bias ??= 0;
+      V.dataIdx = (c, p, S, _) => {
+        if (p == 0) return S;
+        let v = S, b = r(c, p, S, _) ?? ce, M = b >= 0 && b < ce, E = T.ori == 0 ? K : A, Y = V.left, ie = i[0], le = i[p];
+        if (l.has(le[S])) {
+          v = null;
+          let Z = null, W = null, R;
+          if (f == 0 || f == -1) for (R = S; Z == null && R-- > 0; ) l.has(le[R]) || (Z = R);
+          if (f == 0 || f == 1) for (R = S; W == null && R++ < le.length; ) l.has(le[R]) || (W = R);
+          if (Z != null || W != null) if (M) {
+            let ge = Z == null ? -1 / 0 : C(ie[Z], T, E, 0), ve = W == null ? 1 / 0 : C(ie[W], T, E, 0), Re = Y - ge, ue = ve - Y;
+            Re <= ue ? Re <= b && (v = Z) : ue <= b && (v = W);
+          } else v = W == null ? Z : Z == null ? W : S - Z <= W - S ? Z : W;
+        } else M && Ee(Y - C(ie[S], T, E, 0)) > b && (v = null);
+        return v;
       };
     }
-    const setCursorEvent = (e) => {
-      cursor.event = e;
+    let Bt = (t) => {
+      V.event = t;
     };
-    cursor.idxs = activeIdxs;
-    cursor._lock = false;
-    let points2 = cursor.points;
-    points2.show = fnOrSelf(points2.show);
-    points2.size = fnOrSelf(points2.size);
-    points2.stroke = fnOrSelf(points2.stroke);
-    points2.width = fnOrSelf(points2.width);
-    points2.fill = fnOrSelf(points2.fill);
-    const focus = self.focus = assign({}, opts.focus || { alpha: 0.3 }, cursor.focus);
-    const cursorFocus = focus.prox >= 0;
-    const cursorOnePt = cursorFocus && points2.one;
-    let cursorPts = [];
-    let cursorPtsLft = [];
-    let cursorPtsTop = [];
-    function initCursorPt(s, si) {
-      let pt = points2.show(self, si);
-      if (pt instanceof HTMLElement) {
-        addClass(pt, CURSOR_PT);
-        addClass(pt, s.class);
-        elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
-        over.insertBefore(pt, cursorPts[si]);
-        return pt;
+    V.idxs = fe, V._lock = false;
+    let Oe = V.points;
+    Oe.show = X(Oe.show), Oe.size = X(Oe.size), Oe.stroke = X(Oe.stroke), Oe.width = X(Oe.width), Oe.fill = X(Oe.fill);
+    let yt = n.focus = Te({}, e.focus || { alpha: 0.3 }, V.focus), sl = yt.prox >= 0, rl = sl && Oe.one, ot = [], fl = [], ul = [];
+    function Si(t, l) {
+      let r = Oe.show(n, l);
+      if (r instanceof HTMLElement) return Xe(r, rr), Xe(r, t.class), bt(r, -10, -10, K, A), D.insertBefore(r, ot[l]), r;
+    }
+    function _i(t, l) {
+      if (s == 1 || l > 0) {
+        let r = s == 1 && x[t.scale].time, f = t.value;
+        t.value = r ? po(f) ? yo(ee, _o(f, z)) : f || te : f || kf, t.label = t.label || (r ? mf : hf);
+      }
+      if (rl || l > 0) {
+        t.width = t.width == null ? 1 : t.width, t.paths = t.paths || Ff || br, t.fillTo = X(t.fillTo || Af), t.pxAlign = +ne(t.pxAlign, O), t.pxRound = Po(t.pxAlign), t.stroke = X(t.stroke || null), t.fill = X(t.fill || null), t._stroke = t._fill = t._paths = t._focus = null;
+        let r = xf(Ye(1, t.width), 1), f = t.points = Te({}, { size: r, width: Ye(1, r * 0.2), stroke: t.stroke, space: r * 2, paths: Of, _stroke: null, _fill: null }, t.points);
+        f.show = X(f.show), f.filter = X(f.filter), f.fill = X(f.fill), f.stroke = X(f.stroke), f.paths = X(f.paths), f.pxAlign = t.pxAlign;
+      }
+      if (be) {
+        let r = Ul(t, l);
+        ye.splice(l, 0, r[0]), St.splice(l, 0, r[1]), J.values.push(null);
+      }
+      if (He) {
+        fe.splice(l, 0, null);
+        let r = null;
+        rl ? l == 0 && (r = Si(t, l)) : l > 0 && (r = Si(t, l)), ot.splice(l, 0, r), fl.splice(l, 0, 0), ul.splice(l, 0, 0);
+      }
+      Ve("addSeries", l);
+    }
+    function bs(t, l) {
+      l = l ?? k.length, t = s == 1 ? li(t, l, ko, Ao) : li(t, l, {}, Mo), k.splice(l, 0, t), _i(k[l], l);
+    }
+    n.addSeries = bs;
+    function Ms(t) {
+      if (k.splice(t, 1), be) {
+        J.values.splice(t, 1), St.splice(t, 1);
+        let l = ye.splice(t, 1)[0];
+        nl(null, l.firstChild), l.remove();
+      }
+      He && (fe.splice(t, 1), ot.splice(t, 1)[0].remove(), fl.splice(t, 1), ul.splice(t, 1)), Ve("delSeries", t);
+    }
+    n.delSeries = Ms;
+    let Ut = [false, false, false, false];
+    function As(t, l) {
+      if (t._show = t.show, t.show) {
+        let r = t.side % 2, f = x[t.scale];
+        f == null && (t.scale = r ? k[1].scale : P, f = x[t.scale]);
+        let c = f.time;
+        t.size = X(t.size), t.space = X(t.space), t.rotate = X(t.rotate), Ot(t.incrs) && t.incrs.forEach((S) => {
+          !Ht.has(S) && Ht.set(S, Io(S));
+        }), t.incrs = X(t.incrs || (f.distr == 2 ? jr : c ? G == 1 ? $r : Qr : Jt)), t.splits = X(t.splits || (c && f.distr == 1 ? Ue : f.distr == 3 ? Qn : f.distr == 4 ? wf : df)), t.stroke = X(t.stroke), t.grid.stroke = X(t.grid.stroke), t.ticks.stroke = X(t.ticks.stroke), t.border.stroke = X(t.border.stroke);
+        let p = t.values;
+        t.values = Ot(p) && !Ot(p[0]) ? X(p) : c ? Ot(p) ? So(ee, wo(p, z)) : po(p) ? tf(ee, p) : p || we : p || gf, t.filter = X(t.filter || (f.distr >= 3 && f.log == 10 ? yf : f.distr == 3 && f.log == 2 ? vf : Wo)), t.font = Vo(t.font), t.labelFont = Vo(t.labelFont), t._size = t.size(n, null, l, 0), t._space = t._rotate = t._incrs = t._found = t._splits = t._values = null, t._size > 0 && (Ut[l] = true, t._el = ft(nr, w));
       }
     }
-    function initSeries(s, i) {
-      if (mode2 == 1 || i > 0) {
-        let isTime = mode2 == 1 && scales[s.scale].time;
-        let sv = s.value;
-        s.value = isTime ? isStr(sv) ? timeSeriesVal(_tzDate, timeSeriesStamp(sv, _fmtDate)) : sv || _timeSeriesVal : sv || numSeriesVal;
-        s.label = s.label || (isTime ? timeSeriesLabel : numSeriesLabel);
-      }
-      if (cursorOnePt || i > 0) {
-        s.width = s.width == null ? 1 : s.width;
-        s.paths = s.paths || linearPath || retNull;
-        s.fillTo = fnOrSelf(s.fillTo || seriesFillTo);
-        s.pxAlign = +ifNull(s.pxAlign, pxAlign);
-        s.pxRound = pxRoundGen(s.pxAlign);
-        s.stroke = fnOrSelf(s.stroke || null);
-        s.fill = fnOrSelf(s.fill || null);
-        s._stroke = s._fill = s._paths = s._focus = null;
-        let _ptDia = ptDia(max(1, s.width), 1);
-        let points3 = s.points = assign({}, {
-          size: _ptDia,
-          width: max(1, _ptDia * 0.2),
-          stroke: s.stroke,
-          space: _ptDia * 2,
-          paths: pointsPath,
-          _stroke: null,
-          _fill: null
-        }, s.points);
-        points3.show = fnOrSelf(points3.show);
-        points3.filter = fnOrSelf(points3.filter);
-        points3.fill = fnOrSelf(points3.fill);
-        points3.stroke = fnOrSelf(points3.stroke);
-        points3.paths = fnOrSelf(points3.paths);
-        points3.pxAlign = s.pxAlign;
-      }
-      if (showLegend) {
-        let rowCells = initLegendRow(s, i);
-        legendRows.splice(i, 0, rowCells[0]);
-        legendCells.splice(i, 0, rowCells[1]);
-        legend.values.push(null);
-      }
-      if (showCursor) {
-        activeIdxs.splice(i, 0, null);
-        let pt = null;
-        if (cursorOnePt) {
-          if (i == 0)
-            pt = initCursorPt(s, i);
-        } else if (i > 0)
-          pt = initCursorPt(s, i);
-        cursorPts.splice(i, 0, pt);
-        cursorPtsLft.splice(i, 0, 0);
-        cursorPtsTop.splice(i, 0, 0);
-      }
-      fire("addSeries", i);
+    function Ll(t, l, r, f) {
+      let [c, p, S, _] = r, v = l % 2, b = 0;
+      return v == 0 && (_ || p) && (b = l == 0 && !c || l == 2 && !S ? Ae(vo.size / 3) : 0), v == 1 && (c || S) && (b = l == 1 && !p || l == 3 && !_ ? Ae(To.size / 2) : 0), b;
     }
-    function addSeries(opts2, si) {
-      si = si == null ? series.length : si;
-      opts2 = mode2 == 1 ? setDefault(opts2, si, xSeriesOpts, ySeriesOpts) : setDefault(opts2, si, {}, xySeriesOpts);
-      series.splice(si, 0, opts2);
-      initSeries(series[si], si);
-    }
-    self.addSeries = addSeries;
-    function delSeries(i) {
-      series.splice(i, 1);
-      if (showLegend) {
-        legend.values.splice(i, 1);
-        legendCells.splice(i, 1);
-        let tr = legendRows.splice(i, 1)[0];
-        offMouse(null, tr.firstChild);
-        tr.remove();
-      }
-      if (showCursor) {
-        activeIdxs.splice(i, 1);
-        cursorPts.splice(i, 1)[0].remove();
-        cursorPtsLft.splice(i, 1);
-        cursorPtsTop.splice(i, 1);
-      }
-      fire("delSeries", i);
-    }
-    self.delSeries = delSeries;
-    const sidesWithAxes = [false, false, false, false];
-    function initAxis(axis, i) {
-      axis._show = axis.show;
-      if (axis.show) {
-        let isVt = axis.side % 2;
-        let sc = scales[axis.scale];
-        if (sc == null) {
-          axis.scale = isVt ? series[1].scale : xScaleKey;
-          sc = scales[axis.scale];
-        }
-        let isTime = sc.time;
-        axis.size = fnOrSelf(axis.size);
-        axis.space = fnOrSelf(axis.space);
-        axis.rotate = fnOrSelf(axis.rotate);
-        if (isArr(axis.incrs)) {
-          axis.incrs.forEach((incr) => {
-            !fixedDec.has(incr) && fixedDec.set(incr, guessDec(incr));
-          });
-        }
-        axis.incrs = fnOrSelf(axis.incrs || (sc.distr == 2 ? wholeIncrs : isTime ? ms == 1 ? timeIncrsMs : timeIncrsS : numIncrs));
-        axis.splits = fnOrSelf(axis.splits || (isTime && sc.distr == 1 ? _timeAxisSplits : sc.distr == 3 ? logAxisSplits : sc.distr == 4 ? asinhAxisSplits : numAxisSplits));
-        axis.stroke = fnOrSelf(axis.stroke);
-        axis.grid.stroke = fnOrSelf(axis.grid.stroke);
-        axis.ticks.stroke = fnOrSelf(axis.ticks.stroke);
-        axis.border.stroke = fnOrSelf(axis.border.stroke);
-        let av = axis.values;
-        axis.values = // static array of tick values
-        isArr(av) && !isArr(av[0]) ? fnOrSelf(av) : (
-          // temporal
-          isTime ? (
-            // config array of fmtDate string tpls
-            isArr(av) ? timeAxisVals(_tzDate, timeAxisStamps(av, _fmtDate)) : (
-              // fmtDate string tpl
-              isStr(av) ? timeAxisVal(_tzDate, av) : av || _timeAxisVals
-            )
-          ) : av || numAxisVals
-        );
-        axis.filter = fnOrSelf(axis.filter || (sc.distr >= 3 && sc.log == 10 ? log10AxisValsFilt : sc.distr == 3 && sc.log == 2 ? log2AxisValsFilt : retArg1));
-        axis.font = pxRatioFont(axis.font);
-        axis.labelFont = pxRatioFont(axis.labelFont);
-        axis._size = axis.size(self, null, i, 0);
-        axis._space = axis._rotate = axis._incrs = axis._found = // foundIncrSpace
-        axis._splits = axis._values = null;
-        if (axis._size > 0) {
-          sidesWithAxes[i] = true;
-          axis._el = placeDiv(AXIS, wrap);
-        }
-      }
-    }
-    function autoPadSide(self2, side, sidesWithAxes2, cycleNum) {
-      let [hasTopAxis, hasRgtAxis, hasBtmAxis, hasLftAxis] = sidesWithAxes2;
-      let ori = side % 2;
-      let size = 0;
-      if (ori == 0 && (hasLftAxis || hasRgtAxis))
-        size = side == 0 && !hasTopAxis || side == 2 && !hasBtmAxis ? round(xAxisOpts.size / 3) : 0;
-      if (ori == 1 && (hasTopAxis || hasBtmAxis))
-        size = side == 1 && !hasRgtAxis || side == 3 && !hasLftAxis ? round(yAxisOpts.size / 2) : 0;
-      return size;
-    }
-    const padding = self.padding = (opts.padding || [autoPadSide, autoPadSide, autoPadSide, autoPadSide]).map((p) => fnOrSelf(ifNull(p, autoPadSide)));
-    const _padding = self._padding = padding.map((p, i) => p(self, i, sidesWithAxes, 0));
-    let dataLen;
-    let i0 = null;
-    let i1 = null;
-    const idxs = mode2 == 1 ? series[0].idxs : null;
-    let data0 = null;
-    let viaAutoScaleX = false;
-    function setData(_data, _resetScales) {
-      data = _data == null ? [] : _data;
-      self.data = self._data = data;
-      if (mode2 == 2) {
-        dataLen = 0;
-        for (let i = 1; i < series.length; i++)
-          dataLen += data[i][0].length;
+    let yi = n.padding = (e.padding || [Ll, Ll, Ll, Ll]).map((t) => X(ne(t, Ll))), Ct = n._padding = yi.map((t, l) => t(n, l, Ut, 0)), ze, Pe = null, De = null, ql = s == 1 ? k[0].idxs : null, pt = null, Cl = false;
+    function vi(t, l) {
+      if (i = t ?? [], n.data = n._data = i, s == 2) {
+        ze = 0;
+        for (let r = 1; r < k.length; r++) ze += i[r][0].length;
       } else {
-        if (data.length == 0)
-          self.data = self._data = data = [[]];
-        data0 = data[0];
-        dataLen = data0.length;
-        let scaleData = data;
-        if (xScaleDistr == 2) {
-          scaleData = data.slice();
-          let _data0 = scaleData[0] = Array(dataLen);
-          for (let i = 0; i < dataLen; i++)
-            _data0[i] = i;
+        i.length == 0 && (n.data = n._data = i = [[]]), pt = i[0], ze = pt.length;
+        let r = i;
+        if (j == 2) {
+          r = i.slice();
+          let f = r[0] = Array(ze);
+          for (let c = 0; c < ze; c++) f[c] = c;
         }
-        self._data = data = scaleData;
+        n._data = i = r;
       }
-      resetYSeries(true);
-      fire("setData");
-      if (xScaleDistr == 2) {
-        shouldConvergeSize = true;
-      }
-      if (_resetScales !== false) {
-        let xsc = scaleX;
-        if (xsc.auto(self, viaAutoScaleX))
-          autoScaleX();
-        else
-          _setScale(xScaleKey, xsc.min, xsc.max);
-        shouldSetCursor = shouldSetCursor || cursor.left >= 0;
-        shouldSetLegend = true;
-        commit();
+      if (al(true), Ve("setData"), j == 2 && (ol = true), l !== false) {
+        let r = T;
+        r.auto(n, Cl) ? _n() : Rt(P, r.min, r.max), Yt = Yt || V.left >= 0, it = true, pl();
       }
     }
-    self.setData = setData;
-    function autoScaleX() {
-      viaAutoScaleX = true;
-      let _min, _max;
-      if (mode2 == 1) {
-        if (dataLen > 0) {
-          i0 = idxs[0] = 0;
-          i1 = idxs[1] = dataLen - 1;
-          _min = data[0][i0];
-          _max = data[0][i1];
-          if (xScaleDistr == 2) {
-            _min = i0;
-            _max = i1;
-          } else if (_min == _max) {
-            if (xScaleDistr == 3)
-              [_min, _max] = rangeLog(_min, _min, scaleX.log, false);
-            else if (xScaleDistr == 4)
-              [_min, _max] = rangeAsinh(_min, _min, scaleX.log, false);
-            else if (scaleX.time)
-              _max = _min + round(86400 / ms);
-            else
-              [_min, _max] = rangeNum(_min, _max, rangePad, true);
-          }
-        } else {
-          i0 = idxs[0] = _min = null;
-          i1 = idxs[1] = _max = null;
-        }
-      }
-      _setScale(xScaleKey, _min, _max);
+    n.setData = vi;
+    function _n() {
+      Cl = true;
+      let t, l;
+      s == 1 && (ze > 0 ? (Pe = ql[0] = 0, De = ql[1] = ze - 1, t = i[0][Pe], l = i[0][De], j == 2 ? (t = Pe, l = De) : t == l && (j == 3 ? [t, l] = cn(t, t, T.log, false) : j == 4 ? [t, l] = si(t, t, T.log, false) : T.time ? l = t + Ae(86400 / G) : [t, l] = rn(t, l, ri, true))) : (Pe = ql[0] = t = null, De = ql[1] = l = null)), Rt(P, t, l);
     }
-    let ctxStroke, ctxFill, ctxWidth, ctxDash, ctxJoin, ctxCap, ctxFont, ctxAlign, ctxBaseline;
-    let ctxAlpha;
-    function setCtxStyle(stroke, width, dash, cap, fill, join2) {
-      stroke ??= transparent;
-      dash ??= EMPTY_ARR;
-      cap ??= "butt";
-      fill ??= transparent;
-      join2 ??= "round";
-      if (stroke != ctxStroke)
-        ctx.strokeStyle = ctxStroke = stroke;
-      if (fill != ctxFill)
-        ctx.fillStyle = ctxFill = fill;
-      if (width != ctxWidth)
-        ctx.lineWidth = ctxWidth = width;
-      if (join2 != ctxJoin)
-        ctx.lineJoin = ctxJoin = join2;
-      if (cap != ctxCap)
-        ctx.lineCap = ctxCap = cap;
-      if (dash != ctxDash)
-        ctx.setLineDash(ctxDash = dash);
+    let $l, cl, yn, vn, kn, xn, Tn, bn, Mn, je;
+    function ki(t, l, r, f, c, p) {
+      t ??= $i, r ??= ui, f ??= "butt", c ??= $i, p ??= "round", t != $l && (d.strokeStyle = $l = t), c != cl && (d.fillStyle = cl = c), l != yn && (d.lineWidth = yn = l), p != kn && (d.lineJoin = kn = p), f != xn && (d.lineCap = xn = f), r != vn && d.setLineDash(vn = r);
     }
-    function setFontStyle(font2, fill, align, baseline) {
-      if (fill != ctxFill)
-        ctx.fillStyle = ctxFill = fill;
-      if (font2 != ctxFont)
-        ctx.font = ctxFont = font2;
-      if (align != ctxAlign)
-        ctx.textAlign = ctxAlign = align;
-      if (baseline != ctxBaseline)
-        ctx.textBaseline = ctxBaseline = baseline;
+    function xi(t, l, r, f) {
+      l != cl && (d.fillStyle = cl = l), t != Tn && (d.font = Tn = t), r != bn && (d.textAlign = bn = r), f != Mn && (d.textBaseline = Mn = f);
     }
-    function accScale(wsc, psc, facet2, data2, sorted = 0) {
-      if (data2.length > 0 && wsc.auto(self, viaAutoScaleX) && (psc == null || psc.min == null)) {
-        let _i0 = ifNull(i0, 0);
-        let _i1 = ifNull(i1, data2.length - 1);
-        let minMax = facet2.min == null ? getMinMax(data2, _i0, _i1, sorted, wsc.distr == 3) : [facet2.min, facet2.max];
-        wsc.min = min(wsc.min, facet2.min = minMax[0]);
-        wsc.max = max(wsc.max, facet2.max = minMax[1]);
+    function An(t, l, r, f, c = 0) {
+      if (f.length > 0 && t.auto(n, Cl) && (l == null || l.min == null)) {
+        let p = ne(Pe, 0), S = ne(De, f.length - 1), _ = r.min == null ? _r(f, p, S, c, t.distr == 3) : [r.min, r.max];
+        t.min = wt(t.min, r.min = _[0]), t.max = Ye(t.max, r.max = _[1]);
       }
     }
-    const AUTOSCALE = { min: null, max: null };
-    function setScales() {
-      for (let k in scales) {
-        let sc = scales[k];
-        if (pendScales[k] == null && // scales that have never been set (on init)
-        (sc.min == null || // or auto scales when the x scale was explicitly set
-        pendScales[xScaleKey] != null && sc.auto(self, viaAutoScaleX))) {
-          pendScales[k] = AUTOSCALE;
+    let Ti = { min: null, max: null };
+    function Es() {
+      for (let f in x) {
+        let c = x[f];
+        F[f] == null && (c.min == null || F[P] != null && c.auto(n, Cl)) && (F[f] = Ti);
+      }
+      for (let f in x) {
+        let c = x[f];
+        F[f] == null && c.from != null && F[c.from] != null && (F[f] = Ti);
+      }
+      F[P] != null && al(true);
+      let t = {};
+      for (let f in F) {
+        let c = F[f];
+        if (c != null) {
+          let p = t[f] = bl(x[f], Er);
+          if (c.min != null) Te(p, c);
+          else if (f != P || s == 2) if (ze == 0 && p.from == null) {
+            let S = p.range(n, null, null, f);
+            p.min = S[0], p.max = S[1];
+          } else p.min = ce, p.max = -ce;
         }
       }
-      for (let k in scales) {
-        let sc = scales[k];
-        if (pendScales[k] == null && sc.from != null && pendScales[sc.from] != null)
-          pendScales[k] = AUTOSCALE;
-      }
-      if (pendScales[xScaleKey] != null)
-        resetYSeries(true);
-      let wipScales = {};
-      for (let k in pendScales) {
-        let psc = pendScales[k];
-        if (psc != null) {
-          let wsc = wipScales[k] = copy2(scales[k], fastIsObj);
-          if (psc.min != null)
-            assign(wsc, psc);
-          else if (k != xScaleKey || mode2 == 2) {
-            if (dataLen == 0 && wsc.from == null) {
-              let minMax = wsc.range(self, null, null, k);
-              wsc.min = minMax[0];
-              wsc.max = minMax[1];
-            } else {
-              wsc.min = inf;
-              wsc.max = -inf;
-            }
-          }
-        }
-      }
-      if (dataLen > 0) {
-        series.forEach((s, i) => {
-          if (mode2 == 1) {
-            let k = s.scale;
-            let psc = pendScales[k];
-            if (psc == null)
-              return;
-            let wsc = wipScales[k];
-            if (i == 0) {
-              let minMax = wsc.range(self, wsc.min, wsc.max, k);
-              wsc.min = minMax[0];
-              wsc.max = minMax[1];
-              i0 = closestIdx(wsc.min, data[0]);
-              i1 = closestIdx(wsc.max, data[0]);
-              if (i1 - i0 > 1) {
-                if (data[0][i0] < wsc.min)
-                  i0++;
-                if (data[0][i1] > wsc.max)
-                  i1--;
-              }
-              s.min = data0[i0];
-              s.max = data0[i1];
-            } else if (s.show && s.auto)
-              accScale(wsc, psc, s, data[i], s.sorted);
-            s.idxs[0] = i0;
-            s.idxs[1] = i1;
-          } else {
-            if (i > 0) {
-              if (s.show && s.auto) {
-                let [xFacet, yFacet] = s.facets;
-                let xScaleKey2 = xFacet.scale;
-                let yScaleKey = yFacet.scale;
-                let [xData, yData] = data[i];
-                let wscx = wipScales[xScaleKey2];
-                let wscy = wipScales[yScaleKey];
-                wscx != null && accScale(wscx, pendScales[xScaleKey2], xFacet, xData, xFacet.sorted);
-                wscy != null && accScale(wscy, pendScales[yScaleKey], yFacet, yData, yFacet.sorted);
-                s.min = yFacet.min;
-                s.max = yFacet.max;
-              }
-            }
+      if (ze > 0) {
+        k.forEach((f, c) => {
+          if (s == 1) {
+            let p = f.scale, S = F[p];
+            if (S == null) return;
+            let _ = t[p];
+            if (c == 0) {
+              let v = _.range(n, _.min, _.max, p);
+              _.min = v[0], _.max = v[1], Pe = dt(_.min, i[0]), De = dt(_.max, i[0]), De - Pe > 1 && (i[0][Pe] < _.min && Pe++, i[0][De] > _.max && De--), f.min = pt[Pe], f.max = pt[De];
+            } else f.show && f.auto && An(_, S, f, i[c], f.sorted);
+            f.idxs[0] = Pe, f.idxs[1] = De;
+          } else if (c > 0 && f.show && f.auto) {
+            let [p, S] = f.facets, _ = p.scale, v = S.scale, [b, M] = i[c], E = t[_], Y = t[v];
+            E != null && An(E, F[_], p, b, p.sorted), Y != null && An(Y, F[v], S, M, S.sorted), f.min = S.min, f.max = S.max;
           }
         });
-        for (let k in wipScales) {
-          let wsc = wipScales[k];
-          let psc = pendScales[k];
-          if (wsc.from == null && (psc == null || psc.min == null)) {
-            let minMax = wsc.range(
-              self,
-              wsc.min == inf ? null : wsc.min,
-              wsc.max == -inf ? null : wsc.max,
-              k
-            );
-            wsc.min = minMax[0];
-            wsc.max = minMax[1];
+        for (let f in t) {
+          let c = t[f], p = F[f];
+          if (c.from == null && (p == null || p.min == null)) {
+            let S = c.range(n, c.min == ce ? null : c.min, c.max == -ce ? null : c.max, f);
+            c.min = S[0], c.max = S[1];
           }
         }
       }
-      for (let k in wipScales) {
-        let wsc = wipScales[k];
-        if (wsc.from != null) {
-          let base = wipScales[wsc.from];
-          if (base.min == null)
-            wsc.min = wsc.max = null;
+      for (let f in t) {
+        let c = t[f];
+        if (c.from != null) {
+          let p = t[c.from];
+          if (p.min == null) c.min = c.max = null;
           else {
-            let minMax = wsc.range(self, base.min, base.max, k);
-            wsc.min = minMax[0];
-            wsc.max = minMax[1];
+            let S = c.range(n, p.min, p.max, f);
+            c.min = S[0], c.max = S[1];
           }
         }
       }
-      let changed = {};
-      let anyChanged = false;
-      for (let k in wipScales) {
-        let wsc = wipScales[k];
-        let sc = scales[k];
-        if (sc.min != wsc.min || sc.max != wsc.max) {
-          sc.min = wsc.min;
-          sc.max = wsc.max;
-          let distr = sc.distr;
-          sc._min = distr == 3 ? log10(sc.min) : distr == 4 ? asinh(sc.min, sc.asinh) : distr == 100 ? sc.fwd(sc.min) : sc.min;
-          sc._max = distr == 3 ? log10(sc.max) : distr == 4 ? asinh(sc.max, sc.asinh) : distr == 100 ? sc.fwd(sc.max) : sc.max;
-          changed[k] = anyChanged = true;
+      let l = {}, r = false;
+      for (let f in t) {
+        let c = t[f], p = x[f];
+        if (p.min != c.min || p.max != c.max) {
+          p.min = c.min, p.max = c.max;
+          let S = p.distr;
+          p._min = S == 3 ? Pt(p.min) : S == 4 ? Yn(p.min, p.asinh) : S == 100 ? p.fwd(p.min) : p.min, p._max = S == 3 ? Pt(p.max) : S == 4 ? Yn(p.max, p.asinh) : S == 100 ? p.fwd(p.max) : p.max, l[f] = r = true;
         }
       }
-      if (anyChanged) {
-        series.forEach((s, i) => {
-          if (mode2 == 2) {
-            if (i > 0 && changed.y)
-              s._paths = null;
-          } else {
-            if (changed[s.scale])
-              s._paths = null;
-          }
+      if (r) {
+        k.forEach((f, c) => {
+          s == 2 ? c > 0 && l.y && (f._paths = null) : l[f.scale] && (f._paths = null);
         });
-        for (let k in changed) {
-          shouldConvergeSize = true;
-          fire("setScale", k);
-        }
-        if (showCursor && cursor.left >= 0)
-          shouldSetCursor = shouldSetLegend = true;
+        for (let f in l) ol = true, Ve("setScale", f);
+        He && V.left >= 0 && (Yt = it = true);
       }
-      for (let k in pendScales)
-        pendScales[k] = null;
+      for (let f in F) F[f] = null;
     }
-    function getOuterIdxs(ydata) {
-      let _i0 = clamp(i0 - 1, 0, dataLen - 1);
-      let _i1 = clamp(i1 + 1, 0, dataLen - 1);
-      while (ydata[_i0] == null && _i0 > 0)
-        _i0--;
-      while (ydata[_i1] == null && _i1 < dataLen - 1)
-        _i1++;
-      return [_i0, _i1];
+    function Ps(t) {
+      let l = Zn(Pe - 1, 0, ze - 1), r = Zn(De + 1, 0, ze - 1);
+      for (; t[l] == null && l > 0; ) l--;
+      for (; t[r] == null && r < ze - 1; ) r++;
+      return [l, r];
     }
-    function drawSeries() {
-      if (dataLen > 0) {
-        let shouldAlpha = series.some((s) => s._focus) && ctxAlpha != focus.alpha;
-        if (shouldAlpha)
-          ctx.globalAlpha = ctxAlpha = focus.alpha;
-        series.forEach((s, i) => {
-          if (i > 0 && s.show) {
-            cacheStrokeFill(i, false);
-            cacheStrokeFill(i, true);
-            if (s._paths == null) {
-              let _ctxAlpha = ctxAlpha;
-              if (ctxAlpha != s.alpha)
-                ctx.globalAlpha = ctxAlpha = s.alpha;
-              let _idxs = mode2 == 2 ? [0, data[i][0].length - 1] : getOuterIdxs(data[i]);
-              s._paths = s.paths(self, i, _idxs[0], _idxs[1]);
-              if (ctxAlpha != _ctxAlpha)
-                ctx.globalAlpha = ctxAlpha = _ctxAlpha;
-            }
+    function Ds() {
+      if (ze > 0) {
+        let t = k.some((l) => l._focus) && je != yt.alpha;
+        t && (d.globalAlpha = je = yt.alpha), k.forEach((l, r) => {
+          if (r > 0 && l.show && (bi(r, false), bi(r, true), l._paths == null)) {
+            let f = je;
+            je != l.alpha && (d.globalAlpha = je = l.alpha);
+            let c = s == 2 ? [0, i[r][0].length - 1] : Ps(i[r]);
+            l._paths = l.paths(n, r, c[0], c[1]), je != f && (d.globalAlpha = je = f);
           }
-        });
-        series.forEach((s, i) => {
-          if (i > 0 && s.show) {
-            let _ctxAlpha = ctxAlpha;
-            if (ctxAlpha != s.alpha)
-              ctx.globalAlpha = ctxAlpha = s.alpha;
-            s._paths != null && drawPath(i, false);
+        }), k.forEach((l, r) => {
+          if (r > 0 && l.show) {
+            let f = je;
+            je != l.alpha && (d.globalAlpha = je = l.alpha), l._paths != null && Mi(r, false);
             {
-              let _gaps = s._paths != null ? s._paths.gaps : null;
-              let show = s.points.show(self, i, i0, i1, _gaps);
-              let idxs2 = s.points.filter(self, i, show, _gaps);
-              if (show || idxs2) {
-                s.points._paths = s.points.paths(self, i, i0, i1, idxs2);
-                drawPath(i, true);
-              }
+              let c = l._paths != null ? l._paths.gaps : null, p = l.points.show(n, r, Pe, De, c), S = l.points.filter(n, r, p, c);
+              (p || S) && (l.points._paths = l.points.paths(n, r, Pe, De, S), Mi(r, true));
             }
-            if (ctxAlpha != _ctxAlpha)
-              ctx.globalAlpha = ctxAlpha = _ctxAlpha;
-            fire("drawSeries", i);
+            je != f && (d.globalAlpha = je = f), Ve("drawSeries", r);
           }
-        });
-        if (shouldAlpha)
-          ctx.globalAlpha = ctxAlpha = 1;
+        }), t && (d.globalAlpha = je = 1);
       }
     }
-    function cacheStrokeFill(si, _points) {
-      let s = _points ? series[si].points : series[si];
-      s._stroke = s.stroke(self, si);
-      s._fill = s.fill(self, si);
+    function bi(t, l) {
+      let r = l ? k[t].points : k[t];
+      r._stroke = r.stroke(n, t), r._fill = r.fill(n, t);
     }
-    function drawPath(si, _points) {
-      let s = _points ? series[si].points : series[si];
-      let {
-        stroke,
-        fill,
-        clip: gapsClip,
-        flags,
-        _stroke: strokeStyle = s._stroke,
-        _fill: fillStyle = s._fill,
-        _width: width = s.width
-      } = s._paths;
-      width = roundDec(width * pxRatio, 3);
-      let boundsClip = null;
-      let offset = width % 2 / 2;
-      if (_points && fillStyle == null)
-        fillStyle = width > 0 ? "#fff" : strokeStyle;
-      let _pxAlign = s.pxAlign == 1 && offset > 0;
-      _pxAlign && ctx.translate(offset, offset);
-      if (!_points) {
-        let lft = plotLft - width / 2, top = plotTop - width / 2, wid = plotWid + width, hgt = plotHgt + width;
-        boundsClip = new Path2D();
-        boundsClip.rect(lft, top, wid, hgt);
+    function Mi(t, l) {
+      let r = l ? k[t].points : k[t], { stroke: f, fill: c, clip: p, flags: S, _stroke: _ = r._stroke, _fill: v = r._fill, _width: b = r.width } = r._paths;
+      b = ae(b * oe, 3);
+      let M = null, E = b % 2 / 2;
+      l && v == null && (v = b > 0 ? "#fff" : _);
+      let Y = r.pxAlign == 1 && E > 0;
+      if (Y && d.translate(E, E), !l) {
+        let ie = $e - b / 2, le = nt - b / 2, Z = Ke + b, W = at + b;
+        M = new Path2D(), M.rect(ie, le, Z, W);
       }
-      if (_points)
-        strokeFill(strokeStyle, width, s.dash, s.cap, fillStyle, stroke, fill, flags, gapsClip);
-      else
-        fillStroke(si, strokeStyle, width, s.dash, s.cap, fillStyle, stroke, fill, flags, boundsClip, gapsClip);
-      _pxAlign && ctx.translate(-offset, -offset);
+      l ? En(_, b, r.dash, r.cap, v, f, c, S, p) : Ls(t, _, b, r.dash, r.cap, v, f, c, S, M, p), Y && d.translate(-E, -E);
     }
-    function fillStroke(si, strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip) {
-      let didStrokeFill = false;
-      flags != 0 && bands.forEach((b, bi) => {
-        if (b.series[0] == si) {
-          let lowerEdge = series[b.series[1]];
-          let lowerData = data[b.series[1]];
-          let bandClip = (lowerEdge._paths || EMPTY_OBJ).band;
-          if (isArr(bandClip))
-            bandClip = b.dir == 1 ? bandClip[0] : bandClip[1];
-          let gapsClip2;
-          let _fillStyle = null;
-          if (lowerEdge.show && bandClip && hasData(lowerData, i0, i1)) {
-            _fillStyle = b.fill(self, bi) || fillStyle;
-            gapsClip2 = lowerEdge._paths.clip;
-          } else
-            bandClip = null;
-          strokeFill(strokeStyle, lineWidth, lineDash, lineCap, _fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip, gapsClip2, bandClip);
-          didStrokeFill = true;
+    function Ls(t, l, r, f, c, p, S, _, v, b, M) {
+      let E = false;
+      v != 0 && q.forEach((Y, ie) => {
+        if (Y.series[0] == t) {
+          let le = k[Y.series[1]], Z = i[Y.series[1]], W = (le._paths || Yl).band;
+          Ot(W) && (W = Y.dir == 1 ? W[0] : W[1]);
+          let R, ge = null;
+          le.show && W && vr(Z, Pe, De) ? (ge = Y.fill(n, ie) || p, R = le._paths.clip) : W = null, En(l, r, f, c, ge, S, _, v, b, M, R, W), E = true;
         }
-      });
-      if (!didStrokeFill)
-        strokeFill(strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip);
+      }), E || En(l, r, f, c, p, S, _, v, b, M);
     }
-    const CLIP_FILL_STROKE = BAND_CLIP_FILL | BAND_CLIP_STROKE;
-    function strokeFill(strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip, gapsClip2, bandClip) {
-      setCtxStyle(strokeStyle, lineWidth, lineDash, lineCap, fillStyle);
-      if (boundsClip || gapsClip || bandClip) {
-        ctx.save();
-        boundsClip && ctx.clip(boundsClip);
-        gapsClip && ctx.clip(gapsClip);
-      }
-      if (bandClip) {
-        if ((flags & CLIP_FILL_STROKE) == CLIP_FILL_STROKE) {
-          ctx.clip(bandClip);
-          gapsClip2 && ctx.clip(gapsClip2);
-          doFill(fillStyle, fillPath);
-          doStroke(strokeStyle, strokePath, lineWidth);
-        } else if (flags & BAND_CLIP_STROKE) {
-          doFill(fillStyle, fillPath);
-          ctx.clip(bandClip);
-          doStroke(strokeStyle, strokePath, lineWidth);
-        } else if (flags & BAND_CLIP_FILL) {
-          ctx.save();
-          ctx.clip(bandClip);
-          gapsClip2 && ctx.clip(gapsClip2);
-          doFill(fillStyle, fillPath);
-          ctx.restore();
-          doStroke(strokeStyle, strokePath, lineWidth);
-        }
-      } else {
-        doFill(fillStyle, fillPath);
-        doStroke(strokeStyle, strokePath, lineWidth);
-      }
-      if (boundsClip || gapsClip || bandClip)
-        ctx.restore();
+    let Ai = Ml | ei;
+    function En(t, l, r, f, c, p, S, _, v, b, M, E) {
+      ki(t, l, r, f, c), (v || b || E) && (d.save(), v && d.clip(v), b && d.clip(b)), E ? (_ & Ai) == Ai ? (d.clip(E), M && d.clip(M), Zl(c, S), Jl(t, p, l)) : _ & ei ? (Zl(c, S), d.clip(E), Jl(t, p, l)) : _ & Ml && (d.save(), d.clip(E), M && d.clip(M), Zl(c, S), d.restore(), Jl(t, p, l)) : (Zl(c, S), Jl(t, p, l)), (v || b || E) && d.restore();
     }
-    function doStroke(strokeStyle, strokePath, lineWidth) {
-      if (lineWidth > 0) {
-        if (strokePath instanceof Map) {
-          strokePath.forEach((strokePath2, strokeStyle2) => {
-            ctx.strokeStyle = ctxStroke = strokeStyle2;
-            ctx.stroke(strokePath2);
-          });
-        } else
-          strokePath != null && strokeStyle && ctx.stroke(strokePath);
-      }
+    function Jl(t, l, r) {
+      r > 0 && (l instanceof Map ? l.forEach((f, c) => {
+        d.strokeStyle = $l = c, d.stroke(f);
+      }) : l != null && t && d.stroke(l));
     }
-    function doFill(fillStyle, fillPath) {
-      if (fillPath instanceof Map) {
-        fillPath.forEach((fillPath2, fillStyle2) => {
-          ctx.fillStyle = ctxFill = fillStyle2;
-          ctx.fill(fillPath2);
-        });
-      } else
-        fillPath != null && fillStyle && ctx.fill(fillPath);
+    function Zl(t, l) {
+      l instanceof Map ? l.forEach((r, f) => {
+        d.fillStyle = cl = f, d.fill(r);
+      }) : l != null && t && d.fill(l);
     }
-    function getIncrSpace(axisIdx, min2, max2, fullDim) {
-      let axis = axes[axisIdx];
-      let incrSpace;
-      if (fullDim <= 0)
-        incrSpace = [0, 0];
+    function Cs(t, l, r, f) {
+      let c = H[t], p;
+      if (f <= 0) p = [0, 0];
       else {
-        let minSpace = axis._space = axis.space(self, axisIdx, min2, max2, fullDim);
-        let incrs = axis._incrs = axis.incrs(self, axisIdx, min2, max2, fullDim, minSpace);
-        incrSpace = findIncr(min2, max2, incrs, fullDim, minSpace);
+        let S = c._space = c.space(n, t, l, r, f), _ = c._incrs = c.incrs(n, t, l, r, f, S);
+        p = Yf(l, r, _, f, S);
       }
-      return axis._found = incrSpace;
+      return c._found = p;
     }
-    function drawOrthoLines(offs, filts, ori, side, pos0, len, width, stroke, dash, cap) {
-      let offset = width % 2 / 2;
-      pxAlign == 1 && ctx.translate(offset, offset);
-      setCtxStyle(stroke, width, dash, cap, stroke);
-      ctx.beginPath();
-      let x0, y0, x1, y1, pos1 = pos0 + (side == 0 || side == 3 ? -len : len);
-      if (ori == 0) {
-        y0 = pos0;
-        y1 = pos1;
-      } else {
-        x0 = pos0;
-        x1 = pos1;
-      }
-      for (let i = 0; i < offs.length; i++) {
-        if (filts[i] != null) {
-          if (ori == 0)
-            x0 = x1 = offs[i];
-          else
-            y0 = y1 = offs[i];
-          ctx.moveTo(x0, y0);
-          ctx.lineTo(x1, y1);
-        }
-      }
-      ctx.stroke();
-      pxAlign == 1 && ctx.translate(-offset, -offset);
+    function Pn(t, l, r, f, c, p, S, _, v, b) {
+      let M = S % 2 / 2;
+      O == 1 && d.translate(M, M), ki(_, S, v, b, _), d.beginPath();
+      let E, Y, ie, le, Z = c + (f == 0 || f == 3 ? -p : p);
+      r == 0 ? (Y = c, le = Z) : (E = c, ie = Z);
+      for (let W = 0; W < t.length; W++) l[W] != null && (r == 0 ? E = ie = t[W] : Y = le = t[W], d.moveTo(E, Y), d.lineTo(ie, le));
+      d.stroke(), O == 1 && d.translate(-M, -M);
     }
-    function axesCalc(cycleNum) {
-      let converged = true;
-      axes.forEach((axis, i) => {
-        if (!axis.show)
+    function Vs(t) {
+      let l = true;
+      return H.forEach((r, f) => {
+        if (!r.show) return;
+        let c = x[r.scale];
+        if (c.min == null) {
+          r._show && (l = false, r._show = false, al(false));
           return;
-        let scale = scales[axis.scale];
-        if (scale.min == null) {
-          if (axis._show) {
-            converged = false;
-            axis._show = false;
-            resetYSeries(false);
-          }
-          return;
-        } else {
-          if (!axis._show) {
-            converged = false;
-            axis._show = true;
-            resetYSeries(false);
-          }
-        }
-        let side = axis.side;
-        let ori = side % 2;
-        let { min: min2, max: max2 } = scale;
-        let [_incr, _space] = getIncrSpace(i, min2, max2, ori == 0 ? plotWidCss : plotHgtCss);
-        if (_space == 0)
-          return;
-        let forceMin = scale.distr == 2;
-        let _splits = axis._splits = axis.splits(self, i, min2, max2, _incr, _space, forceMin);
-        let splits = scale.distr == 2 ? _splits.map((i2) => data0[i2]) : _splits;
-        let incr = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
-        let values = axis._values = axis.values(self, axis.filter(self, splits, i, _space, incr), i, _space, incr);
-        axis._rotate = side == 2 ? axis.rotate(self, values, i, _space) : 0;
-        let oldSize = axis._size;
-        axis._size = ceil(axis.size(self, values, i, cycleNum));
-        if (oldSize != null && axis._size != oldSize)
-          converged = false;
-      });
-      return converged;
+        } else r._show || (l = false, r._show = true, al(false));
+        let p = r.side, S = p % 2, { min: _, max: v } = c, [b, M] = Cs(f, _, v, S == 0 ? K : A);
+        if (M == 0) return;
+        let E = c.distr == 2, Y = r._splits = r.splits(n, f, _, v, b, M, E), ie = c.distr == 2 ? Y.map((R) => pt[R]) : Y, le = c.distr == 2 ? pt[Y[1]] - pt[Y[0]] : b, Z = r._values = r.values(n, r.filter(n, ie, f, M, le), f, M, le);
+        r._rotate = p == 2 ? r.rotate(n, Z, f, M) : 0;
+        let W = r._size;
+        r._size = ut(r.size(n, Z, f, t)), W != null && r._size != W && (l = false);
+      }), l;
     }
-    function paddingCalc(cycleNum) {
-      let converged = true;
-      padding.forEach((p, i) => {
-        let _p = p(self, i, sidesWithAxes, cycleNum);
-        if (_p != _padding[i])
-          converged = false;
-        _padding[i] = _p;
-      });
-      return converged;
+    function Rs(t) {
+      let l = true;
+      return yi.forEach((r, f) => {
+        let c = r(n, f, Ut, t);
+        c != Ct[f] && (l = false), Ct[f] = c;
+      }), l;
     }
-    function drawAxesGrid() {
-      for (let i = 0; i < axes.length; i++) {
-        let axis = axes[i];
-        if (!axis.show || !axis._show)
-          continue;
-        let side = axis.side;
-        let ori = side % 2;
-        let x, y;
-        let fillStyle = axis.stroke(self, i);
-        let shiftDir = side == 0 || side == 3 ? -1 : 1;
-        let [_incr, _space] = axis._found;
-        if (axis.label != null) {
-          let shiftAmt2 = axis.labelGap * shiftDir;
-          let baseLpos = round((axis._lpos + shiftAmt2) * pxRatio);
-          setFontStyle(axis.labelFont[0], fillStyle, "center", side == 2 ? TOP : BOTTOM);
-          ctx.save();
-          if (ori == 1) {
-            x = y = 0;
-            ctx.translate(
-              baseLpos,
-              round(plotTop + plotHgt / 2)
-            );
-            ctx.rotate((side == 3 ? -PI : PI) / 2);
-          } else {
-            x = round(plotLft + plotWid / 2);
-            y = baseLpos;
-          }
-          let _label = isFn(axis.label) ? axis.label(self, i, _incr, _space) : axis.label;
-          ctx.fillText(_label, x, y);
-          ctx.restore();
+    function zs() {
+      for (let t = 0; t < H.length; t++) {
+        let l = H[t];
+        if (!l.show || !l._show) continue;
+        let r = l.side, f = r % 2, c, p, S = l.stroke(n, t), _ = r == 0 || r == 3 ? -1 : 1, [v, b] = l._found;
+        if (l.label != null) {
+          let Ge = l.labelGap * _, Qe = Ae((l._lpos + Ge) * oe);
+          xi(l.labelFont[0], S, "center", r == 2 ? "top" : qi), d.save(), f == 1 ? (c = p = 0, d.translate(Qe, Ae(nt + at / 2)), d.rotate((r == 3 ? -on : on) / 2)) : (c = Ae($e + Ke / 2), p = Qe);
+          let qt = Ho(l.label) ? l.label(n, t, v, b) : l.label;
+          d.fillText(qt, c, p), d.restore();
         }
-        if (_space == 0)
-          continue;
-        let scale = scales[axis.scale];
-        let plotDim = ori == 0 ? plotWid : plotHgt;
-        let plotOff = ori == 0 ? plotLft : plotTop;
-        let _splits = axis._splits;
-        let splits = scale.distr == 2 ? _splits.map((i2) => data0[i2]) : _splits;
-        let incr = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
-        let ticks2 = axis.ticks;
-        let border2 = axis.border;
-        let _tickSize = ticks2.show ? ticks2.size : 0;
-        let tickSize = round(_tickSize * pxRatio);
-        let axisGap = round((axis.alignTo == 2 ? axis._size - _tickSize - axis.gap : axis.gap) * pxRatio);
-        let angle = axis._rotate * -PI / 180;
-        let basePos = pxRound(axis._pos * pxRatio);
-        let shiftAmt = (tickSize + axisGap) * shiftDir;
-        let finalPos = basePos + shiftAmt;
-        y = ori == 0 ? finalPos : 0;
-        x = ori == 1 ? finalPos : 0;
-        let font2 = axis.font[0];
-        let textAlign = axis.align == 1 ? LEFT : axis.align == 2 ? RIGHT : angle > 0 ? LEFT : angle < 0 ? RIGHT : ori == 0 ? "center" : side == 3 ? RIGHT : LEFT;
-        let textBaseline = angle || ori == 1 ? "middle" : side == 2 ? TOP : BOTTOM;
-        setFontStyle(font2, fillStyle, textAlign, textBaseline);
-        let lineHeight = axis.font[1] * axis.lineGap;
-        let canOffs = _splits.map((val) => pxRound(getPos(val, scale, plotDim, plotOff)));
-        let _values = axis._values;
-        for (let i2 = 0; i2 < _values.length; i2++) {
-          let val = _values[i2];
-          if (val != null) {
-            if (ori == 0)
-              x = canOffs[i2];
-            else
-              y = canOffs[i2];
-            val = "" + val;
-            let _parts = val.indexOf("\n") == -1 ? [val] : val.split(/\n/gm);
-            for (let j = 0; j < _parts.length; j++) {
-              let text2 = _parts[j];
-              if (angle) {
-                ctx.save();
-                ctx.translate(x, y + j * lineHeight);
-                ctx.rotate(angle);
-                ctx.fillText(text2, 0, 0);
-                ctx.restore();
-              } else
-                ctx.fillText(text2, x, y + j * lineHeight);
+        if (b == 0) continue;
+        let M = x[l.scale], E = f == 0 ? Ke : at, Y = f == 0 ? $e : nt, ie = l._splits, le = M.distr == 2 ? ie.map((Ge) => pt[Ge]) : ie, Z = M.distr == 2 ? pt[ie[1]] - pt[ie[0]] : v, W = l.ticks, R = l.border, ge = W.show ? W.size : 0, ve = Ae(ge * oe), Re = Ae((l.alignTo == 2 ? l._size - ge - l.gap : l.gap) * oe), ue = l._rotate * -on / 180, ke = N(l._pos * oe), Je = (ve + Re) * _, We = ke + Je;
+        p = f == 0 ? We : 0, c = f == 1 ? We : 0;
+        let st = l.font[0], ht = l.align == 1 ? yl : l.align == 2 ? Wn : ue > 0 ? yl : ue < 0 ? Wn : f == 0 ? "center" : r == 3 ? Wn : yl, xt = ue || f == 1 ? "middle" : r == 2 ? "top" : qi;
+        xi(st, S, ht, xt);
+        let Ze = l.font[1] * l.lineGap, rt = ie.map((Ge) => N(h(Ge, M, E, Y))), mt = l._values;
+        for (let Ge = 0; Ge < mt.length; Ge++) {
+          let Qe = mt[Ge];
+          if (Qe != null) {
+            f == 0 ? c = rt[Ge] : p = rt[Ge], Qe = "" + Qe;
+            let qt = Qe.indexOf(`
+`) == -1 ? [Qe] : Qe.split(/\n/gm);
+            for (let Ie = 0; Ie < qt.length; Ie++) {
+              let Ki = qt[Ie];
+              ue ? (d.save(), d.translate(c, p + Ie * Ze), d.rotate(ue), d.fillText(Ki, 0, 0), d.restore()) : d.fillText(Ki, c, p + Ie * Ze);
             }
           }
         }
-        if (ticks2.show) {
-          drawOrthoLines(
-            canOffs,
-            ticks2.filter(self, splits, i, _space, incr),
-            ori,
-            side,
-            basePos,
-            tickSize,
-            roundDec(ticks2.width * pxRatio, 3),
-            ticks2.stroke(self, i),
-            ticks2.dash,
-            ticks2.cap
-          );
-        }
-        let grid2 = axis.grid;
-        if (grid2.show) {
-          drawOrthoLines(
-            canOffs,
-            grid2.filter(self, splits, i, _space, incr),
-            ori,
-            ori == 0 ? 2 : 1,
-            ori == 0 ? plotTop : plotLft,
-            ori == 0 ? plotHgt : plotWid,
-            roundDec(grid2.width * pxRatio, 3),
-            grid2.stroke(self, i),
-            grid2.dash,
-            grid2.cap
-          );
-        }
-        if (border2.show) {
-          drawOrthoLines(
-            [basePos],
-            [1],
-            ori == 0 ? 1 : 0,
-            ori == 0 ? 1 : 2,
-            ori == 1 ? plotTop : plotLft,
-            ori == 1 ? plotHgt : plotWid,
-            roundDec(border2.width * pxRatio, 3),
-            border2.stroke(self, i),
-            border2.dash,
-            border2.cap
-          );
-        }
+        W.show && Pn(rt, W.filter(n, le, t, b, Z), f, r, ke, ve, ae(W.width * oe, 3), W.stroke(n, t), W.dash, W.cap);
+        let Tt = l.grid;
+        Tt.show && Pn(rt, Tt.filter(n, le, t, b, Z), f, f == 0 ? 2 : 1, f == 0 ? nt : $e, f == 0 ? at : Ke, ae(Tt.width * oe, 3), Tt.stroke(n, t), Tt.dash, Tt.cap), R.show && Pn([ke], [1], f == 0 ? 1 : 0, f == 0 ? 1 : 2, f == 1 ? nt : $e, f == 1 ? at : Ke, ae(R.width * oe, 3), R.stroke(n, t), R.dash, R.cap);
       }
-      fire("drawAxes");
+      Ve("drawAxes");
     }
-    function resetYSeries(minMax) {
-      series.forEach((s, i) => {
-        if (i > 0) {
-          s._paths = null;
-          if (minMax) {
-            if (mode2 == 1) {
-              s.min = null;
-              s.max = null;
-            } else {
-              s.facets.forEach((f) => {
-                f.min = null;
-                f.max = null;
-              });
-            }
-          }
-        }
+    function al(t) {
+      k.forEach((l, r) => {
+        r > 0 && (l._paths = null, t && (s == 1 ? (l.min = null, l.max = null) : l.facets.forEach((f) => {
+          f.min = null, f.max = null;
+        })));
       });
     }
-    let queuedCommit = false;
-    let deferHooks = false;
-    let hooksQueue = [];
-    function flushHooks() {
-      deferHooks = false;
-      for (let i = 0; i < hooksQueue.length; i++)
-        fire(...hooksQueue[i]);
-      hooksQueue.length = 0;
+    let Ql = false, Dn = false, Vl = [];
+    function Fs() {
+      Dn = false;
+      for (let t = 0; t < Vl.length; t++) Ve(...Vl[t]);
+      Vl.length = 0;
     }
-    function commit() {
-      if (!queuedCommit) {
-        microTask(_commit);
-        queuedCommit = true;
-      }
+    function pl() {
+      Ql || (zr(Ei), Ql = true);
     }
-    function batch(fn, _deferHooks = false) {
-      queuedCommit = true;
-      deferHooks = _deferHooks;
-      fn(self);
-      _commit();
-      if (_deferHooks && hooksQueue.length > 0)
-        queueMicrotask(flushHooks);
+    function Os(t, l = false) {
+      Ql = true, Dn = l, t(n), Ei(), l && Vl.length > 0 && queueMicrotask(Fs);
     }
-    self.batch = batch;
-    function _commit() {
-      if (shouldSetScales) {
-        setScales();
-        shouldSetScales = false;
-      }
-      if (shouldConvergeSize) {
-        convergeSize();
-        shouldConvergeSize = false;
-      }
-      if (shouldSetSize) {
-        setStylePx(under, LEFT, plotLftCss);
-        setStylePx(under, TOP, plotTopCss);
-        setStylePx(under, WIDTH, plotWidCss);
-        setStylePx(under, HEIGHT, plotHgtCss);
-        setStylePx(over, LEFT, plotLftCss);
-        setStylePx(over, TOP, plotTopCss);
-        setStylePx(over, WIDTH, plotWidCss);
-        setStylePx(over, HEIGHT, plotHgtCss);
-        setStylePx(wrap, WIDTH, fullWidCss);
-        setStylePx(wrap, HEIGHT, fullHgtCss);
-        can.width = round(fullWidCss * pxRatio);
-        can.height = round(fullHgtCss * pxRatio);
-        axes.forEach(({ _el, _show, _size, _pos, side }) => {
-          if (_el != null) {
-            if (_show) {
-              let posOffset = side === 3 || side === 0 ? _size : 0;
-              let isVt = side % 2 == 1;
-              setStylePx(_el, isVt ? "left" : "top", _pos - posOffset);
-              setStylePx(_el, isVt ? "width" : "height", _size);
-              setStylePx(_el, isVt ? "top" : "left", isVt ? plotTopCss : plotLftCss);
-              setStylePx(_el, isVt ? "height" : "width", isVt ? plotHgtCss : plotWidCss);
-              remClass(_el, OFF);
-            } else
-              addClass(_el, OFF);
-          }
-        });
-        ctxStroke = ctxFill = ctxWidth = ctxJoin = ctxCap = ctxFont = ctxAlign = ctxBaseline = ctxDash = null;
-        ctxAlpha = 1;
-        syncRect(true);
-        if (plotLftCss != _plotLftCss || plotTopCss != _plotTopCss || plotWidCss != _plotWidCss || plotHgtCss != _plotHgtCss) {
-          resetYSeries(false);
-          let pctWid = plotWidCss / _plotWidCss;
-          let pctHgt = plotHgtCss / _plotHgtCss;
-          if (showCursor && !shouldSetCursor && cursor.left >= 0) {
-            cursor.left *= pctWid;
-            cursor.top *= pctHgt;
-            vCursor && elTrans(vCursor, round(cursor.left), 0, plotWidCss, plotHgtCss);
-            hCursor && elTrans(hCursor, 0, round(cursor.top), plotWidCss, plotHgtCss);
-            for (let i = 0; i < cursorPts.length; i++) {
-              let pt = cursorPts[i];
-              if (pt != null) {
-                cursorPtsLft[i] *= pctWid;
-                cursorPtsTop[i] *= pctHgt;
-                elTrans(pt, ceil(cursorPtsLft[i]), ceil(cursorPtsTop[i]), plotWidCss, plotHgtCss);
-              }
+    n.batch = Os;
+    function Ei() {
+      if (wn && (Es(), wn = false), ol && (vs(), ol = false), Kl) {
+        if (de(L, yl, pe), de(L, "top", Me), de(L, Nl, K), de(L, Wl, A), de(D, yl, pe), de(D, "top", Me), de(D, Nl, K), de(D, Wl, A), de(w, Nl, At), de(w, Wl, Wt), y.width = Ae(At * oe), y.height = Ae(Wt * oe), H.forEach(({ _el: t, _show: l, _size: r, _pos: f, side: c }) => {
+          if (t != null) if (l) {
+            let p = c === 3 || c === 0 ? r : 0, S = c % 2 == 1;
+            de(t, S ? "left" : "top", f - p), de(t, S ? "width" : "height", r), de(t, S ? "top" : "left", S ? Me : pe), de(t, S ? "height" : "width", S ? A : K), $n(t, Zt);
+          } else Xe(t, Zt);
+        }), $l = cl = yn = kn = xn = Tn = bn = Mn = vn = null, je = 1, Fl(true), pe != il || Me != Gt || K != _t || A != It) {
+          al(false);
+          let t = K / _t, l = A / It;
+          if (He && !Yt && V.left >= 0) {
+            V.left *= t, V.top *= l, hl && bt(hl, Ae(V.left), 0, K, A), ml && bt(ml, 0, Ae(V.top), K, A);
+            for (let r = 0; r < ot.length; r++) {
+              let f = ot[r];
+              f != null && (fl[r] *= t, ul[r] *= l, bt(f, ut(fl[r]), ut(ul[r]), K, A));
             }
           }
-          if (select.show && !shouldSetSelect && select.left >= 0 && select.width > 0) {
-            select.left *= pctWid;
-            select.width *= pctWid;
-            select.top *= pctHgt;
-            select.height *= pctHgt;
-            for (let prop in _hideProps)
-              setStylePx(selectDiv, prop, select[prop]);
+          if (me.show && !jl && me.left >= 0 && me.width > 0) {
+            me.left *= t, me.width *= t, me.top *= l, me.height *= l;
+            for (let r in Fn) de(wl, r, me[r]);
           }
-          _plotLftCss = plotLftCss;
-          _plotTopCss = plotTopCss;
-          _plotWidCss = plotWidCss;
-          _plotHgtCss = plotHgtCss;
+          il = pe, Gt = Me, _t = K, It = A;
         }
-        fire("setSize");
-        shouldSetSize = false;
+        Ve("setSize"), Kl = false;
       }
-      if (fullWidCss > 0 && fullHgtCss > 0) {
-        ctx.clearRect(0, 0, can.width, can.height);
-        fire("drawClear");
-        drawOrder.forEach((fn) => fn());
-        fire("draw");
-      }
-      if (select.show && shouldSetSelect) {
-        setSelect(select);
-        shouldSetSelect = false;
-      }
-      if (showCursor && shouldSetCursor) {
-        updateCursor(null, true, false);
-        shouldSetCursor = false;
-      }
-      if (legend.show && legend.live && shouldSetLegend) {
-        setLegend();
-        shouldSetLegend = false;
-      }
-      if (!ready) {
-        ready = true;
-        self.status = 1;
-        fire("ready");
-      }
-      viaAutoScaleX = false;
-      queuedCommit = false;
+      At > 0 && Wt > 0 && (d.clearRect(0, 0, y.width, y.height), Ve("drawClear"), U.forEach((t) => t()), Ve("draw")), me.show && jl && (Xl(me), jl = false), He && Yt && (jt(null, true, false), Yt = false), J.show && J.live && it && (Rn(), it = false), m || (m = true, n.status = 1, Ve("ready")), Cl = false, Ql = false;
     }
-    self.redraw = (rebuildPaths, recalcAxes) => {
-      shouldConvergeSize = recalcAxes || false;
-      if (rebuildPaths !== false)
-        _setScale(xScaleKey, scaleX.min, scaleX.max);
-      else
-        commit();
+    n.redraw = (t, l) => {
+      ol = l || false, t !== false ? Rt(P, T.min, T.max) : pl();
     };
-    function setScale(key2, opts2) {
-      let sc = scales[key2];
-      if (sc.from == null) {
-        if (dataLen == 0) {
-          let minMax = sc.range(self, opts2.min, opts2.max, key2);
-          opts2.min = minMax[0];
-          opts2.max = minMax[1];
+    function Ln(t, l) {
+      let r = x[t];
+      if (r.from == null) {
+        if (ze == 0) {
+          let f = r.range(n, l.min, l.max, t);
+          l.min = f[0], l.max = f[1];
         }
-        if (opts2.min > opts2.max) {
-          let _min = opts2.min;
-          opts2.min = opts2.max;
-          opts2.max = _min;
+        if (l.min > l.max) {
+          let f = l.min;
+          l.min = l.max, l.max = f;
         }
-        if (dataLen > 1 && opts2.min != null && opts2.max != null && opts2.max - opts2.min < 1e-16)
-          return;
-        if (key2 == xScaleKey) {
-          if (sc.distr == 2 && dataLen > 0) {
-            opts2.min = closestIdx(opts2.min, data[0]);
-            opts2.max = closestIdx(opts2.max, data[0]);
-            if (opts2.min == opts2.max)
-              opts2.max++;
+        if (ze > 1 && l.min != null && l.max != null && l.max - l.min < 1e-16) return;
+        t == P && r.distr == 2 && ze > 0 && (l.min = dt(l.min, i[0]), l.max = dt(l.max, i[0]), l.min == l.max && l.max++), F[t] = l, wn = true, pl();
+      }
+    }
+    n.setScale = Ln;
+    let Cn, Vn, hl, ml, Pi, Di, gl, dl, Li, Ci, he, _e, Vt = false, Fe = V.drag, Le = Fe.x, Ce = Fe.y;
+    He && (V.x && (Cn = ft(or, D)), V.y && (Vn = ft(sr, D)), T.ori == 0 ? (hl = Cn, ml = Vn) : (hl = Vn, ml = Cn), he = V.left, _e = V.top);
+    let me = n.select = Te({ show: true, over: true, left: 0, width: 0, top: 0, height: 0 }, e.select), wl = me.show ? ft(ir, me.over ? D : L) : null;
+    function Xl(t, l) {
+      if (me.show) {
+        for (let r in t) me[r] = t[r], r in Fn && de(wl, r, t[r]);
+        l !== false && Ve("setSelect");
+      }
+    }
+    n.setSelect = Xl;
+    function Hs(t) {
+      if (k[t].show) be && $n(ye[t], Zt);
+      else if (be && Xe(ye[t], Zt), He) {
+        let r = rl ? ot[0] : ot[t];
+        r != null && bt(r, -10, -10, K, A);
+      }
+    }
+    function Rt(t, l, r) {
+      Ln(t, { min: l, max: r });
+    }
+    function vt(t, l, r, f) {
+      l.focus != null && Ys(t), l.show != null && k.forEach((c, p) => {
+        p > 0 && (t == p || t == null) && (c.show = l.show, Hs(p), s == 2 ? (Rt(c.facets[0].scale, null, null), Rt(c.facets[1].scale, null, null)) : Rt(c.scale, null, null), pl());
+      }), r !== false && Ve("setSeries", t, l), f && Ol("setSeries", n, t, l);
+    }
+    n.setSeries = vt;
+    function Ns(t, l) {
+      Te(q[t], l);
+    }
+    function Ws(t, l) {
+      t.fill = X(t.fill || null), t.dir = ne(t.dir, -1), l = l ?? q.length, q.splice(l, 0, t);
+    }
+    function Gs(t) {
+      t == null ? q.length = 0 : q.splice(t, 1);
+    }
+    n.addBand = Ws, n.setBand = Ns, n.delBand = Gs;
+    function Is(t, l) {
+      k[t].alpha = l, He && ot[t] != null && (ot[t].style.opacity = l), be && ye[t] && (ye[t].style.opacity = l);
+    }
+    let Et, zt, Kt, Sl = { focus: true };
+    function Ys(t) {
+      if (t != Kt) {
+        let l = t == null, r = yt.alpha != 1;
+        k.forEach((f, c) => {
+          if (s == 1 || c > 0) {
+            let p = l || c == 0 || c == t;
+            f._focus = l ? null : p, r && Is(c, p ? 1 : yt.alpha);
           }
-        }
-        pendScales[key2] = opts2;
-        shouldSetScales = true;
-        commit();
+        }), Kt = t, r && pl();
       }
     }
-    self.setScale = setScale;
-    let xCursor;
-    let yCursor;
-    let vCursor;
-    let hCursor;
-    let rawMouseLeft0;
-    let rawMouseTop0;
-    let mouseLeft0;
-    let mouseTop0;
-    let rawMouseLeft1;
-    let rawMouseTop1;
-    let mouseLeft1;
-    let mouseTop1;
-    let dragging = false;
-    const drag = cursor.drag;
-    let dragX = drag.x;
-    let dragY = drag.y;
-    if (showCursor) {
-      if (cursor.x)
-        xCursor = placeDiv(CURSOR_X, over);
-      if (cursor.y)
-        yCursor = placeDiv(CURSOR_Y, over);
-      if (scaleX.ori == 0) {
-        vCursor = xCursor;
-        hCursor = yCursor;
-      } else {
-        vCursor = yCursor;
-        hCursor = xCursor;
-      }
-      mouseLeft1 = cursor.left;
-      mouseTop1 = cursor.top;
-    }
-    const select = self.select = assign({
-      show: true,
-      over: true,
-      left: 0,
-      width: 0,
-      top: 0,
-      height: 0
-    }, opts.select);
-    const selectDiv = select.show ? placeDiv(SELECT, select.over ? over : under) : null;
-    function setSelect(opts2, _fire) {
-      if (select.show) {
-        for (let prop in opts2) {
-          select[prop] = opts2[prop];
-          if (prop in _hideProps)
-            setStylePx(selectDiv, prop, opts2[prop]);
-        }
-        _fire !== false && fire("setSelect");
-      }
-    }
-    self.setSelect = setSelect;
-    function toggleDOM(i) {
-      let s = series[i];
-      if (s.show)
-        showLegend && remClass(legendRows[i], OFF);
-      else {
-        showLegend && addClass(legendRows[i], OFF);
-        if (showCursor) {
-          let pt = cursorOnePt ? cursorPts[0] : cursorPts[i];
-          pt != null && elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
-        }
-      }
-    }
-    function _setScale(key2, min2, max2) {
-      setScale(key2, { min: min2, max: max2 });
-    }
-    function setSeries(i, opts2, _fire, _pub) {
-      if (opts2.focus != null)
-        setFocus(i);
-      if (opts2.show != null) {
-        series.forEach((s, si) => {
-          if (si > 0 && (i == si || i == null)) {
-            s.show = opts2.show;
-            toggleDOM(si);
-            if (mode2 == 2) {
-              _setScale(s.facets[0].scale, null, null);
-              _setScale(s.facets[1].scale, null, null);
-            } else
-              _setScale(s.scale, null, null);
-            commit();
-          }
-        });
-      }
-      _fire !== false && fire("setSeries", i, opts2);
-      _pub && pubSync("setSeries", self, i, opts2);
-    }
-    self.setSeries = setSeries;
-    function setBand(bi, opts2) {
-      assign(bands[bi], opts2);
-    }
-    function addBand(opts2, bi) {
-      opts2.fill = fnOrSelf(opts2.fill || null);
-      opts2.dir = ifNull(opts2.dir, -1);
-      bi = bi == null ? bands.length : bi;
-      bands.splice(bi, 0, opts2);
-    }
-    function delBand(bi) {
-      if (bi == null)
-        bands.length = 0;
-      else
-        bands.splice(bi, 1);
-    }
-    self.addBand = addBand;
-    self.setBand = setBand;
-    self.delBand = delBand;
-    function setAlpha(i, value) {
-      series[i].alpha = value;
-      if (showCursor && cursorPts[i] != null)
-        cursorPts[i].style.opacity = value;
-      if (showLegend && legendRows[i])
-        legendRows[i].style.opacity = value;
-    }
-    let closestDist;
-    let closestSeries;
-    let focusedSeries;
-    const FOCUS_TRUE = { focus: true };
-    function setFocus(i) {
-      if (i != focusedSeries) {
-        let allFocused = i == null;
-        let _setAlpha = focus.alpha != 1;
-        series.forEach((s, i2) => {
-          if (mode2 == 1 || i2 > 0) {
-            let isFocused = allFocused || i2 == 0 || i2 == i;
-            s._focus = allFocused ? null : isFocused;
-            _setAlpha && setAlpha(i2, isFocused ? 1 : focus.alpha);
-          }
-        });
-        focusedSeries = i;
-        _setAlpha && commit();
-      }
-    }
-    if (showLegend && cursorFocus) {
-      onMouse(mouseleave, legendTable, (e) => {
-        if (cursor._lock)
-          return;
-        setCursorEvent(e);
-        if (focusedSeries != null)
-          setSeries(null, FOCUS_TRUE, true, syncOpts.setSeries);
-      });
-    }
-    function posToVal(pos, scale, can2) {
-      let sc = scales[scale];
-      if (can2)
-        pos = pos / pxRatio - (sc.ori == 1 ? plotTopCss : plotLftCss);
-      let dim = plotWidCss;
-      if (sc.ori == 1) {
-        dim = plotHgtCss;
-        pos = dim - pos;
-      }
-      if (sc.dir == -1)
-        pos = dim - pos;
-      let _min = sc._min, _max = sc._max, pct = pos / dim;
-      let sv = _min + (_max - _min) * pct;
-      let distr = sc.distr;
-      return distr == 3 ? pow(10, sv) : distr == 4 ? sinh(sv, sc.asinh) : distr == 100 ? sc.bwd(sv) : sv;
-    }
-    function closestIdxFromXpos(pos, can2) {
-      let v = posToVal(pos, xScaleKey, can2);
-      return closestIdx(v, data[0], i0, i1);
-    }
-    self.valToIdx = (val) => closestIdx(val, data[0]);
-    self.posToIdx = closestIdxFromXpos;
-    self.posToVal = posToVal;
-    self.valToPos = (val, scale, can2) => scales[scale].ori == 0 ? getHPos(
-      val,
-      scales[scale],
-      can2 ? plotWid : plotWidCss,
-      can2 ? plotLft : 0
-    ) : getVPos(
-      val,
-      scales[scale],
-      can2 ? plotHgt : plotHgtCss,
-      can2 ? plotTop : 0
-    );
-    self.setCursor = (opts2, _fire, _pub) => {
-      mouseLeft1 = opts2.left;
-      mouseTop1 = opts2.top;
-      updateCursor(null, _fire, _pub);
-    };
-    function setSelH(off2, dim) {
-      setStylePx(selectDiv, LEFT, select.left = off2);
-      setStylePx(selectDiv, WIDTH, select.width = dim);
-    }
-    function setSelV(off2, dim) {
-      setStylePx(selectDiv, TOP, select.top = off2);
-      setStylePx(selectDiv, HEIGHT, select.height = dim);
-    }
-    let setSelX = scaleX.ori == 0 ? setSelH : setSelV;
-    let setSelY = scaleX.ori == 1 ? setSelH : setSelV;
-    function syncLegend() {
-      if (showLegend && legend.live) {
-        for (let i = mode2 == 2 ? 1 : 0; i < series.length; i++) {
-          if (i == 0 && multiValLegend)
-            continue;
-          let vals = legend.values[i];
-          let j = 0;
-          for (let k in vals)
-            legendCells[i][j++].firstChild.nodeValue = vals[k];
-        }
-      }
-    }
-    function setLegend(opts2, _fire) {
-      if (opts2 != null) {
-        if (opts2.idxs) {
-          opts2.idxs.forEach((didx, sidx) => {
-            activeIdxs[sidx] = didx;
-          });
-        } else if (!isUndef(opts2.idx))
-          activeIdxs.fill(opts2.idx);
-        legend.idx = activeIdxs[0];
-      }
-      if (showLegend && legend.live) {
-        for (let sidx = 0; sidx < series.length; sidx++) {
-          if (sidx > 0 || mode2 == 1 && !multiValLegend)
-            setLegendValues(sidx, activeIdxs[sidx]);
-        }
-        syncLegend();
-      }
-      shouldSetLegend = false;
-      _fire !== false && fire("setLegend");
-    }
-    self.setLegend = setLegend;
-    function setLegendValues(sidx, idx) {
-      let s = series[sidx];
-      let src = sidx == 0 && xScaleDistr == 2 ? data0 : data[sidx];
-      let val;
-      if (multiValLegend)
-        val = s.values(self, sidx, idx) ?? NULL_LEGEND_VALUES;
-      else {
-        val = s.value(self, idx == null ? null : src[idx], sidx, idx);
-        val = val == null ? NULL_LEGEND_VALUES : { _: val };
-      }
-      legend.values[sidx] = val;
-    }
-    function updateCursor(src, _fire, _pub) {
-      rawMouseLeft1 = mouseLeft1;
-      rawMouseTop1 = mouseTop1;
-      [mouseLeft1, mouseTop1] = cursor.move(self, mouseLeft1, mouseTop1);
-      cursor.left = mouseLeft1;
-      cursor.top = mouseTop1;
-      if (showCursor) {
-        vCursor && elTrans(vCursor, round(mouseLeft1), 0, plotWidCss, plotHgtCss);
-        hCursor && elTrans(hCursor, 0, round(mouseTop1), plotWidCss, plotHgtCss);
-      }
-      let idx;
-      let noDataInRange = i0 > i1;
-      closestDist = inf;
-      closestSeries = null;
-      let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
-      let yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss;
-      if (mouseLeft1 < 0 || dataLen == 0 || noDataInRange) {
-        idx = cursor.idx = null;
-        for (let i = 0; i < series.length; i++) {
-          let pt = cursorPts[i];
-          pt != null && elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
-        }
-        if (cursorFocus)
-          setSeries(null, FOCUS_TRUE, true, src == null && syncOpts.setSeries);
-        if (legend.live) {
-          activeIdxs.fill(idx);
-          shouldSetLegend = true;
-        }
-      } else {
-        let mouseXPos, valAtPosX, xPos;
-        if (mode2 == 1) {
-          mouseXPos = scaleX.ori == 0 ? mouseLeft1 : mouseTop1;
-          valAtPosX = posToVal(mouseXPos, xScaleKey);
-          idx = cursor.idx = closestIdx(valAtPosX, data[0], i0, i1);
-          xPos = valToPosX(data[0][idx], scaleX, xDim, 0);
-        }
-        let _ptLft = -10;
-        let _ptTop = -10;
-        let _ptWid = 0;
-        let _ptHgt = 0;
-        let _centered = true;
-        let _ptFill = "";
-        let _ptStroke = "";
-        for (let i = mode2 == 2 ? 1 : 0; i < series.length; i++) {
-          let s = series[i];
-          let idx1 = activeIdxs[i];
-          let yVal1 = idx1 == null ? null : mode2 == 1 ? data[i][idx1] : data[i][1][idx1];
-          let idx2 = cursor.dataIdx(self, i, idx, valAtPosX);
-          let yVal2 = idx2 == null ? null : mode2 == 1 ? data[i][idx2] : data[i][1][idx2];
-          shouldSetLegend = shouldSetLegend || yVal2 != yVal1 || idx2 != idx1;
-          activeIdxs[i] = idx2;
-          if (i > 0 && s.show) {
-            let xPos2 = idx2 == null ? -10 : idx2 == idx ? xPos : valToPosX(mode2 == 1 ? data[0][idx2] : data[i][0][idx2], scaleX, xDim, 0);
-            let yPos = yVal2 == null ? -10 : valToPosY(yVal2, mode2 == 1 ? scales[s.scale] : scales[s.facets[1].scale], yDim, 0);
-            if (cursorFocus && yVal2 != null) {
-              let mouseYPos = scaleX.ori == 1 ? mouseLeft1 : mouseTop1;
-              let dist = abs(focus.dist(self, i, idx2, yPos, mouseYPos));
-              if (dist < closestDist) {
-                let bias = focus.bias;
-                if (bias != 0) {
-                  let mouseYVal = posToVal(mouseYPos, s.scale);
-                  let seriesYValSign = yVal2 >= 0 ? 1 : -1;
-                  let mouseYValSign = mouseYVal >= 0 ? 1 : -1;
-                  if (mouseYValSign == seriesYValSign && (mouseYValSign == 1 ? bias == 1 ? yVal2 >= mouseYVal : yVal2 <= mouseYVal : (
-                    // >= 0
-                    bias == 1 ? yVal2 <= mouseYVal : yVal2 >= mouseYVal
-                  ))) {
-                    closestDist = dist;
-                    closestSeries = i;
-                  }
-                } else {
-                  closestDist = dist;
-                  closestSeries = i;
-                }
-              }
-            }
-            if (shouldSetLegend || cursorOnePt) {
-              let hPos, vPos;
-              if (scaleX.ori == 0) {
-                hPos = xPos2;
-                vPos = yPos;
-              } else {
-                hPos = yPos;
-                vPos = xPos2;
-              }
-              let ptWid, ptHgt, ptLft, ptTop, ptStroke, ptFill, centered = true, getBBox = points2.bbox;
-              if (getBBox != null) {
-                centered = false;
-                let bbox = getBBox(self, i);
-                ptLft = bbox.left;
-                ptTop = bbox.top;
-                ptWid = bbox.width;
-                ptHgt = bbox.height;
-              } else {
-                ptLft = hPos;
-                ptTop = vPos;
-                ptWid = ptHgt = points2.size(self, i);
-              }
-              ptFill = points2.fill(self, i);
-              ptStroke = points2.stroke(self, i);
-              if (cursorOnePt) {
-                if (i == closestSeries && closestDist <= focus.prox) {
-                  _ptLft = ptLft;
-                  _ptTop = ptTop;
-                  _ptWid = ptWid;
-                  _ptHgt = ptHgt;
-                  _centered = centered;
-                  _ptFill = ptFill;
-                  _ptStroke = ptStroke;
-                }
-              } else {
-                let pt = cursorPts[i];
-                if (pt != null) {
-                  cursorPtsLft[i] = ptLft;
-                  cursorPtsTop[i] = ptTop;
-                  elSize(pt, ptWid, ptHgt, centered);
-                  elColor(pt, ptFill, ptStroke);
-                  elTrans(pt, ceil(ptLft), ceil(ptTop), plotWidCss, plotHgtCss);
-                }
-              }
-            }
-          }
-        }
-        if (cursorOnePt) {
-          let p = focus.prox;
-          let focusChanged = focusedSeries == null ? closestDist <= p : closestDist > p || closestSeries != focusedSeries;
-          if (shouldSetLegend || focusChanged) {
-            let pt = cursorPts[0];
-            if (pt != null) {
-              cursorPtsLft[0] = _ptLft;
-              cursorPtsTop[0] = _ptTop;
-              elSize(pt, _ptWid, _ptHgt, _centered);
-              elColor(pt, _ptFill, _ptStroke);
-              elTrans(pt, ceil(_ptLft), ceil(_ptTop), plotWidCss, plotHgtCss);
-            }
-          }
-        }
-      }
-      if (select.show && dragging) {
-        if (src != null) {
-          let [xKey, yKey] = syncOpts.scales;
-          let [matchXKeys, matchYKeys] = syncOpts.match;
-          let [xKeySrc, yKeySrc] = src.cursor.sync.scales;
-          let sdrag = src.cursor.drag;
-          dragX = sdrag._x;
-          dragY = sdrag._y;
-          if (dragX || dragY) {
-            let { left, top, width, height } = src.select;
-            let sori = src.scales[xKeySrc].ori;
-            let sPosToVal = src.posToVal;
-            let sOff, sDim, sc, a, b;
-            let matchingX = xKey != null && matchXKeys(xKey, xKeySrc);
-            let matchingY = yKey != null && matchYKeys(yKey, yKeySrc);
-            if (matchingX && dragX) {
-              if (sori == 0) {
-                sOff = left;
-                sDim = width;
-              } else {
-                sOff = top;
-                sDim = height;
-              }
-              sc = scales[xKey];
-              a = valToPosX(sPosToVal(sOff, xKeySrc), sc, xDim, 0);
-              b = valToPosX(sPosToVal(sOff + sDim, xKeySrc), sc, xDim, 0);
-              setSelX(min(a, b), abs(b - a));
-            } else
-              setSelX(0, xDim);
-            if (matchingY && dragY) {
-              if (sori == 1) {
-                sOff = left;
-                sDim = width;
-              } else {
-                sOff = top;
-                sDim = height;
-              }
-              sc = scales[yKey];
-              a = valToPosY(sPosToVal(sOff, yKeySrc), sc, yDim, 0);
-              b = valToPosY(sPosToVal(sOff + sDim, yKeySrc), sc, yDim, 0);
-              setSelY(min(a, b), abs(b - a));
-            } else
-              setSelY(0, yDim);
-          } else
-            hideSelect();
-        } else {
-          let rawDX = abs(rawMouseLeft1 - rawMouseLeft0);
-          let rawDY = abs(rawMouseTop1 - rawMouseTop0);
-          if (scaleX.ori == 1) {
-            let _rawDX = rawDX;
-            rawDX = rawDY;
-            rawDY = _rawDX;
-          }
-          dragX = drag.x && rawDX >= drag.dist;
-          dragY = drag.y && rawDY >= drag.dist;
-          let uni = drag.uni;
-          if (uni != null) {
-            if (dragX && dragY) {
-              dragX = rawDX >= uni;
-              dragY = rawDY >= uni;
-              if (!dragX && !dragY) {
-                if (rawDY > rawDX)
-                  dragY = true;
-                else
-                  dragX = true;
-              }
-            }
-          } else if (drag.x && drag.y && (dragX || dragY))
-            dragX = dragY = true;
-          let p0, p1;
-          if (dragX) {
-            if (scaleX.ori == 0) {
-              p0 = mouseLeft0;
-              p1 = mouseLeft1;
-            } else {
-              p0 = mouseTop0;
-              p1 = mouseTop1;
-            }
-            setSelX(min(p0, p1), abs(p1 - p0));
-            if (!dragY)
-              setSelY(0, yDim);
-          }
-          if (dragY) {
-            if (scaleX.ori == 1) {
-              p0 = mouseLeft0;
-              p1 = mouseLeft1;
-            } else {
-              p0 = mouseTop0;
-              p1 = mouseTop1;
-            }
-            setSelY(min(p0, p1), abs(p1 - p0));
-            if (!dragX)
-              setSelX(0, xDim);
-          }
-          if (!dragX && !dragY) {
-            setSelX(0, 0);
-            setSelY(0, 0);
-          }
-        }
-      }
-      drag._x = dragX;
-      drag._y = dragY;
-      if (src == null) {
-        if (_pub) {
-          if (syncKey != null) {
-            let [xSyncKey, ySyncKey] = syncOpts.scales;
-            syncOpts.values[0] = xSyncKey != null ? posToVal(scaleX.ori == 0 ? mouseLeft1 : mouseTop1, xSyncKey) : null;
-            syncOpts.values[1] = ySyncKey != null ? posToVal(scaleX.ori == 1 ? mouseLeft1 : mouseTop1, ySyncKey) : null;
-          }
-          pubSync(mousemove, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, idx);
-        }
-        if (cursorFocus) {
-          let shouldPub = _pub && syncOpts.setSeries;
-          let p = focus.prox;
-          if (focusedSeries == null) {
-            if (closestDist <= p)
-              setSeries(closestSeries, FOCUS_TRUE, true, shouldPub);
-          } else {
-            if (closestDist > p)
-              setSeries(null, FOCUS_TRUE, true, shouldPub);
-            else if (closestSeries != focusedSeries)
-              setSeries(closestSeries, FOCUS_TRUE, true, shouldPub);
-          }
-        }
-      }
-      if (shouldSetLegend) {
-        legend.idx = idx;
-        setLegend();
-      }
-      _fire !== false && fire("setCursor");
-    }
-    let rect2 = null;
-    Object.defineProperty(self, "rect", {
-      get() {
-        if (rect2 == null)
-          syncRect(false);
-        return rect2;
-      }
+    be && sl && Ne(Qi, se, (t) => {
+      V._lock || (Bt(t), Kt != null && vt(null, Sl, true, xe.setSeries));
     });
-    function syncRect(defer = false) {
-      if (defer)
-        rect2 = null;
-      else {
-        rect2 = over.getBoundingClientRect();
-        fire("syncRect", rect2);
-      }
+    function kt(t, l, r) {
+      let f = x[l];
+      r && (t = t / oe - (f.ori == 1 ? Me : pe));
+      let c = K;
+      f.ori == 1 && (c = A, t = c - t), f.dir == -1 && (t = c - t);
+      let p = f._min, S = f._max, _ = t / c, v = p + (S - p) * _, b = f.distr;
+      return b == 3 ? xl(10, v) : b == 4 ? xr(v, f.asinh) : b == 100 ? f.bwd(v) : v;
     }
-    function mouseMove(e, src, _l, _t, _w, _h, _i) {
-      if (cursor._lock)
-        return;
-      if (dragging && e != null && e.movementX == 0 && e.movementY == 0)
-        return;
-      cacheMouse(e, src, _l, _t, _w, _h, _i, false, e != null);
-      if (e != null)
-        updateCursor(null, true, true);
-      else
-        updateCursor(src, true, false);
+    function Bs(t, l) {
+      let r = kt(t, P, l);
+      return dt(r, i[0], Pe, De);
     }
-    function cacheMouse(e, src, _l, _t, _w, _h, _i, initial, snap) {
-      if (rect2 == null)
-        syncRect(false);
-      setCursorEvent(e);
-      if (e != null) {
-        _l = e.clientX - rect2.left;
-        _t = e.clientY - rect2.top;
-      } else {
-        if (_l < 0 || _t < 0) {
-          mouseLeft1 = -10;
-          mouseTop1 = -10;
-          return;
-        }
-        let [xKey, yKey] = syncOpts.scales;
-        let syncOptsSrc = src.cursor.sync;
-        let [xValSrc, yValSrc] = syncOptsSrc.values;
-        let [xKeySrc, yKeySrc] = syncOptsSrc.scales;
-        let [matchXKeys, matchYKeys] = syncOpts.match;
-        let rotSrc = src.axes[0].side % 2 == 1;
-        let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss, yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss, _xDim = rotSrc ? _h : _w, _yDim = rotSrc ? _w : _h, _xPos = rotSrc ? _t : _l, _yPos = rotSrc ? _l : _t;
-        if (xKeySrc != null)
-          _l = matchXKeys(xKey, xKeySrc) ? getPos(xValSrc, scales[xKey], xDim, 0) : -10;
-        else
-          _l = xDim * (_xPos / _xDim);
-        if (yKeySrc != null)
-          _t = matchYKeys(yKey, yKeySrc) ? getPos(yValSrc, scales[yKey], yDim, 0) : -10;
-        else
-          _t = yDim * (_yPos / _yDim);
-        if (scaleX.ori == 1) {
-          let __l = _l;
-          _l = _t;
-          _t = __l;
-        }
-      }
-      if (snap && (src == null || src.cursor.event.type == mousemove)) {
-        if (_l <= 1 || _l >= plotWidCss - 1)
-          _l = incrRound(_l, plotWidCss);
-        if (_t <= 1 || _t >= plotHgtCss - 1)
-          _t = incrRound(_t, plotHgtCss);
-      }
-      if (initial) {
-        rawMouseLeft0 = _l;
-        rawMouseTop0 = _t;
-        [mouseLeft0, mouseTop0] = cursor.move(self, _l, _t);
-      } else {
-        mouseLeft1 = _l;
-        mouseTop1 = _t;
-      }
-    }
-    const _hideProps = {
-      width: 0,
-      height: 0,
-      left: 0,
-      top: 0
+    n.valToIdx = (t) => dt(t, i[0]), n.posToIdx = Bs, n.posToVal = kt, n.valToPos = (t, l, r) => x[l].ori == 0 ? a(t, x[l], r ? Ke : K, r ? $e : 0) : u(t, x[l], r ? at : A, r ? nt : 0), n.setCursor = (t, l, r) => {
+      he = t.left, _e = t.top, jt(null, l, r);
     };
-    function hideSelect() {
-      setSelect(_hideProps, false);
+    function Vi(t, l) {
+      de(wl, yl, me.left = t), de(wl, Nl, me.width = l);
     }
-    let downSelectLeft;
-    let downSelectTop;
-    let downSelectWidth;
-    let downSelectHeight;
-    function mouseDown(e, src, _l, _t, _w, _h, _i) {
-      dragging = true;
-      dragX = dragY = drag._x = drag._y = false;
-      cacheMouse(e, src, _l, _t, _w, _h, _i, true, false);
-      if (e != null) {
-        onMouse(mouseup, doc, mouseUp, false);
-        pubSync(mousedown, self, mouseLeft0, mouseTop0, plotWidCss, plotHgtCss, null);
+    function Ri(t, l) {
+      de(wl, "top", me.top = t), de(wl, Wl, me.height = l);
+    }
+    let Rl = T.ori == 0 ? Vi : Ri, zl = T.ori == 1 ? Vi : Ri;
+    function Us() {
+      if (be && J.live) for (let t = s == 2 ? 1 : 0; t < k.length; t++) {
+        if (t == 0 && lt) continue;
+        let l = J.values[t], r = 0;
+        for (let f in l) St[t][r++].firstChild.nodeValue = l[f];
       }
-      let { left, top, width, height } = select;
-      downSelectLeft = left;
-      downSelectTop = top;
-      downSelectWidth = width;
-      downSelectHeight = height;
     }
-    function mouseUp(e, src, _l, _t, _w, _h, _i) {
-      dragging = drag._x = drag._y = false;
-      cacheMouse(e, src, _l, _t, _w, _h, _i, false, true);
-      let { left, top, width, height } = select;
-      let hasSelect = width > 0 || height > 0;
-      let chgSelect = downSelectLeft != left || downSelectTop != top || downSelectWidth != width || downSelectHeight != height;
-      hasSelect && chgSelect && setSelect(select);
-      if (drag.setScale && hasSelect && chgSelect) {
-        let xOff = left, xDim = width, yOff = top, yDim = height;
-        if (scaleX.ori == 1) {
-          xOff = top, xDim = height, yOff = left, yDim = width;
+    function Rn(t, l) {
+      if (t != null && (t.idxs ? t.idxs.forEach((r, f) => {
+        fe[f] = r;
+      }) : Ar(t.idx) || fe.fill(t.idx), J.idx = fe[0]), be && J.live) {
+        for (let r = 0; r < k.length; r++) (r > 0 || s == 1 && !lt) && Ks(r, fe[r]);
+        Us();
+      }
+      it = false, l !== false && Ve("setLegend");
+    }
+    n.setLegend = Rn;
+    function Ks(t, l) {
+      let r = k[t], f = t == 0 && j == 2 ? pt : i[t], c;
+      lt ? c = r.values(n, t, l) ?? Lt : (c = r.value(n, l == null ? null : f[l], t, l), c = c == null ? Lt : { _: c }), J.values[t] = c;
+    }
+    function jt(t, l, r) {
+      Li = he, Ci = _e, [he, _e] = V.move(n, he, _e), V.left = he, V.top = _e, He && (hl && bt(hl, Ae(he), 0, K, A), ml && bt(ml, 0, Ae(_e), K, A));
+      let f, c = Pe > De;
+      Et = ce, zt = null;
+      let p = T.ori == 0 ? K : A, S = T.ori == 1 ? K : A;
+      if (he < 0 || ze == 0 || c) {
+        f = V.idx = null;
+        for (let _ = 0; _ < k.length; _++) {
+          let v = ot[_];
+          v != null && bt(v, -10, -10, K, A);
         }
-        if (dragX) {
-          _setScale(
-            xScaleKey,
-            posToVal(xOff, xScaleKey),
-            posToVal(xOff + xDim, xScaleKey)
-          );
-        }
-        if (dragY) {
-          for (let k in scales) {
-            let sc = scales[k];
-            if (k != xScaleKey && sc.from == null && sc.min != inf) {
-              _setScale(
-                k,
-                posToVal(yOff + yDim, k),
-                posToVal(yOff, k)
-              );
+        sl && vt(null, Sl, true, t == null && xe.setSeries), J.live && (fe.fill(f), it = true);
+      } else {
+        let _, v, b;
+        s == 1 && (_ = T.ori == 0 ? he : _e, v = kt(_, P), f = V.idx = dt(v, i[0], Pe, De), b = C(i[0][f], T, p, 0));
+        let M = -10, E = -10, Y = 0, ie = 0, le = true, Z = "", W = "";
+        for (let R = s == 2 ? 1 : 0; R < k.length; R++) {
+          let ge = k[R], ve = fe[R], Re = ve == null ? null : s == 1 ? i[R][ve] : i[R][1][ve], ue = V.dataIdx(n, R, f, v), ke = ue == null ? null : s == 1 ? i[R][ue] : i[R][1][ue];
+          if (it = it || ke != Re || ue != ve, fe[R] = ue, R > 0 && ge.show) {
+            let Je = ue == null ? -10 : ue == f ? b : C(s == 1 ? i[0][ue] : i[R][0][ue], T, p, 0), We = ke == null ? -10 : I(ke, s == 1 ? x[ge.scale] : x[ge.facets[1].scale], S, 0);
+            if (sl && ke != null) {
+              let st = T.ori == 1 ? he : _e, ht = Ee(yt.dist(n, R, ue, We, st));
+              if (ht < Et) {
+                let xt = yt.bias;
+                if (xt != 0) {
+                  let Ze = kt(st, ge.scale), rt = ke >= 0 ? 1 : -1, mt = Ze >= 0 ? 1 : -1;
+                  mt == rt && (mt == 1 ? xt == 1 ? ke >= Ze : ke <= Ze : xt == 1 ? ke <= Ze : ke >= Ze) && (Et = ht, zt = R);
+                } else Et = ht, zt = R;
+              }
+            }
+            if (it || rl) {
+              let st, ht;
+              T.ori == 0 ? (st = Je, ht = We) : (st = We, ht = Je);
+              let xt, Ze, rt, mt, Tt, Ge, Qe = true, qt = Oe.bbox;
+              if (qt != null) {
+                Qe = false;
+                let Ie = qt(n, R);
+                rt = Ie.left, mt = Ie.top, xt = Ie.width, Ze = Ie.height;
+              } else rt = st, mt = ht, xt = Ze = Oe.size(n, R);
+              if (Ge = Oe.fill(n, R), Tt = Oe.stroke(n, R), rl) R == zt && Et <= yt.prox && (M = rt, E = mt, Y = xt, ie = Ze, le = Qe, Z = Ge, W = Tt);
+              else {
+                let Ie = ot[R];
+                Ie != null && (fl[R] = rt, ul[R] = mt, oo(Ie, xt, Ze, Qe), no(Ie, Ge, Tt), bt(Ie, ut(rt), ut(mt), K, A));
+              }
             }
           }
         }
-        hideSelect();
-      } else if (cursor.lock) {
-        cursor._lock = !cursor._lock;
-        updateCursor(src, true, e != null);
-      }
-      if (e != null) {
-        offMouse(mouseup, doc);
-        pubSync(mouseup, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, null);
-      }
-    }
-    function mouseLeave(e, src, _l, _t, _w, _h, _i) {
-      if (cursor._lock)
-        return;
-      setCursorEvent(e);
-      let _dragging = dragging;
-      if (dragging) {
-        let snapH = true;
-        let snapV = true;
-        let snapProx = 10;
-        let dragH, dragV;
-        if (scaleX.ori == 0) {
-          dragH = dragX;
-          dragV = dragY;
-        } else {
-          dragH = dragY;
-          dragV = dragX;
+        if (rl) {
+          let R = yt.prox, ge = Kt == null ? Et <= R : Et > R || zt != Kt;
+          if (it || ge) {
+            let ve = ot[0];
+            ve != null && (fl[0] = M, ul[0] = E, oo(ve, Y, ie, le), no(ve, Z, W), bt(ve, ut(M), ut(E), K, A));
+          }
         }
-        if (dragH && dragV) {
-          snapH = mouseLeft1 <= snapProx || mouseLeft1 >= plotWidCss - snapProx;
-          snapV = mouseTop1 <= snapProx || mouseTop1 >= plotHgtCss - snapProx;
-        }
-        if (dragH && snapH)
-          mouseLeft1 = mouseLeft1 < mouseLeft0 ? 0 : plotWidCss;
-        if (dragV && snapV)
-          mouseTop1 = mouseTop1 < mouseTop0 ? 0 : plotHgtCss;
-        updateCursor(null, true, true);
-        dragging = false;
       }
-      mouseLeft1 = -10;
-      mouseTop1 = -10;
-      activeIdxs.fill(null);
-      updateCursor(null, true, true);
-      if (_dragging)
-        dragging = _dragging;
+      if (me.show && Vt) if (t != null) {
+        let [_, v] = xe.scales, [b, M] = xe.match, [E, Y] = t.cursor.sync.scales, ie = t.cursor.drag;
+        if (Le = ie._x, Ce = ie._y, Le || Ce) {
+          let { left: le, top: Z, width: W, height: R } = t.select, ge = t.scales[E].ori, ve = t.posToVal, Re, ue, ke, Je, We, st = _ != null && b(_, E), ht = v != null && M(v, Y);
+          st && Le ? (ge == 0 ? (Re = le, ue = W) : (Re = Z, ue = R), ke = x[_], Je = C(ve(Re, E), ke, p, 0), We = C(ve(Re + ue, E), ke, p, 0), Rl(wt(Je, We), Ee(We - Je))) : Rl(0, p), ht && Ce ? (ge == 1 ? (Re = le, ue = W) : (Re = Z, ue = R), ke = x[v], Je = I(ve(Re, Y), ke, S, 0), We = I(ve(Re + ue, Y), ke, S, 0), zl(wt(Je, We), Ee(We - Je))) : zl(0, S);
+        } else On();
+      } else {
+        let _ = Ee(Li - Pi), v = Ee(Ci - Di);
+        if (T.ori == 1) {
+          let Y = _;
+          _ = v, v = Y;
+        }
+        Le = Fe.x && _ >= Fe.dist, Ce = Fe.y && v >= Fe.dist;
+        let b = Fe.uni;
+        b != null ? Le && Ce && (Le = _ >= b, Ce = v >= b, !Le && !Ce && (v > _ ? Ce = true : Le = true)) : Fe.x && Fe.y && (Le || Ce) && (Le = Ce = true);
+        let M, E;
+        Le && (T.ori == 0 ? (M = gl, E = he) : (M = dl, E = _e), Rl(wt(M, E), Ee(E - M)), Ce || zl(0, S)), Ce && (T.ori == 1 ? (M = gl, E = he) : (M = dl, E = _e), zl(wt(M, E), Ee(E - M)), Le || Rl(0, p)), !Le && !Ce && (Rl(0, 0), zl(0, 0));
+      }
+      if (Fe._x = Le, Fe._y = Ce, t == null) {
+        if (r) {
+          if (Ui != null) {
+            let [_, v] = xe.scales;
+            xe.values[0] = _ != null ? kt(T.ori == 0 ? he : _e, _) : null, xe.values[1] = v != null ? kt(T.ori == 1 ? he : _e, v) : null;
+          }
+          Ol(Gn, n, he, _e, K, A, f);
+        }
+        if (sl) {
+          let _ = r && xe.setSeries, v = yt.prox;
+          Kt == null ? Et <= v && vt(zt, Sl, true, _) : Et > v ? vt(null, Sl, true, _) : zt != Kt && vt(zt, Sl, true, _);
+        }
+      }
+      it && (J.idx = f, Rn()), l !== false && Ve("setCursor");
     }
-    function dblClick(e, src, _l, _t, _w, _h, _i) {
-      if (cursor._lock)
-        return;
-      setCursorEvent(e);
-      autoScaleX();
-      hideSelect();
-      if (e != null)
-        pubSync(dblclick, self, mouseLeft1, mouseTop1, plotWidCss, plotHgtCss, null);
+    let Ft = null;
+    Object.defineProperty(n, "rect", { get() {
+      return Ft == null && Fl(false), Ft;
+    } });
+    function Fl(t = false) {
+      t ? Ft = null : (Ft = D.getBoundingClientRect(), Ve("syncRect", Ft));
     }
-    function syncPxRatio() {
-      axes.forEach(syncFontSize);
-      _setSize(self.width, self.height, true);
+    function zi(t, l, r, f, c, p, S) {
+      V._lock || Vt && t != null && t.movementX == 0 && t.movementY == 0 || (zn(t, l, r, f, c, p, S, false, t != null), t != null ? jt(null, true, true) : jt(l, true, false));
     }
-    on(dppxchange, win, syncPxRatio);
-    const events = {};
-    events.mousedown = mouseDown;
-    events.mousemove = mouseMove;
-    events.mouseup = mouseUp;
-    events.dblclick = dblClick;
-    events["setSeries"] = (e, src, idx, opts2) => {
-      let seriesIdxMatcher2 = syncOpts.match[2];
-      idx = seriesIdxMatcher2(self, src, idx);
-      idx != -1 && setSeries(idx, opts2, true, false);
-    };
-    if (showCursor) {
-      onMouse(mousedown, over, mouseDown);
-      onMouse(mousemove, over, mouseMove);
-      onMouse(mouseenter, over, (e) => {
-        setCursorEvent(e);
-        syncRect(false);
-      });
-      onMouse(mouseleave, over, mouseLeave);
-      onMouse(dblclick, over, dblClick);
-      cursorPlots.add(self);
-      self.syncRect = syncRect;
-    }
-    const hooks = self.hooks = opts.hooks || {};
-    function fire(evName, a1, a2) {
-      if (deferHooks)
-        hooksQueue.push([evName, a1, a2]);
+    function zn(t, l, r, f, c, p, S, _, v) {
+      if (Ft == null && Fl(false), Bt(t), t != null) r = t.clientX - Ft.left, f = t.clientY - Ft.top;
       else {
-        if (evName in hooks) {
-          hooks[evName].forEach((fn) => {
-            fn.call(null, self, a1, a2);
-          });
+        if (r < 0 || f < 0) {
+          he = -10, _e = -10;
+          return;
+        }
+        let [b, M] = xe.scales, E = l.cursor.sync, [Y, ie] = E.values, [le, Z] = E.scales, [W, R] = xe.match, ge = l.axes[0].side % 2 == 1, ve = T.ori == 0 ? K : A, Re = T.ori == 1 ? K : A, ue = ge ? p : c, ke = ge ? c : p, Je = ge ? f : r, We = ge ? r : f;
+        if (le != null ? r = W(b, le) ? h(Y, x[b], ve, 0) : -10 : r = ve * (Je / ue), Z != null ? f = R(M, Z) ? h(ie, x[M], Re, 0) : -10 : f = Re * (We / ke), T.ori == 1) {
+          let st = r;
+          r = f, f = st;
         }
       }
+      v && (l == null || l.cursor.event.type == Gn) && ((r <= 1 || r >= K - 1) && (r = $t(r, K)), (f <= 1 || f >= A - 1) && (f = $t(f, A))), _ ? (Pi = r, Di = f, [gl, dl] = V.move(n, r, f)) : (he = r, _e = f);
     }
-    (opts.plugins || []).forEach((p) => {
-      for (let evName in p.hooks)
-        hooks[evName] = (hooks[evName] || []).concat(p.hooks[evName]);
+    let Fn = { width: 0, height: 0, left: 0, top: 0 };
+    function On() {
+      Xl(Fn, false);
+    }
+    let Fi, Oi, Hi, Ni;
+    function Wi(t, l, r, f, c, p, S) {
+      Vt = true, Le = Ce = Fe._x = Fe._y = false, zn(t, l, r, f, c, p, S, true, false), t != null && (Ne(In, jn, Gi, false), Ol(Ji, n, gl, dl, K, A, null));
+      let { left: _, top: v, width: b, height: M } = me;
+      Fi = _, Oi = v, Hi = b, Ni = M;
+    }
+    function Gi(t, l, r, f, c, p, S) {
+      Vt = Fe._x = Fe._y = false, zn(t, l, r, f, c, p, S, false, true);
+      let { left: _, top: v, width: b, height: M } = me, E = b > 0 || M > 0, Y = Fi != _ || Oi != v || Hi != b || Ni != M;
+      if (E && Y && Xl(me), Fe.setScale && E && Y) {
+        let ie = _, le = b, Z = v, W = M;
+        if (T.ori == 1 && (ie = v, le = M, Z = _, W = b), Le && Rt(P, kt(ie, P), kt(ie + le, P)), Ce) for (let R in x) {
+          let ge = x[R];
+          R != P && ge.from == null && ge.min != ce && Rt(R, kt(Z + W, R), kt(Z, R));
+        }
+        On();
+      } else V.lock && (V._lock = !V._lock, jt(l, true, t != null));
+      t != null && (nl(In, jn), Ol(In, n, he, _e, K, A, null));
+    }
+    function js(t, l, r, f, c, p, S) {
+      if (V._lock) return;
+      Bt(t);
+      let _ = Vt;
+      if (Vt) {
+        let v = true, b = true, M = 10, E, Y;
+        T.ori == 0 ? (E = Le, Y = Ce) : (E = Ce, Y = Le), E && Y && (v = he <= M || he >= K - M, b = _e <= M || _e >= A - M), E && v && (he = he < gl ? 0 : K), Y && b && (_e = _e < dl ? 0 : A), jt(null, true, true), Vt = false;
+      }
+      he = -10, _e = -10, fe.fill(null), jt(null, true, true), _ && (Vt = _);
+    }
+    function Ii(t, l, r, f, c, p, S) {
+      V._lock || (Bt(t), _n(), On(), t != null && Ol(Xi, n, he, _e, K, A, null));
+    }
+    function Yi() {
+      H.forEach(Bf), Sn(n.width, n.height, true);
+    }
+    Qt(sn, kl, Yi);
+    let _l = {};
+    _l.mousedown = Wi, _l.mousemove = zi, _l.mouseup = Gi, _l.dblclick = Ii, _l.setSeries = (t, l, r, f) => {
+      let c = xe.match[2];
+      r = c(n, l, r), r != -1 && vt(r, f, true, false);
+    }, He && (Ne(Ji, D, Wi), Ne(Gn, D, zi), Ne(Zi, D, (t) => {
+      Bt(t), Fl(false);
+    }), Ne(Qi, D, js), Ne(Xi, D, Ii), ti.add(n), n.syncRect = Fl);
+    let en = n.hooks = e.hooks || {};
+    function Ve(t, l, r) {
+      Dn ? Vl.push([t, l, r]) : t in en && en[t].forEach((f) => {
+        f.call(null, n, l, r);
+      });
+    }
+    (e.plugins || []).forEach((t) => {
+      for (let l in t.hooks) en[l] = (en[l] || []).concat(t.hooks[l]);
     });
-    const seriesIdxMatcher = (self2, src, srcSeriesIdx) => srcSeriesIdx;
-    const syncOpts = assign({
-      key: null,
-      setSeries: false,
-      filters: {
-        pub: retTrue,
-        sub: retTrue
-      },
-      scales: [xScaleKey, series[1] ? series[1].scale : null],
-      match: [retEq, retEq, seriesIdxMatcher],
-      values: [null, null]
-    }, cursor.sync);
-    if (syncOpts.match.length == 2)
-      syncOpts.match.push(seriesIdxMatcher);
-    cursor.sync = syncOpts;
-    const syncKey = syncOpts.key;
-    const sync = _sync(syncKey);
-    function pubSync(type, src, x, y, w, h, i) {
-      if (syncOpts.filters.pub(type, src, x, y, w, h, i))
-        sync.pub(type, src, x, y, w, h, i);
+    let Bi = (t, l, r) => r, xe = Te({ key: null, setSeries: false, filters: { pub: co, sub: co }, scales: [P, k[1] ? k[1].scale : null], match: [ao, ao, Bi], values: [null, null] }, V.sync);
+    xe.match.length == 2 && xe.match.push(Bi), V.sync = xe;
+    let Ui = xe.key, Hn = fs(Ui);
+    function Ol(t, l, r, f, c, p, S) {
+      xe.filters.pub(t, l, r, f, c, p, S) && Hn.pub(t, l, r, f, c, p, S);
     }
-    sync.sub(self);
-    function pub(type, src, x, y, w, h, i) {
-      if (syncOpts.filters.sub(type, src, x, y, w, h, i))
-        events[type](null, src, x, y, w, h, i);
+    Hn.sub(n);
+    function qs(t, l, r, f, c, p, S) {
+      xe.filters.sub(t, l, r, f, c, p, S) && _l[t](null, l, r, f, c, p, S);
     }
-    self.pub = pub;
-    function destroy() {
-      sync.unsub(self);
-      cursorPlots.delete(self);
-      mouseListeners.clear();
-      off(dppxchange, win, syncPxRatio);
-      root.remove();
-      legendTable?.remove();
-      fire("destroy");
+    n.pub = qs;
+    function $s() {
+      Hn.unsub(n), ti.delete(n), Nt.clear(), Jn(sn, kl, Yi), g.remove(), se?.remove(), Ve("destroy");
     }
-    self.destroy = destroy;
-    function _init() {
-      fire("init", opts, data);
-      setData(data || opts.data, false);
-      if (pendScales[xScaleKey])
-        setScale(xScaleKey, pendScales[xScaleKey]);
-      else
-        autoScaleX();
-      shouldSetSelect = select.show && (select.width > 0 || select.height > 0);
-      shouldSetCursor = shouldSetLegend = true;
-      _setSize(opts.width, opts.height);
+    n.destroy = $s;
+    function Nn() {
+      Ve("init", e, i), vi(i || e.data, false), F[P] ? Ln(P, F[P]) : _n(), jl = me.show && (me.width > 0 || me.height > 0), Yt = it = true, Sn(e.width, e.height);
     }
-    series.forEach(initSeries);
-    axes.forEach(initAxis);
-    if (then) {
-      if (then instanceof HTMLElement) {
-        then.appendChild(root);
-        _init();
-      } else
-        then(self, _init);
-    } else
-      _init();
-    return self;
+    return k.forEach(_i), H.forEach(As), o ? o instanceof HTMLElement ? (o.appendChild(g), Nn()) : o(n, Nn) : Nn(), n;
   }
-  uPlot.assign = assign;
-  uPlot.fmtNum = fmtNum;
-  uPlot.rangeNum = rangeNum;
-  uPlot.rangeLog = rangeLog;
-  uPlot.rangeAsinh = rangeAsinh;
-  uPlot.orient = orient;
-  uPlot.pxRatio = pxRatio;
+  Be.assign = Te;
+  Be.fmtNum = fi;
+  Be.rangeNum = rn;
+  Be.rangeLog = cn;
+  Be.rangeAsinh = si;
+  Be.orient = el;
+  Be.pxRatio = oe;
+  Be.join = Rr;
+  Be.fmtDate = ci, Be.tzDate = Ur;
+  Be.sync = fs;
   {
-    uPlot.join = join;
-  }
-  {
-    uPlot.fmtDate = fmtDate;
-    uPlot.tzDate = tzDate;
-  }
-  uPlot.sync = _sync;
-  {
-    uPlot.addGap = addGap;
-    uPlot.clipGaps = clipGaps;
-    let paths = uPlot.paths = {
-      points
-    };
-    paths.linear = linear;
-    paths.stepped = stepped;
-    paths.bars = bars;
-    paths.spline = monotoneCubic;
+    Be.addGap = Ef, Be.clipGaps = hn;
+    let e = Be.paths = { points: ms };
+    e.linear = ds, e.stepped = Lf, e.bars = Cf, e.spline = Rf;
   }
 
   // src/chart.js
@@ -6084,7 +3619,7 @@
       // the axis is another one only by now
       setCursor: [(u) => plot.hover(u)],
       // uPlot's types do not know what it tells here
-      setSeries: [(_2, k, how) => plot.focusedByMouse(
+      setSeries: [(_, k, how) => plot.focusedByMouse(
         k,
         /** @type {any} */
         how
@@ -6104,7 +3639,7 @@
         size: 24,
         gap: 2,
         space: 60,
-        values: (_2, ticks2) => ticks2.map((v) => `${number(v, 6)} s`)
+        values: (_, ticks) => ticks.map((v) => `${number(v, 6)} s`)
       },
       {
         ...axis,
@@ -6117,7 +3652,7 @@
         labelGap: 0,
         labelFont: FONT,
         // of powers of ten those that uPlot leaves in
-        ...!log && { values: (_2, ticks2) => ticks2.map((v) => number(v, 6)) }
+        ...!log && { values: (_, ticks) => ticks.map((v) => number(v, 6)) }
       }
     ];
   };
@@ -6182,7 +3717,7 @@
     const { margin_time: time } = plots.source.stateOf(system);
     if (typeof time !== "number") return;
     const { ctx: context, bbox } = u;
-    const ratio = uPlot.pxRatio;
+    const ratio = Be.pxRatio;
     const x = u.valToPos(time, "x", true);
     context.fillStyle = colour("limit");
     context.beginPath();
@@ -6207,7 +3742,7 @@
   };
   var drawBounds = (u, { bounds, unit }) => {
     const { ctx: context, bbox } = u;
-    const ratio = uPlot.pxRatio;
+    const ratio = Be.pxRatio;
     asBounds(context, ratio);
     let last = Infinity;
     for (const { value, note } of bounds) {
@@ -6224,7 +3759,7 @@
   };
   var drawMovingBounds = (u, bounds) => {
     const { ctx: context, bbox } = u;
-    const ratio = uPlot.pxRatio;
+    const ratio = Be.pxRatio;
     asBounds(context, ratio);
     const time = u.data[0];
     for (const { values, note } of bounds) {
@@ -6258,7 +3793,7 @@
       this.root = element("div", { class: "plot-chips" });
       this.several = spec.total > shown2 ? `${shown2} of ${spec.total} shown` : "";
       this.note = element("span", { class: "plot-note", text: this.several });
-      this.values = shown2 > MOST_CHIPS ? [] : spec.groups.map((_2, group) => this.add(group));
+      this.values = shown2 > MOST_CHIPS ? [] : spec.groups.map((_, group) => this.add(group));
       this.readout = element("span", { class: "readout" });
       this.root.append(...this.values.length ? [] : [this.readout], this.note);
     }
@@ -6411,12 +3946,12 @@
   var NARROWEST = 1e-4;
   var STEP = 0.7;
   var SLOP = 4;
-  var scaled = ([from, to], around, factor) => [
+  var scaled = ([from, to2], around, factor) => [
     around - (around - from) * factor,
-    around + (to - around) * factor
+    around + (to2 - around) * factor
   ];
-  var within = ([from, to], whole) => {
-    const width = Math.max(to - from, NARROWEST * whole);
+  var within = ([from, to2], whole) => {
+    const width = Math.max(to2 - from, NARROWEST * whole);
     if (!(width < 0.999 * whole)) return null;
     const begin = Math.min(Math.max(from, 0), whole - width);
     return [begin, begin + width];
@@ -6594,7 +4129,7 @@
     while (n < first.length && labels.every((each) => each[n] === first[n])) n++;
     const common = first.slice(0, n).lastIndexOf(" ") + 1;
     return labels.map(
-      (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_2, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
+      (each) => each.slice(common).replace(/\bagents? /g, "").replace(/ and /g, "–").replace(/ to /g, "→").replace(/_(\d)\b/g, (_, digit) => "₀₁₂₃₄₅₆₇₈₉"[digit])
     );
   };
   var keyed = (labels) => labels.map((label, k) => {
@@ -6678,9 +4213,9 @@
       note: noteOf([...whose], new Set(shorts).size)
     }));
   };
-  var noteOf = (whose, of) => {
+  var noteOf = (whose, of2) => {
     const note = `: ${whose.join(", ")}`;
-    return whose.length < of && note.length < 20 ? note : "";
+    return whose.length < of2 && note.length < 20 ? note : "";
   };
   var evenly = (n, most) => {
     if (n <= most) return [...Array(n).keys()];
@@ -6820,7 +4355,7 @@
      */
     make(width, height) {
       this.uplot?.destroy();
-      this.uplot = new uPlot(optionsOf(this, width, height), this.data(), this.chart);
+      this.uplot = new Be(optionsOf(this, width, height), this.data(), this.chart);
       const { over } = this.uplot;
       const lines = [this.timeLine, ...this.exitLines.map((each) => each.line)];
       for (const each of lines) each.x = NaN;
@@ -6852,9 +4387,9 @@
       const { store } = this.plots.source;
       this.movingBounds = movingBoundsOf(this.spec, store);
       if (!this.look.log) return [store.time, ...this.columns()];
-      const sign2 = this.turned ? -1 : 1;
+      const sign = this.turned ? -1 : 1;
       const drawn = this.columns().map(
-        (column) => column.map((value) => value !== null && sign2 * value > 0 ? sign2 * value : null)
+        (column) => column.map((value) => value !== null && sign * value > 0 ? sign * value : null)
       );
       return [store.time, ...drawn];
     }
@@ -6879,8 +4414,8 @@
      * @param {number} from px
      * @param {number} to
      */
-    panValues(from, to) {
-      this.moveValues((edge) => edge + from - to);
+    panValues(from, to2) {
+      this.moveValues((edge) => edge + from - to2);
     }
     // ---- values
     /**
@@ -6919,8 +4454,8 @@
         root.hidden = !Number.isFinite(exit) || this.plots.hiddenRuns.has(system.run);
         if (root.hidden) continue;
         own.place(this.uplot, exit);
-        const [from, to] = this.plots.window;
-        root.classList.toggle("leftward", exit > from + 0.7 * (to - from));
+        const [from, to2] = this.plots.window;
+        root.classList.toggle("leftward", exit > from + 0.7 * (to2 - from));
       }
     }
     /**
@@ -6972,14 +4507,14 @@
       return alone.length ? [leftOf(whole, alone, runs)] : [];
     });
     if (!common.length) return { whole: null, left };
-    const of = wholes.filter((whole) => whole.lines.some(often));
+    const of2 = wholes.filter((whole) => whole.lines.some(often));
     return {
       whole: {
-        ...of[0],
-        systems: of.flatMap((whole) => whole.systems),
+        ...of2[0],
+        systems: of2.flatMap((whole) => whole.systems),
         whose,
         lines: common,
-        bounds: boundsOf2(of, runs)
+        bounds: boundsOf2(of2, runs)
       },
       left
     };
@@ -7099,9 +4634,9 @@
      * @param {number} around s
      */
     zoom(factor, around = this.now) {
-      const [from, to] = this.window;
-      const middle = around < from || around > to ? (from + to) / 2 : around;
-      this.show(scaled([from, to], middle, factor));
+      const [from, to2] = this.window;
+      const middle = around < from || around > to2 ? (from + to2) / 2 : around;
+      this.show(scaled([from, to2], middle, factor));
     }
     /** @param {number} seconds */
     pan(seconds) {
@@ -7116,8 +4651,8 @@
       this.show([time - far, time + far]);
     }
     tellStretch() {
-      const [from, to] = this.window;
-      this.shown.textContent = this.stretch ? `${number(from, 4)} to ${number(to, 4)} s` : "";
+      const [from, to2] = this.window;
+      this.shown.textContent = this.stretch ? `${number(from, 4)} to ${number(to2, 4)} s` : "";
     }
     /** @param {Source} source */
     setSource(source) {
@@ -7220,7 +4755,7 @@
 
   // src/bars.js
   var PITCH = 0.62;
-  var WIDTH2 = 0.4;
+  var WIDTH = 0.4;
   var FAINT = 0.35;
   var WIDER = 1.25;
   var GAUGE = 1.7;
@@ -7254,7 +4789,7 @@
       const bounded = this.boundedNumbers();
       this.width = PITCH * this.perRow + GAUGE * bounded.length;
       this.depth = PITCH * this.rows;
-      this.bars = system.action.owner.map((_2, k) => this.addBar(k));
+      this.bars = system.action.owner.map((_, k) => this.addBar(k));
       this.gauges = bounded.map((quantity, k) => this.addGauge(quantity, k));
       this.origin = [0, 0, 0];
       this.scale = 1;
@@ -7281,7 +4816,7 @@
       const bar = mesh(8947848);
       const [x, y] = this.spot(k);
       bar.position.set(x, y, 0);
-      bar.scale.set(WIDTH2, WIDTH2, 1);
+      bar.scale.set(WIDTH, WIDTH, 1);
       this.group.add(bar);
       return bar;
     }
@@ -7348,10 +4883,10 @@
      */
     update(instant, store, [x, y, z], scale) {
       const own = instant.systems[this.system.name];
-      const { alike, faint, off: off2 } = this.system.shown;
+      const { alike, faint, off } = this.system.shown;
       this.reference = Math.max(...alike.map((name) => store.greatest(`${name}/action`))) || 1;
       this.fade(faint);
-      this.group.visible = !off2;
+      this.group.visible = !off;
       this.origin = [x, y, z];
       this.scale = scale;
       this.group.position.set(x, y, z + 0.035);
@@ -7403,7 +4938,7 @@
     /** @param {number} k */
     foot(k) {
       const [x, y] = this.spot(k);
-      return this.point(x, y - WIDTH2 / 2, 0);
+      return this.point(x, y - WIDTH / 2, 0);
     }
     corners() {
       const [w, d] = [this.width / 2 + 0.3, this.depth];
@@ -7423,7 +4958,7 @@
       const { name, action } = this.system;
       const [x, y] = this.spot(0);
       const unit = action.unit ? ` / ${action.unit}` : "";
-      const point = this.point(x - WIDTH2 / 2, y, TALL);
+      const point = this.point(x - WIDTH / 2, y, TALL);
       return {
         point,
         text: `${name}: ${action.name}${unit}`,
@@ -7598,10 +5133,10 @@
       set(path, object);
       changed();
     };
-    const resize2 = viewer.set_3d_pane_size.bind(viewer);
+    const resize = viewer.set_3d_pane_size.bind(viewer);
     viewer.set_3d_pane_size = () => {
       const { clientWidth: w, clientHeight: h } = pane;
-      if (w && h) resize2(w, h);
+      if (w && h) resize(w, h);
     };
     viewer.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     viewer.gui.domElement.style.display = "none";
@@ -7713,11 +5248,11 @@
     }
     /** From the side, and for a long lane nearly along it, so that the near ones stay large. */
     defaultDirection() {
-      const { box, bars: bars2, planar } = this.layout;
+      const { box, bars, planar } = this.layout;
       const length = box ? box.high[0] - box.low[0] : 0;
       const long = Math.min(Math.max((length - 40) / 60, 0), 1);
       const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
-      const rows = bars2.reduce((sum, each) => sum + each.rows, 0);
+      const rows = bars.reduce((sum, each) => sum + each.rows, 0);
       const ofBars = rows > 1 ? 32 : 12;
       const ofFleet = planar ? 36 : 20 - 13 * long;
       const elevation = (box ? ofFleet : ofBars) * DEGREE;
@@ -7857,15 +5392,15 @@
      * @param {Numbers} row of estimates
      */
     outlines(system, holder, row) {
-      const bars2 = this.scene.layout.barsOf(system);
+      const bars = this.scene.layout.barsOf(system);
       system.action.owner.forEach((owner, k) => {
         if (owner === holder + 1) return;
         const [outline] = this.copiesOf(k, () => [this.outline()]);
-        const [x, y] = bars2.spot(k);
-        outline.position.set(...bars2.point(x, y, 0));
+        const [x, y] = bars.spot(k);
+        outline.position.set(...bars.point(x, y, 0));
         outline.visible = Number.isFinite(row[k]);
-        const height = bars2.scale * bars2.heightOf(row[k]);
-        outline.scale.set(0.5 * bars2.scale, 0.5 * bars2.scale, height || 1e-4);
+        const height = bars.scale * bars.heightOf(row[k]);
+        outline.scale.set(0.5 * bars.scale, 0.5 * bars.scale, height || 1e-4);
       });
     }
     /**
@@ -7896,10 +5431,10 @@
         const ahead = this.ahead(system, agent, row, action);
         const sources = this.scene.tinted.get(system.name)?.[agent] ?? [];
         const copies = this.copiesOf(agent, () => sources.map((mesh2) => this.copy(mesh2)));
-        copies.forEach((copy3, k) => {
-          copy3.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
-          ahead.forEach((v, axis) => copy3.matrix.elements[12 + axis] += v);
-          copy3.visible = Math.hypot(...ahead) > 0.01;
+        copies.forEach((copy2, k) => {
+          copy2.matrix.copy(matrixIn(this.scene.viewer, sources[k]));
+          ahead.forEach((v, axis) => copy2.matrix.elements[12 + axis] += v);
+          copy2.visible = Math.hypot(...ahead) > 0.01;
         });
       }
     }
@@ -7927,10 +5462,10 @@
         depthWrite: false
       });
       material.emissive.set(colour("ghost")).multiplyScalar(0.35);
-      const copy3 = new THREE.Mesh(mesh2.geometry, material);
-      copy3.matrixAutoUpdate = false;
-      this.group.add(copy3);
-      return copy3;
+      const copy2 = new THREE.Mesh(mesh2.geometry, material);
+      copy2.matrixAutoUpdate = false;
+      this.group.add(copy2);
+      return copy2;
     }
   };
 
@@ -7997,7 +5532,7 @@
      * @param {number} floor
      * @param {number[] | null} lane its least and greatest y
      */
-    place(target, distance, floor2, lane) {
+    place(target, distance, floor, lane) {
       const u = this.uniforms;
       const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
       this.major = 10 * minor;
@@ -8005,7 +5540,7 @@
       const snap = (v) => Math.round(v / major) * major;
       const reach = Math.max(8, 4 * distance);
       const origin = [snap(target[0]), snap(target[1])];
-      this.mesh.position.set(origin[0], origin[1], floor2 - 0.02);
+      this.mesh.position.set(origin[0], origin[1], floor - 0.02);
       this.mesh.scale.setScalar(2 * reach + major);
       u.size.value = 2 * reach + major;
       [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
@@ -8036,9 +5571,9 @@
      * @param {Bars[]} bars
      * @param {Plan[]} plans
      */
-    begin(fleets, bars2, plans) {
+    begin(fleets, bars, plans) {
       this.fleets = fleets;
-      this.bars = bars2;
+      this.bars = bars;
       this.plans = plans;
       this.known = false;
       this.spill = 0;
@@ -8079,7 +5614,7 @@
     barsOf(system) {
       return (
         /** @type {Bars} */
-        this.bars.find((bars2) => bars2.system === system)
+        this.bars.find((bars) => bars.system === system)
       );
     }
     boxOf() {
@@ -8123,21 +5658,21 @@
     }
     /** The points that should be in view, as three.js sees them. */
     points() {
-      const points2 = [];
+      const points = [];
       for (const system of this.fleets)
         for (let agent = 0; agent < system.agents; agent++) {
           const [x, y, z] = this.agentAt(system, agent);
-          points2.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
+          points.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
         }
       if (this.box) {
         const { low, high } = this.box;
         for (const x of [low[0] - this.spill, high[0] + this.spill])
           for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
-            points2.push([x, y, this.floor]);
+            points.push([x, y, this.floor]);
       }
-      for (const plan of this.plans) points2.push(...plan.corners(this.time, this.floor));
-      for (const bars2 of this.bars) points2.push(...bars2.corners());
-      return points2.length ? points2.map(toView) : [new THREE.Vector3()];
+      for (const plan of this.plans) points.push(...plan.corners(this.time, this.floor));
+      for (const bars of this.bars) points.push(...bars.corners());
+      return points.length ? points.map(toView) : [new THREE.Vector3()];
     }
     /** The middle of the agents, without what swings about them, as three.js sees it. */
     middle() {
@@ -8148,8 +5683,8 @@
           box.expandByPoint(toView([x, y, this.floor]));
           box.expandByPoint(toView([x, y, z + system.height]));
         }
-      for (const bars2 of this.bars)
-        for (const corner of bars2.corners()) box.expandByPoint(toView(corner));
+      for (const bars of this.bars)
+        for (const corner of bars.corners()) box.expandByPoint(toView(corner));
       return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
     }
   };
@@ -8158,7 +5693,7 @@
   var STRIP = new THREE.PlaneGeometry(1, 1);
   var AROUND2 = 48;
   var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND2);
-  var WIDTH3 = 0.05;
+  var WIDTH2 = 0.05;
   var LEAD = 0.02;
   var RIM = 0.025;
   var STEP2 = 4e-3;
@@ -8242,11 +5777,11 @@
       return this.plan.velocity.map((v, axis) => v * time + offset[axis]);
     }
     /** Corners of the region, if it is of the size of a fleet, for the camera. */
-    corners(time, floor2) {
+    corners(time, floor) {
       const [x, y] = this.origin(time);
       return this.plan.region.map(([a, b]) => (
         /** @type {Point} */
-        [x + a, y + b, floor2]
+        [x + a, y + b, floor]
       ));
     }
     /**
@@ -8283,7 +5818,7 @@
       const share = used(value, high, low);
       strip.material.color.setRGB(...ramp(share));
       const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
-      this.stretch(strip, ends[0], ends[1], WIDTH3, layout.floor + 2 * STEP2);
+      this.stretch(strip, ends[0], ends[1], WIDTH2, layout.floor + 2 * STEP2);
     }
     /**
      * The mark at an agent's output, and the line that leads to it.
@@ -8295,13 +5830,13 @@
      */
     placeOutput(agent, from, action, time, level) {
       const { owner } = this.system.action;
-      const to = this.origin(time);
-      if (to.length < 2 || !action) return;
+      const to2 = this.origin(time);
+      if (to2.length < 2 || !action) return;
       const axes = owner.flatMap((each, k) => each === agent + 1 ? [k] : []);
-      axes.forEach((k, axis) => to[axis] += action[k]);
-      if (axes.length === 1) to[1] = from[1];
-      this.marks[agent].position.set(to[0], to[1], level + 3 * STEP2);
-      this.stretch(this.leads[agent], from, to, LEAD, level + 2 * STEP2);
+      axes.forEach((k, axis) => to2[axis] += action[k]);
+      if (axes.length === 1) to2[1] = from[1];
+      this.marks[agent].position.set(to2[0], to2[1], level + 3 * STEP2);
+      this.stretch(this.leads[agent], from, to2, LEAD, level + 2 * STEP2);
     }
     /**
      * @param {Three} strip
@@ -8310,9 +5845,9 @@
      * @param {number} width
      * @param {number} level
      */
-    stretch(strip, from, to, width, level) {
-      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-      strip.position.set((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, level);
+    stretch(strip, from, to2, width, level) {
+      const [dx, dy] = [to2[0] - from[0], to2[1] - from[1]];
+      strip.position.set((from[0] + to2[0]) / 2, (from[1] + to2[1]) / 2, level);
       strip.rotation.z = Math.atan2(dy, dx);
       strip.scale.set(Math.max(Math.hypot(dx, dy), 1e-6), width, 1);
     }
@@ -8427,9 +5962,9 @@
       for (const object of this.objects.slice(first, first + count))
         object?.traverse(({ material, userData }) => {
           if (!material?.color) return;
-          const { opacity, transparent: transparent2, depthWrite } = userData.solid ??= { ...material };
+          const { opacity, transparent, depthWrite } = userData.solid ??= { ...material };
           material.opacity = shown2.faint ? FAINT2 * opacity : opacity;
-          material.transparent = shown2.faint || transparent2;
+          material.transparent = shown2.faint || transparent;
           material.depthWrite = !shown2.faint && depthWrite;
         });
     }
@@ -8530,20 +6065,20 @@
      * @param {Store} store
      */
     placeBars(instant, store) {
-      const { box, floor: floor2 } = this.layout;
+      const { box, floor } = this.layout;
       let behind = box ? box.high[1] + 2.4 : 0;
-      for (const bars2 of this.bars) {
-        const { over } = bars2.system.shown;
+      for (const bars of this.bars) {
+        const { over } = bars.system.shown;
         const under = over && this.bars.find(({ system }) => system === over);
         if (under) {
-          bars2.update(instant, store, under.origin, under.scale);
+          bars.update(instant, store, under.origin, under.scale);
           continue;
         }
         const span = box ? box.high[0] - box.low[0] : 0;
-        const scale = box ? Math.min(Math.max(0.6 * span / bars2.width, 0.8), 6) : 1;
+        const scale = box ? Math.min(Math.max(0.6 * span / bars.width, 0.8), 6) : 1;
         const x = box ? (box.low[0] + box.high[0]) / 2 : 0;
-        bars2.update(instant, store, [x, behind, floor2], scale);
-        behind += scale * (bars2.depth + 1);
+        bars.update(instant, store, [x, behind, floor], scale);
+        behind += scale * (bars.depth + 1);
       }
     }
     // ---- pictures
@@ -8867,8 +6402,8 @@
       return range;
     }
     makeNumber() {
-      const { label, min: min2, max: max2 } = this.control;
-      const attributes = { type: "number", min: min2, max: max2, step: "any" };
+      const { label, min, max } = this.control;
+      const attributes = { type: "number", min, max, step: "any" };
       const number2 = element("input", { ...attributes, "aria-label": `${label}, as a number` });
       number2.oninput = () => this.typing = true;
       number2.onblur = () => {
@@ -8890,14 +6425,14 @@
      * @param {number} value
      */
     placeOf(value) {
-      const { min: min2, max: max2 } = this.control;
-      if (this.logarithmic) return Math.log(value / min2) / Math.log(max2 / min2);
-      return (value - min2) / (max2 - min2);
+      const { min, max } = this.control;
+      if (this.logarithmic) return Math.log(value / min) / Math.log(max / min);
+      return (value - min) / (max - min);
     }
     /** @param {number} place */
     valueAt(place) {
-      const { min: min2, max: max2 } = this.control;
-      return this.logarithmic ? min2 * (max2 / min2) ** place : min2 + (max2 - min2) * place;
+      const { min, max } = this.control;
+      return this.logarithmic ? min * (max / min) ** place : min + (max - min) * place;
     }
     show() {
       const place = this.placeOf(this.value);
@@ -9007,18 +6542,18 @@
      * @param {string} whom in words
      */
     arrows({ system, axes, force }, agentOf, whom) {
-      const arrow = (axis, k, sign2 = 1) => {
-        const what = `push ${whom} ${sign2 < 0 ? "against" : "along"} ${axis || "its axis"}`;
+      const arrow = (axis, k, sign = 1) => {
+        const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
         return element("button", {
           type: "button",
           class: "push",
-          text: (axis === "y" ? "↓↑" : "←→")[sign2 < 0 ? 0 : 1],
+          text: (axis === "y" ? "↓↑" : "←→")[sign < 0 ? 0 : 1],
           title: what,
           "aria-label": what,
-          onclick: () => this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign2 * force })
+          onclick: () => this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force })
         });
       };
-      return axes.flatMap((axis, k) => [-1, 1].map((sign2) => arrow(axis, k, sign2)));
+      return axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow(axis, k, sign)));
     }
     /**
      * The simulation's values.
@@ -9120,7 +6655,7 @@
     const times = groups.map(([{ time }]) => time);
     const before = info.length + track.length + cuesOf(times, times).length;
     const places = clusters.map(
-      (_2, k) => clusters.slice(0, k).reduce((sum, { length }) => sum + length, before)
+      (_, k) => clusters.slice(0, k).reduce((sum, { length }) => sum + length, before)
     );
     return joined([HEAD, element2(408125543, info, track, cuesOf(times, places), ...clusters)]);
   };
@@ -9190,10 +6725,10 @@
     async start() {
       const { playback, plots } = this.page;
       if (!playback || this.page.recording !== null) return;
-      const [from, to] = plots.window;
+      const [from, to2] = plots.window;
       const stretch = (
         /** @type {Stretch} */
-        [from, Math.min(to, playback.end)]
+        [from, Math.min(to2, playback.end)]
       );
       const refused = this.refusal(stretch, playback.speed ?? 1);
       if (refused) return notify(refused, "error", ABOUT);
@@ -9216,10 +6751,10 @@
      * @param {Stretch} stretch
      * @param {number} speed
      */
-    refusal([from, to], speed) {
+    refusal([from, to2], speed) {
       if (!("VideoEncoder" in window))
         return "This browser cannot make videos (it has no VideoEncoder); current Chromium, Edge, Firefox and Safari can.";
-      const seconds = (to - from) / speed;
+      const seconds = (to2 - from) / speed;
       if (seconds > LONGEST)
         return `A video has at most ${LONGEST} s, and this one would have ${number(seconds)} s: show a shorter stretch in the plots (drag there with shift) or choose a higher speed.`;
       return seconds > 0 ? "" : "The plots show no stretch of this run.";
@@ -9228,12 +6763,12 @@
      * @param {Playback} playback
      * @param {Stretch} stretch
      */
-    async record(playback, [from, to]) {
+    async record(playback, [from, to2]) {
       const { page: page2 } = this;
       const speed = playback.speed ?? 1;
       const canvas = this.canvas();
       const film = new Film(canvas);
-      const count = Math.max(1, Math.round((to - from) / speed * RATE));
+      const count = Math.max(1, Math.round((to2 - from) / speed * RATE));
       page2.scene.setQuality(1);
       let n = 0;
       for (; n < count && !this.stopped && film.bytes < LARGEST; n++) {
