@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import mujoco
 import numpy as np
 from pydantic import Field
 
 from gne_mj.errors import InvalidInput, part_of
 from gne_mj.toml_table import Table, Unit
+
+if TYPE_CHECKING:
+    import mujoco
 
 APART = 2.0  # m between robots, so that they do not touch
 
@@ -113,6 +115,8 @@ def check_leaves(
     Raises:
         InvalidInput: names ``agents.poses``.
     """
+    import mujoco  # which reading a scenario does not need
+
     joint = model.dof_jntid[dof]
     if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         return

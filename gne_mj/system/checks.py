@@ -214,12 +214,12 @@ def check_engine(system: SystemData) -> None:
             f"MuJoCo has models of flexible robots and of a user's MJCF files; run"
             f" {kind.NAME}s on 'ode'",
         )
+    if system.engine == "ode" and not has_ode(kind):
+        raise InvalidInput("engine", system.engine, f"{kind.NAME}s run on 'mujoco'")
     if system.agents.contacts and system.engine != "mujoco":
         raise InvalidInput(
             "agents.contacts", True, "only MuJoCo has bodies: it must be false on engine 'ode'"
         )
-    if system.engine == "ode" and not has_ode(kind):
-        raise InvalidInput("engine", system.engine, f"{kind.NAME}s run on 'mujoco'")
     if system.integrator == "rosenbrock" and system.game.agents > ROSENBROCK_AGENTS:
         raise InvalidInput(
             "integrator",
