@@ -151,7 +151,7 @@ def report(
 
 def reasons(run: Ended) -> list[Reason]:
     """All that was seen, what holds outputs before what lets them move."""
-    found = [*_limits(run), *_stops(run), *_slips(run), *_loads(run)]
+    found = [*_limits(run), *_controllers(run), *_stops(run), *_slips(run), *_loads(run)]
     return [*found, *_moving(run)]
 
 
@@ -173,6 +173,25 @@ def _limits(run: Ended) -> Iterator[Reason]:
         f"the input of {_whose(agents)} was at its limit for up to {share[worst]:.0%} of the time"
         f" ({limit[worst]:g} of agent {run.agents(np.arange(len(share)) == worst)[0]}), {end}",
         {"share": share.tolist(), "at_end": bool(late.any())},
+    )  # fmt: skip
+
+
+def _controllers(run: Ended) -> Iterator[Reason]:
+    """What low-level controllers asked of actuators, or their own limits held back."""
+    met = run.plant.limits_met if isinstance(run.plant, FleetPlant) else {}
+    found = {i: {n: part for n, part in parts.items() if part > MANY} for i, parts in met.items()}
+    agents = [i + 1 for i, parts in found.items() if parts]
+    if not agents:
+        return
+    share, worst, name = max(
+        (part, i + 1, name) for i, parts in found.items() for name, part in parts.items()
+    )
+    what = "its own limits" if name == "controller" else f"the range of '{name}'"
+    yield Reason(
+        "limit", agents,
+        f"the low-level controller of {_whose(agents)} met limits, that of agent {worst} {what} in"
+        f" {share:.0%} of all evaluations",
+        {"share": {i + 1: parts for i, parts in found.items() if parts}},
     )  # fmt: skip
 
 

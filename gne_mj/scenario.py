@@ -159,7 +159,13 @@ def _resolve(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _resolve_in(table: Any, folder: Path) -> None:
-    for key in FILES if isinstance(table, dict) else ():
+    if isinstance(table, list):
+        for each in table:
+            _resolve_in(each, folder)
+    if not isinstance(table, dict):
+        return
+    _resolve_in(table.get("input"), folder)  # agents' low-level controllers
+    for key in FILES:
         given = table.get(key)
         if isinstance(given, str):
             table[key] = _absolute(folder, given)

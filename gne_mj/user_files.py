@@ -9,7 +9,9 @@ agent, ``action(agent)`` and so on (:mod:`gne_mj.controllers.local_law`). All of
 scenario's parameters too, by name. ``ACTS_OUTSIDE = True`` in the file says that these functions
 have an action outside the set as well; ``FILTERED = True`` puts them under the barrier
 (:mod:`gne_mj.controllers.filtered`). An agent type's file has constants and kernels as
-:mod:`gne_mj.plants.agent_type` lists them.
+:mod:`gne_mj.plants.agent_type` lists them; a low-level controller's
+(:mod:`gne_mj.plants.low_level.table`) ``control(readings, memory, u)`` and, with a memory of
+``MEMORY`` entries, ``rate(readings, memory, u)`` and ``start(readings)``, or kernels.
 """
 
 import hashlib
@@ -21,7 +23,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -41,10 +43,16 @@ from gne_mj.native import is_kernel
 from gne_mj.plain import check_arguments
 from gne_mj.plants.agent_type import complete
 from gne_mj.plants.agents import Agents
+from gne_mj.plants.low_level.plain import controller as plain_controller
+from gne_mj.plants.low_level.reading_table import ReadingTable
+from gne_mj.plants.low_level.table import Controller, ControllerTable, Seen
 from gne_mj.plants.table import AgentsTable
-from gne_mj.registry import AGENTS, GAMES, LAWS, TIMES
+from gne_mj.registry import AGENTS, GAMES, LAWS, LOW_LEVEL, TIMES
 from gne_mj.time_functions import Signal, TimeTable, called
 from gne_mj.toml_table import Fills, PerAgent, Sizes, dimension_of, per_agent
+
+if TYPE_CHECKING:
+    from gne_mj.plants.low_level.robot import Robot
 
 # Files written for version 0.1 import Game from there. (`gne_mj.game` stays the function.)
 sys.modules.setdefault("gne_mj.game", game_model)
@@ -284,6 +292,60 @@ class CustomController(NetworkTable):
     def build(self, game: Game) -> Law:
         """The law."""
         return load_law(self.file, game, self.network(game.agents), self.parameters)
+
+
+# What the plain functions of a controller take besides the scenario's parameters, and its kernels
+_LOW_LEVEL = {
+    "control": ("readings", "memory", "u"), "rate": ("readings", "memory", "u"),
+    "start": ("readings",),
+}  # fmt: skip
+_LOW_LEVEL_KERNELS = {
+    "control": ("q", "readings", "memory", "u", "out"),
+    "rate": ("q", "readings", "memory", "u", "out"), "start": ("q", "readings", "out"),
+}  # fmt: skip
+
+
+@LOW_LEVEL.register
+class CustomLowLevel(ControllerTable):
+    """A low-level controller of the user's own."""
+
+    controller: Literal["custom"]
+    file: Annotated[str, Fills("path")] = Field(
+        description="Python file that defines control(readings, memory, u), or kernels"
+    )
+    actuators: list[str] = Field(min_length=1, description="whose forces it says, in this order")
+    readings: list[str | ReadingTable] = Field(
+        description="what it reads: names of joints or sensors, or tables as of outputs"
+    )
+    parameters: dict[str, Any] = Field({}, description="handed to its functions, by name")
+
+    def bind(self, robot: "Robot", axes: int) -> Controller:
+        """See the base class."""
+        module, name = load_module(self.file), Path(self.file).name
+        functions = {each: getattr(module, each) for each in _LOW_LEVEL if hasattr(module, each)}
+        if "control" not in functions:
+            raise InvalidInput("input.file", name, "it must define control(readings, memory, u)")
+        memory = getattr(module, "MEMORY", 0)
+        seen = [(Seen(each),) if isinstance(each, str) else each.seen() for each in self.readings]
+        parts = tuple(self.actuators), tuple(one for each in seen for one in each), axes
+        native = {is_kernel(function) for function in functions.values()}
+        if len(native) > 1:
+            raise InvalidInput("input.file", name, "mark all its functions with @kernel, or none")
+        known = _LOW_LEVEL_KERNELS if native == {True} else _LOW_LEVEL
+        given = {} if native == {True} else self.parameters
+        for each, function in functions.items():
+            check_arguments("input.file", name, function, each, known[each], given)
+        if native == {False}:
+            made = {each: partial(f, **self.parameters) for each, f in functions.items()}
+            return plain_controller(made, *parts, memory)
+        names = getattr(module, "PARAMETERS", ())
+        if set(names) != set(self.parameters):
+            wanted = ", ".join(names) or "none"
+            raise InvalidInput("input.parameters", sorted(self.parameters), f"{name} has {wanted}")
+        moving = memory if "rate" in functions else 0
+        numbers = np.array([float(self.parameters[each]) for each in names])
+        actuators, readings, inputs = parts
+        return Controller(module, actuators, readings, numbers, inputs, moving, memory - moving)
 
 
 @AGENTS.register

@@ -148,3 +148,53 @@ def quadrotor_law(model, data, u, place, heading, *, w_n=20.0, zeta=1.0, k=2.0, 
     mixer = np.vstack([np.ones(4), arms[:, 1], -arms[:, 0], spin])
     thrusts = np.linalg.solve(mixer, [force @ r[:, 2], *moment])
     return thrusts * [1, 1, 1 / 4, 1]
+
+
+CART = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body name="cart">
+      <joint name="x" type="slide" axis="1 0 0" damping="1.5"/>
+      <geom size="0.1" mass="2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="push" joint="x" gear="4"/></actuator>
+</mujoco>
+"""
+# As if a cart had no drag: it follows a mass that has none
+FRICTIONLESS = """
+MEMORY = 1
+
+
+def control(readings, memory, u, *, mass, gain):
+    return [u[0] + mass * gain * (memory[0] - readings[0])]
+
+
+def rate(readings, memory, u, *, mass, gain):
+    return [u[0] / mass]
+
+
+def start(readings, *, mass, gain):
+    return [readings[0]]
+"""
+FRICTIONLESS_KERNELS = """
+from gne_mj.native import kernel
+
+MEMORY, PARAMETERS = 1, ("mass", "gain")
+
+
+@kernel
+def control(q, readings, memory, u, out):
+    out[0] = u[0] + q[0] * q[1] * (memory[0] - readings[0])
+
+
+@kernel
+def rate(q, readings, memory, u, out):
+    out[0] = u[0] / q[0]
+
+
+@kernel
+def start(q, readings, out):
+    out[0] = readings[0]
+"""

@@ -4,10 +4,21 @@ import mujoco
 import numpy as np
 import pytest
 from builders import run_loop
-from low_level_robots import ARM, BOAT, CAR, QUADROTOR, fleet, quadrotor_law
+from low_level_robots import (
+    ARM,
+    BOAT,
+    CAR,
+    CART,
+    FRICTIONLESS,
+    FRICTIONLESS_KERNELS,
+    QUADROTOR,
+    fleet,
+    quadrotor_law,
+)  # fmt: skip
 
+import gne_mj.user_files  # noqa: F401  registers controllers of the user's own
 from gne_mj.controllers import FullInformation
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.games import velocity_game
 from gne_mj.plants.mjcf_robot import MjcfAgents
 from gne_mj.system import System
@@ -225,3 +236,74 @@ def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
 def test_what_does_not_fit_is_told(tmp_path, text, given, axes, key, words):
     with pytest.raises(InvalidInput, match=rf"agents.input.{key}: .*{words}"):
         fleet(tmp_path / "robot.xml", text, given, {"site": "any"}, axes)
+
+
+def frictionless(folder, text=FRICTIONLESS, **more):
+    path = folder / "own.py"
+    path.write_text(text)
+    return {
+        "controller": "custom", "file": str(path), "actuators": ["push"], "readings": ["x"],
+        "parameters": {"mass": 2.0, "gain": 20.0}, **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [FRICTIONLESS, FRICTIONLESS_KERNELS])
+def test_a_users_own_has_a_memory(tmp_path, text):
+    """Plain functions and kernels, against bare MuJoCo; the memory's rate is that of a step."""
+    plant = fleet(tmp_path / "cart.xml", CART, frictionless(tmp_path, text), "x", 1, count=2)
+    plant.reset([[0.3, 0.0], [-0.1, 0.0]])
+    plant.step([1.2, 0.0], 100)
+    expected = []
+    for v, u in ((0.3, 1.2), (-0.1, 0.0)):
+        model, data = bare(tmp_path / "cart.xml", 0.002)
+        data.qvel[0] = memory = v
+        for _ in range(100):
+            data.ctrl[0] = (u + 2.0 * 20.0 * (memory - data.qvel[0])) / 4
+            memory += 0.002 * u / 2.0
+            mujoco.mj_step(model, data)
+        expected.append(data.qvel[0])
+    assert np.allclose(plant.output, expected, rtol=0, atol=1e-12)
+    assert abs(plant.output[0] - (0.3 + 0.6 * 0.2)) < 0.02
+
+
+@pytest.mark.parametrize(("integrator", "mode", "period"), MODES)
+def test_a_memory_in_the_native_loops(tmp_path, integrator, mode, period):
+    """Both forms give the same run, which mode implicit predicts."""
+    (tmp_path / "cart.xml").write_text(CART)
+    found = []
+    for text in (FRICTIONLESS, FRICTIONLESS_KERNELS):
+        agents = MjcfAgents(
+            type="mjcf-robot", count=2, file=str(tmp_path / "cart.xml"), output="x",
+            input=frictionless(tmp_path, text),
+        ).build((1, 1))  # fmt: skip
+        system = System(
+            "carts", velocity_game(2, 1.0, 2.0), agents, FullInformation(), 0.1,
+            agents.equilibrium(np.array([0.3, 0.5])), engine="mujoco", mode=mode,
+            integrator=integrator,
+        )  # fmt: skip
+        states, _, _, loop = run_loop(system, 0.002, 100, period)
+        assert mode != "implicit" or loop.monitor.prediction < 1e-12
+        found.append(states[:, :, 0])
+    assert np.allclose(found[1], found[0], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "words"),
+    [
+        ("x = 1", {}, "it must define control"),
+        ("def control(readings, u): return [0]", {"parameters": {}}, "must define control"),
+        (FRICTIONLESS, {"readings": ["y"]}, "input.readings: got 'y'"),
+        (FRICTIONLESS, {"actuators": ["pull"]}, "did you mean 'push'"),
+        (FRICTIONLESS_KERNELS, {"parameters": {"mass": 1.0}}, "own.py has mass, gain"),
+        (FRICTIONLESS.replace("return [readings[0]]", "return [1, 2]"), {}, "a list of 1 numbers"),
+        (FRICTIONLESS.replace("u[0] / mass", "undefined"), {}, "own.py, line 10"),
+    ],
+)
+def test_what_is_wrong_with_a_users_own_is_told(tmp_path, text, more, words):
+    def attempt():
+        plant = fleet(tmp_path / "cart.xml", CART, frictionless(tmp_path, text, **more), "x", 1)
+        plant.reset([[0.0, 0.0]])
+        plant.step([1.0])
+
+    with pytest.raises((InvalidInput, UserCodeError), match=words):
+        attempt()

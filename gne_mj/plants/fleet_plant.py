@@ -50,6 +50,13 @@ class FleetPlant(Plant):
         return True
 
     @property
+    def limits_met(self) -> dict[int, dict[str, float]]:
+        """Since the start, for each agent (from 0) with a low-level controller: the actuators that
+        it asked for more than they give, by name, and in what part of all evaluations; and
+        "controller" where it gave less by limits of its own."""
+        return {}
+
+    @property
     def state_bits(self) -> int:
         """Of mjtState, what puts a fleet back to where it was, but for what a loop keeps."""
         return STATE

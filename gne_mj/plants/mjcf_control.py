@@ -25,6 +25,7 @@ from gne_mj.plants.low_level.functions import address_of
 from gne_mj.plants.low_level.robot import Robot
 from gne_mj.plants.low_level.table import Controlled, Controller, Seen
 from gne_mj.plants.mjcf_actuator import make_force
+from gne_mj.plants.mjcf_output import Output
 from gne_mj.plants.mjcf_reading import OBJECTS, READING, Term, names_in, terms_of, velocity_of
 from gne_mj.plants.mjcf_robot import MjcfRobots
 from gne_mj.plants.native_mujoco import USERDATA_HEADER, field
@@ -269,12 +270,16 @@ def term_of(model: mujoco.MjModel, prefix: str, seen: Seen) -> Term:
     Raises:
         InvalidInput: it is a sum, has no position, or is known at a step's start only.
     """
-    if seen.value in _STRIDES:
+    if seen.value in _STRIDES and isinstance(seen.of, Output):
         kind, stride = seen.of.kind, _STRIDES[seen.value]
         array = _ORIENTATION[kind] if seen.value == "orientation" else seen.value
         index = int(mujoco.mj_name2id(model, OBJECTS[kind], prefix + seen.of.name))
+        if index < 0:
+            near = nearest(seen.of.name, names_in(model, kind, prefix))
+            raise InvalidInput("input.readings", seen.of.name, f"no such {kind}; {near}")
         return Term(array, stride * index + seen.component)
-    terms = terms_of(model, prefix, seen.of)
+    with named(output="input.readings"):
+        terms = terms_of(model, prefix, seen.of)
     (term,) = terms[:1]
     expected = ""
     if len(terms) > 1 or term.factor != 1.0:
@@ -305,7 +310,9 @@ def begin(data: mujoco.MjData, fleet: FleetControls, read: Any) -> None:
             continue
         seen, memory = np.zeros(len(controller.seen)), np.zeros(length)
         read(c, seen)
-        controller.module.start(controller.numbers, seen, memory)
+        start = controller.start or getattr(controller.module, "start", None)
+        if start is not None:
+            start(controller.numbers, seen, memory)
         data.act[place.memory : place.memory + place.moving] = memory[: controller.moving]
         held = place.own + 2 + place.controls
         data.userdata[held : held + controller.held] = memory[controller.moving :]

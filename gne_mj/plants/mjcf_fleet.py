@@ -12,6 +12,7 @@ from gne_mj.errors import InvalidInput, named
 from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
+from gne_mj.plain import raise_pending
 from gne_mj.plants import mjcf_file, mjcf_robot
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
@@ -323,9 +324,7 @@ class MjcfPlant(FleetPlant):
 
     @property
     def limits_met(self) -> dict[int, dict[str, float]]:
-        """Since the start: for each agent (from 0) with a low-level controller the actuators that
-        it asked for more than they give, by name, and in what part of all evaluations; and
-        "controller" where it gave less by limits of its own."""
+        """See the base class."""
         return limits_met(self.data, self._controls)
 
     def _slopes(self) -> NDArray[np.float64]:
@@ -368,6 +367,7 @@ class MjcfPlant(FleetPlant):
         with callbacks(passive=self.passive):
             if self._controls.controllers:
                 _driven_steps()(self.model._address, self.data._address, block, given, steps)
+                raise_pending()
             else:
                 run_steps()(step_address(), self.model._address, self.data._address, steps)
         check_warnings(self.data)

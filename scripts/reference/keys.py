@@ -82,6 +82,8 @@ def page() -> str:
     for tag, table in sorted(LOW_LEVEL._tables.items()):
         if table.__module__.startswith("gne_mj."):
             parts += [f'### `controller = "{tag}"`\n', _about(table), _rows(table)]
+            parts += [text for key, inner in _inner(table)
+                      for text in (f"`{key}` has\n", _rows(inner))]  # fmt: skip
     parts += ["## Functions of time\n", TIME]
     for tag, table in TIMES_OF.items():
         parts += [f'### `type = "{tag}"`\n', _about(table), _rows(table)]

@@ -8,7 +8,8 @@ module (``low_level/quadrotor.py``) with its registered table and its kernels:
                                            COUNTS_LIMITS = True it returns 1 where it gave less than
                                            u asks for, by limits of its own, and else 0
     rate(q, readings, memory, u, out)      fills out (moving,); only with a memory that moves
-    start(q, readings, out)                fills out (memory,) at a run's start; called in Python
+    start(q, readings, out)                fills out (memory,) at a run's start, else zeros; called
+                                           in Python
 
 Those entries of the memory that move come first. They are in MuJoCo's ``act``, each an activation
 that integrates its control, so that whatever saves, copies or predicts a simulation's state has
@@ -16,7 +17,7 @@ them too; what is only kept from the start is in ``userdata``.
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -44,7 +45,7 @@ class Seen(NamedTuple):
         component: of an orientation (row by row) or such an array.
     """
 
-    of: Output
+    of: Output | str
     value: str = "velocity"
     component: int = 0
 
@@ -60,6 +61,8 @@ class Controller:
         numbers: q.
         inputs: entries of u.
         moving, held: entries of its memory that move, and that are kept from the start.
+        start: in place of the module's.
+        kept: what must be there as long as it is.
     """
 
     module: ModuleType
@@ -69,6 +72,8 @@ class Controller:
     inputs: int
     moving: int = 0
     held: int = 0
+    start: Callable[..., None] | None = None
+    kept: Any = None
 
 
 class ControllerTable(Table):
