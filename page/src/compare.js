@@ -56,12 +56,15 @@ export class Comparison {
     for (const system of systems) {
       const alike = systems.filter((each) => this.comparedBy(each) === this.comparedBy(system));
       const off = this.hidden.has(system.run);
-      const faint = this.ghosts && !off && system.run !== first;
+      const under = alike.find(({ run }) => run === first) ?? null;
+      // bars of another quantity stand where they did
+      const ghost = system.drawn_as === "fleet" || under !== null;
+      const faint = this.ghosts && !off && system.run !== first && ghost;
       system.shown = {
         offset: offsetOf(system, this.ghosts),
         faint,
         off,
-        over: (faint && alike.find(({ run }) => run === first)) || null,
+        over: faint ? under : null,
         alike: alike.map(({ name }) => name),
       };
     }
@@ -71,8 +74,8 @@ export class Comparison {
    * What systems of several runs have in common.
    * @param {System} system
    */
-  comparedBy({ name, run }) {
-    return this.runs[run]?.systems[name] ?? name;
+  comparedBy({ name, run, action }) {
+    return [this.runs[run]?.systems[name] ?? name, action.name, action.unit].join("\n");
   }
 
   /** @param {boolean} ghosts */

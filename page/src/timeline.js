@@ -28,5 +28,5 @@ export const exitLine = (whose) =>
   element(
     "div",
     { class: "exit-line", hidden: true },
-    element("span", { text: `${whose} left the set`.trim() }),
+    element("span", { text: whose ? `left the set: ${whose}` : "left the set" }),
   );

@@ -354,12 +354,14 @@
       for (const system of systems) {
         const alike = systems.filter((each) => this.comparedBy(each) === this.comparedBy(system));
         const off = this.hidden.has(system.run);
-        const faint = this.ghosts && !off && system.run !== first;
+        const under = alike.find(({ run }) => run === first) ?? null;
+        const ghost = system.drawn_as === "fleet" || under !== null;
+        const faint = this.ghosts && !off && system.run !== first && ghost;
         system.shown = {
           offset: offsetOf(system, this.ghosts),
           faint,
           off,
-          over: faint && alike.find(({ run }) => run === first) || null,
+          over: faint ? under : null,
           alike: alike.map(({ name }) => name)
         };
       }
@@ -368,8 +370,8 @@
      * What systems of several runs have in common.
      * @param {System} system
      */
-    comparedBy({ name, run }) {
-      return this.runs[run]?.systems[name] ?? name;
+    comparedBy({ name, run, action }) {
+      return [this.runs[run]?.systems[name] ?? name, action.name, action.unit].join("\n");
     }
     /** @param {boolean} ghosts */
     setGhosts(ghosts) {
@@ -4262,7 +4264,7 @@
   var exitLine = (whose) => element(
     "div",
     { class: "exit-line", hidden: true },
-    element("span", { text: `${whose} left the set`.trim() })
+    element("span", { text: whose ? `left the set: ${whose}` : "left the set" })
   );
 
   // src/plot.js
