@@ -152,7 +152,6 @@ WRONG = [
     ({"mass": "-1"}, "MuJoCo must"),
     ({"mass": "heavy"}, "MuJoCo must read it: XML Error"),
     ({"extra": "<contact"}, "MuJoCo must read it"),
-    ({"compiler": '<compiler settotalmass="20"/>'}, "scale its masses"),
     ({"flags": '<flag sleep="enable"/>'}, "leave the flag 'sleep' out"),
 ]
 

@@ -21,6 +21,7 @@ from gne_mj.interface.tables import made
 from gne_mj.plants.integrator import IntegratorAgents
 from gne_mj.plants.mixed import MixedAgents
 from gne_mj.plants.mjcf_robot import MjcfAgents
+from gne_mj.plants.mjcf_source import is_named
 from gne_mj.plants.pi_cascade import PiCascadeAgents
 from gne_mj.plants.robot_tables import PlanarRobotAgents, RobotAgents
 from gne_mj.plants.table import AgentsTable
@@ -151,7 +152,8 @@ def mjcf_robots(
 
     Args:
         count: N.
-        file: an MJCF file, or its text, which begins with ``<``; one for all or one each.
+        file: an MJCF file, or its text, which begins with ``<``, or the name of a package's
+            (``"dm_control:walker"``, docs/robots.md); one for all or one each.
         output: the joint or velocity sensor that is y_i, likewise, or a table that says what
             (docs/robots.md), as ``{"body": "hull", "axes": ["x", "y"]}``; of vectors a list.
         input: the actuator that u_i drives, likewise, or a table of several, or of a force.
@@ -189,7 +191,7 @@ def _path(file: str | Path) -> str:
     """A file's path; that of a text, which is kept among the user's temporary files."""
     text = str(file).lstrip()
     if not text.startswith("<"):
-        return str(Path(file).resolve())
+        return text if is_named(text) else str(Path(file).resolve())
     path = Path(gettempdir()) / f"gne-mj-{sha256(text.encode()).hexdigest()[:16]}.xml"
     with written("file", path, replace=True) as new:
         new.write_text(text, encoding="utf-8")

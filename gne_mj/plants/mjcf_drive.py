@@ -76,6 +76,8 @@ def add_effort(spec: Any, given: str | Input | Controlled, channel: int, path: P
     if given.kind == "body":
         found.add_site(name=name)
     actuator = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE)
+    actuator.set_to_motor()  # whatever the file's defaults say
+    actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_FALSE
     actuator.target = name if given.kind == "body" else given.name
     if not given.own:
         if spec.site(_WORLD) is None:
@@ -115,7 +117,8 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
             index = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + name))
             if index < 0:
                 names = names_in(model, "actuator", prefix)
-                raise InvalidInput("input", name, nearest(name, names))
+                hint = nearest(name, names) if names else "its file has no actuator: name a body"
+                raise InvalidInput("input", name, hint)
             if name == _effort(channel):
                 _check_moves(model, index, robot.input, robot.path)
             own = given.factors == (1.0,) and _measures(model, prefix, robot.output, index)

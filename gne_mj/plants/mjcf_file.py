@@ -42,14 +42,38 @@ def read(path: Path) -> Any:
     for name in options_of(spec):
         _check_finite(path, name, getattr(spec.option, name))
     if spec.compiler.settotalmass > 0:
-        raise _refusal(path, "settotalmass would be that of the fleet: scale its masses instead")
+        _scale_masses(spec, path)
     if spec.option.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         raise _refusal(path, "MuJoCo's state does not say who sleeps: leave the flag 'sleep' out")
     # a state that is not a number must be seen, not be reset
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     for key in list(spec.keys):
         spec.delete(key)
+    _name_actuators(spec)
     return spec
+
+
+def _scale_masses(spec: Any, path: Path) -> None:
+    """Let a robot have the mass that it asks for (settotalmass), which MuJoCo takes for that of
+    all that it compiles, of a whole fleet."""
+    total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
+    factor = total / np.sum(compiled(spec, path).body_mass)
+    for geom in spec.geoms:
+        geom.mass *= factor  # nan, where its density says it
+        geom.density *= factor
+    for body in spec.bodies:
+        if body.explicitinertial:
+            body.mass *= factor
+            body.inertia = body.inertia * factor
+            body.fullinertia = body.fullinertia * factor
+
+
+def _name_actuators(spec: Any) -> None:
+    """Call actuators without a name as what they drive, where one alone drives it."""
+    names = [actuator.name or actuator.target for actuator in spec.actuators]
+    for actuator, name in zip(spec.actuators, names, strict=True):
+        if names.count(name) == 1:
+            actuator.name = name
 
 
 def alone(path: Path) -> mujoco.MjModel:

@@ -141,7 +141,8 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
     engine: ClassVar[str] = "mujoco"
     type: Literal["mjcf-robot"]
     file: Annotated[str | list[str], Fills("path")] = Field(
-        description="MJCF file, one for all or one each; gne_mj:car.xml is a shipped one"
+        description="MJCF file, one for all or one each; or a package's, as gne_mj:car.xml,"
+        " dm_control:walker, gymnasium:ant, menagerie:unitree_go2"
     )
     output: str | OutputTable | list[str | OutputTable] | list[list[str | OutputTable]] = Field(
         description="joint or velocity sensor that is y_i, or of y = q + tau v; or a table that"
