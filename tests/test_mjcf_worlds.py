@@ -339,3 +339,12 @@ def test_all_contacts_are_as_files_say_and_neighbours_need_room(tmp_path):
     agents = dataclasses.replace(mjcf_robots((robot,) * 2, np.full(2, np.inf)), spacing=0.1)
     with pytest.raises(InvalidInput, match=r"overlaps 'robot_2/hull' of agent 2, 0.1 m beside it"):
         MjcfPlant(agents, 0.002).reset(np.zeros((2, 2)))
+
+
+def test_a_floor_that_all_files_bring_is_seen_once(tmp_path):
+    robot = boat(tmp_path)
+    model = plant_of(robot, robot, robot).model
+    planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    seen = [model.geom(geom).name for geom in planes if model.geom_group[geom] == 0]
+    assert len(planes) == 4
+    assert seen == ["robot_1/floor"]

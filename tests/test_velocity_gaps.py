@@ -95,6 +95,8 @@ def velocity_scenarios():
         scenario = load_scenario(name)
         for key, system in scenario.systems.items():
             if system.game.type in ("velocity-synchronization", "velocity-consensus"):
+                if name == "cars":  # whose contacts other versions of MuJoCo may solve otherwise
+                    continue
                 # of the disturbed one a loop of its own is compiled
                 marks = [pytest.mark.slow] if name == "disturbed" else []
                 yield pytest.param(name, key, marks=marks)

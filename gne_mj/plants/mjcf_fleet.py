@@ -51,7 +51,7 @@ from gne_mj.plants.mjcf_prediction import (
 )
 from gne_mj.plants.mjcf_reading import Term, array_word, fresh_by, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
-from gne_mj.plants.mjcf_terrain import check_options, ground, without_floors
+from gne_mj.plants.mjcf_terrain import check_options, ground, show_one_floor, without_floors
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
@@ -150,6 +150,7 @@ class MjcfPlant(FleetPlant):
         with quiet():
             mujoco.mj_fwdPosition(self.model, self.data)
         self._owners = owners_of(self.model, sizes_of_robots)
+        show_one_floor(self.model, self.data, self._owners)
         share_floors(self.model, self.data, self._owners)
         let_touch(self.model, self._owners, agents.touching)
         self._terms: list[Term] = []  # of all outputs that are no joint's
