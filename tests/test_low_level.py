@@ -213,6 +213,29 @@ def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
         assert np.allclose(data.qfrc_actuator, expected, rtol=0, atol=1e-12)
 
 
+def test_servos_with_a_ctrlrange_give_forces_and_count_where_they_do_not(tmp_path):
+    """A cart of 2 kg goes as under the force itself, until its servo clamps."""
+    motor = '<motor name="push" joint="x" gear="4"/>'
+    for servo, most in (
+        ('<velocity name="push" joint="x" kv="3" gear="2" ctrlrange="-1 1"/>', None),
+        ('<position name="push" joint="x" kp="6" kv="1" gear="-2" ctrlrange="-1 1"/>', None),
+        ('<velocity name="push" joint="x" kv="3" ctrlrange="-9 9" forcerange="-1 1"/>', 1.0),
+    ):
+        text = CART.replace(motor, servo).replace('damping="1.5"', "")
+        given = {"controller": "servo", "actuators": ["push"]}
+        plant = fleet(tmp_path / "cart.xml", text, given, "x", 1)
+        plant.reset([[0.1, 0.0]])
+        plant.step([0.8], 200)
+        assert plant.output[0] == pytest.approx(0.1 + 0.4 * 0.4, abs=1e-12)
+        assert plant.limits_met == {0: {}}
+        plant.step([8.0], 100)
+        assert plant.output[0] < 0.26 + 4.0 * 0.2 - 0.1
+        name, rate = ("controller", most) if most else ("push", None)
+        assert plant.limits_met[0][name] == pytest.approx(1 / 3, abs=0.1)
+        if rate:
+            assert plant.data.qfrc_actuator[0] == pytest.approx(rate)
+
+
 @pytest.mark.parametrize(
     ("text", "given", "axes", "key", "words"),
     [
@@ -230,6 +253,7 @@ def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
         (CAR, {**WHEELS, "site": "nose"}, 1, "site", "two entries"),
         (BOAT, {**SCREWS, "screws": ["port", "port"]}, 1, "screws", "left of the other"),
         (BOAT, {**SCREWS, "body": None}, 1, "body", "has 0 free joints"),
+        (ARM, {"controller": "servo", "actuators": ["b"]}, 1, "actuators", "velocity servo of a"),
         (ARM, {**HAND, "joints": ["a", "b"]}, 2, "joints", "'elbow'"),
     ],
 )

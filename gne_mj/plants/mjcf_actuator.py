@@ -25,6 +25,7 @@ _GAINS = {
     _GAIN.mjGAIN_SO3: "it is a servo of an orientation",
     _GAIN.mjGAIN_PID: "it is a PID servo",
 }
+_OR_SERVO = ", or input = {{ controller = 'servo', actuators = ['{}'] }}"
 _TRANSMISSIONS = {
     _TRN.mjTRN_SLIDERCRANK: "a slider-crank, whose lever changes",
     _TRN.mjTRN_BODY: "adhesion of a body",
@@ -78,6 +79,14 @@ def _clamps(model: mujoco.MjModel, actuator: int) -> bool:
     return bool(model.actuator_ctrllimited[model.actuator_ctrladr[actuator]] and not ignored)
 
 
+def control_range(model: mujoco.MjModel, actuator: int) -> tuple[float, float]:
+    """The least and greatest control that pass unchanged."""
+    if not _clamps(model, actuator):
+        return -np.inf, np.inf
+    low, high = model.actuator_ctrlrange[model.actuator_ctrladr[actuator]]
+    return float(low), float(high)
+
+
 def make_force(
     model: mujoco.MjModel,
     data: mujoco.MjData,
@@ -117,7 +126,7 @@ def make_force(
             "input",
             name,
             f"in {path.name} {what}, where a law needs a force: make it a <motor>, or name"
-            " another actuator",
+            f" another actuator{_OR_SERVO.format(name) if is_servo(model, actuator) else ''}",
         )
     if is_servo(model, actuator):
         model.actuator_biastype[actuator] = _BIAS.mjBIAS_NONE

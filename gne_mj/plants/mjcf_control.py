@@ -24,7 +24,7 @@ from gne_mj.plants import mjcf_file
 from gne_mj.plants.low_level.functions import address_of
 from gne_mj.plants.low_level.robot import Robot
 from gne_mj.plants.low_level.table import Controlled, Controller, Seen
-from gne_mj.plants.mjcf_actuator import make_force
+from gne_mj.plants.mjcf_actuator import control_range, make_force
 from gne_mj.plants.mjcf_output import Output
 from gne_mj.plants.mjcf_reading import OBJECTS, READING, Term, names_in, terms_of, velocity_of
 from gne_mj.plants.mjcf_robot import MjcfRobots
@@ -247,7 +247,10 @@ def fleet_controls(
             if index < 0:
                 known = [n for n in names_in(model, "actuator", prefix) if _MEMORY not in n]
                 raise InvalidInput("input", name, nearest(name, known))
-            ranges += make_force(model, data, index, name, path, own_velocity=False)
+            if controller.raw:
+                ranges += control_range(model, index)
+            else:
+                ranges += make_force(model, data, index, name, path, own_velocity=False)
             controls.append(int(model.actuator_ctrladr[index]))
         memory = [model.actuator(f"{prefix}{_MEMORY} {k + 1}") for k in range(controller.moving)]
         first = int(memory[0].actadr[0]) if memory else 0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, nearest
+from gne_mj.plants.mjcf_actuator import is_servo
 from gne_mj.plants.mjcf_reading import OBJECTS, names_in
 
 Array = NDArray[np.float64]
@@ -178,3 +179,24 @@ class Robot(NamedTuple):
         _, _, inertia = self.composite(body)
         axes = self.axes(body)
         return float((axes @ inertia @ axes.T)[2, 2])
+
+    def servo(self, key: str, name: str) -> list[float]:
+        """Of a servo its gear, gain, b_0, b_1 and b_2, and the range of its force.
+
+        Raises:
+            InvalidInput: it is no servo at a joint or tendon; names ``input`` and the key.
+        """
+        model, index = self.model, self.find(key, "actuator", name)
+        along = (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT, _TRN.mjTRN_TENDON)
+        gear = float(model.actuator_gear[model.actuator_outadr[index], 0])
+        gain = float(model.actuator_gainprm[index, 0])
+        given = _TRN(model.actuator_trntype[index]) in along and gear * gain != 0.0
+        if not given or not is_servo(model, index):
+            raise self.refused(
+                key, name, f"in {self.path.name} it must be a position or velocity servo of a joint"
+                " or tendon, without timeconst and delay",
+            )  # fmt: skip
+        low, high = -np.inf, np.inf
+        if model.actuator_forcelimited[index]:
+            low, high = model.actuator_forcerange[index]
+        return [gear, gain, *model.actuator_biasprm[index, :3].tolist(), float(low), float(high)]

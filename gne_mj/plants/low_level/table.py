@@ -63,6 +63,7 @@ class Controller:
         moving, held: entries of its memory that move, and that are kept from the start.
         start: in place of the module's.
         kept: what must be there as long as it is.
+        raw: whether it says the actuators' own controls, which are not made forces.
     """
 
     module: ModuleType
@@ -74,6 +75,7 @@ class Controller:
     held: int = 0
     start: Callable[..., None] | None = None
     kept: Any = None
+    raw: bool = False
 
 
 class ControllerTable(Table):
