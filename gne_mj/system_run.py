@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj import not_reached
 from gne_mj.certificate import Certificate, certify_run
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.errors import InvalidInput
@@ -229,6 +228,8 @@ class SystemRun:
             clock=self.clock,
         )
         if certificate.status == "completed":
+            from gne_mj import not_reached  # which loads MuJoCo
+
             why = not_reached.report(
                 self.system, time, samples.state[:, :, self.system.agents.kind.OUTPUT],
                 samples.input, duration=self.clock.duration, tolerance=tolerance,

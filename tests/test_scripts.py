@@ -15,4 +15,6 @@ def test_what_it_installs_is_locked(script):
     """An environment of no name ended scripts/arena before it began."""
     for line in re.findall(r"^make_environment\b.*", script.read_text(), re.MULTILINE):
         if "{" not in line:
-            assert line.split()[1:2] and set(line.split()[1:]) <= LOCKS, line
+            names = line.split()[1:]
+            assert names
+            assert set(names) <= LOCKS, line

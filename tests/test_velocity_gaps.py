@@ -95,7 +95,7 @@ def velocity_scenarios():
         scenario = load_scenario(name)
         for key, system in scenario.systems.items():
             if system.game.type in ("velocity-synchronization", "velocity-consensus"):
-                if name == "cars":  # whose contacts other versions of MuJoCo may solve otherwise
+                if system.agents.type == "mjcf-robot":  # scripts/check-robots looks at these
                     continue
                 # of the disturbed one a loop of its own is compiled
                 marks = [pytest.mark.slow] if name == "disturbed" else []

@@ -80,7 +80,7 @@ def without_floors(spec: Any, path: Path) -> None:
 
 
 def show_one_floor(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:
-    """Hide but one of the planes that lie in each other, so that a floor that all bring is seen once.
+    """Hide but one of the planes that lie in each other: a floor that all bring is seen once.
 
     Args:
         model: of the fleet; those that are hidden change their group.
