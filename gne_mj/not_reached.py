@@ -215,7 +215,7 @@ def _loads(run: Ended) -> Iterator[Reason]:
     parts, pushed = {}, set()
     fleet = run.fleet
     if fleet is not None:
-        balance = acting_forces.holding(fleet, held, 1)
+        balance = acting_forces.balance(fleet, held, 1)
         parts = {name: float(value[channel]) for name, value in balance.items()}
     for fault in run.system.faults:
         if isinstance(fault, Push):

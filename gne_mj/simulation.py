@@ -240,6 +240,14 @@ class Simulation:
             self.interventions.pop()  # a slider on its way
         self.interventions.append(note)
 
+    def doubts(self) -> dict[str, list[str]]:
+        """Before a run: what will go wrong with users' robots, a sentence each, by system.
+
+        Steps that are too long, outputs that do not rise with their inputs, limits below what
+        staying at the start takes (:mod:`gne_mj.examination.in_short`).
+        """
+        return {name: run.doubts() for name, run in self._runs.items()}
+
     def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run to the clock's end, recording; Ctrl-C ends it early and keeps what was done.
 

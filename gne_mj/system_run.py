@@ -14,6 +14,7 @@ from gne_mj.errors import InvalidInput
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.base import Samples
 from gne_mj.plain import raise_pending
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.run_metrics import check_numbers
 from gne_mj.signals import declared
 from gne_mj.system import Clock, System
@@ -68,6 +69,16 @@ class SystemRun:
     def inside(self) -> bool:
         """Whether the run has not left its set."""
         return bool(self.loop.monitor.exit == watch.INSIDE)
+
+    def doubts(self) -> list[str]:
+        """See :meth:`gne_mj.simulation.Simulation.doubts`."""
+        plant = getattr(self.loop, "plant", None)
+        if has_ode(self.system.agents.kind) or plant is None:
+            return []
+        from gne_mj.examination.in_short import doubts  # late: it knows MuJoCo
+
+        steps = self.clock.steps(self.clock.control_period)
+        return doubts(plant, self.system.agents.input_limit, steps)
 
     def step(self) -> Snapshot:
         """One integration step; what is returned is its beginning."""

@@ -267,6 +267,72 @@ def passivity(
     raise typer.Exit(0 if all(report.holds for report in reports.values()) else 1)
 
 
+_ROBOT = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT.xml|SCENARIO",
+        help="An MJCF file (gne_mj:car.xml is a shipped one), or a scenario with such robots.",
+    ),
+]
+
+
+@app.command(name="examine")
+def examine_(
+    source: _ROBOT,
+    output: Annotated[
+        str | None,
+        typer.Option(metavar="VALUE", help="y_i as a scenario has it; proposed if left out."),
+    ] = None,
+    input: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="u_i as a scenario has it; likewise.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B,...",
+            help="Wished output, a number an entry; 0.5, of a scenario's robots y*.",
+        ),
+    ] = None,
+    passive: Annotated[
+        bool, typer.Option("--passivity/--no-passivity", help="Try passivity, too.")
+    ] = True,
+    set_: SET = None,
+    system: Annotated[
+        str | None, typer.Option("--system", metavar="NAME", help="This one; all if left out.")
+    ] = None,
+    scenario: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Write the recommended scenario of a file here."),
+    ] = None,
+    as_json: JSON = False,
+) -> None:
+    """Tell what a user's robot is like before it plays, and what to use.
+
+    Its outputs and inputs; what input holds it at rest and at the wished output; dy+/du over
+    periods and states; relative degree, limits, the longest stable step, passivity; and an agents'
+    table with what goes with it. Exit status 1 if no output is reached by an input.
+    """
+    from gne_mj.interface import examining
+
+    wished = None if at is None else _numbers("at", at)
+    with telling(PREPARING, quiet=as_json) as tell:
+        found = examining.of_source(
+            source, output, input, wished, changes=settings(set_), system=system,
+            passivity=passive, scenario=scenario, progress=tell,
+        )  # fmt: skip
+    (only, *_) = found.values()
+    if scenario is not None and only.usable:
+        from gne_mj.files import written
+
+        with written("scenario", scenario, replace=False) as new:
+            new.write_text(only.recommendation.toml, encoding="utf-8")
+    if as_json:
+        emit(json.dumps({name: each.to_dict() for name, each in found.items()}, indent=2))
+    else:
+        print("\n\n".join(map(str, found.values())))
+    raise typer.Exit(0 if all(each.usable for each in found.values()) else 1)
+
+
 @app.command(name="map")
 def map_(
     source: SCENARIO,
@@ -307,7 +373,7 @@ def map_(
     grid = mapping.Grid(
         periods=tuple(meaning("periods", parse_path, periods)),
         margins=tuple(meaning("margins", parse_path, margins)),
-        pushes=_forces(pushes),
+        pushes=_numbers("pushes", pushes),
         runs=runs,
         duration=duration,
         seed=seed,
@@ -330,13 +396,13 @@ def map_(
     raise typer.Exit(1 if stop.is_set() else 0)
 
 
-def _forces(text: str) -> tuple[float, ...]:
+def _numbers(key: str, text: str) -> tuple[float, ...]:
     from gne_mj.errors import InvalidInput
 
     try:
-        return tuple(float(force) for force in text.split(","))
+        return tuple(float(number) for number in text.split(","))
     except ValueError:
-        raise InvalidInput("pushes", text, "it must be numbers, A,B,...") from None
+        raise InvalidInput(key, text, "it must be numbers, A,B,...") from None
 
 
 def _print_map(cells: "list[Cell]", out: Path | None) -> None:

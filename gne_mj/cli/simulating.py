@@ -61,6 +61,7 @@ def simulate(
         illustrate: writes pictures beside the trajectory.
     """
     simulation = load(scenario, changes, quiet=quiet)
+    warn(simulation)
     with stopping():  # the writing too: a first Ctrl-C never loses what was computed
         duration = simulation.clock.duration
         with telling(PREPARING, quiet=quiet) as tell:
@@ -72,6 +73,13 @@ def simulate(
                 if illustrate is not None:
                     illustrate(trajectory, folder)
     return trajectory
+
+
+def warn(simulation: "Simulation") -> None:
+    """Tell before a run what will go wrong with users' robots."""
+    for name, doubts in simulation.doubts().items():
+        for doubt in doubts:
+            say(f"gne-mj: warning: systems.{name}: {doubt}")
 
 
 def keep(trajectory: "Trajectory", folder: Path) -> None:

@@ -15,6 +15,7 @@ from gne_mj.interface.agents import (
     planar_robots,
 )
 from gne_mj.interface.analyses import certify, check, solve
+from gne_mj.interface.examining import examine
 from gne_mj.interface.faults import (
     bias,
     estimate_corruption,
@@ -57,6 +58,7 @@ __all__ = [
     "custom_agents",
     "discrete_cbf_filter",
     "estimate_corruption",
+    "examine",
     "feedback_seeking",
     "flexible_robots",
     "full_information",

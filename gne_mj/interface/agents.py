@@ -168,7 +168,7 @@ def mjcf_robots(
         input_limit: in N or N m.
     """
     each = [file] if isinstance(file, str | Path) else list(file)
-    paths = [_path(one) for one in each]
+    paths = [path_of(one) for one in each]
     return made(
         MjcfAgents,
         type="mjcf-robot",
@@ -181,13 +181,13 @@ def mjcf_robots(
         reference_velocity=reference_velocity,
         spacing=spacing,
         poses=poses,
-        terrain=None if terrain is None else _path(terrain),
+        terrain=None if terrain is None else path_of(terrain),
         contacts=contacts,
         input_limit=input_limit,
     )
 
 
-def _path(file: str | Path) -> str:
+def path_of(file: str | Path) -> str:
     """A file's path; that of a text, which is kept among the user's temporary files."""
     text = str(file).lstrip()
     if not text.startswith("<"):

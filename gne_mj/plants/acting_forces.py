@@ -18,7 +18,8 @@ _DRY = (
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
 )
-SHARE = 0.01  # of all: what is less is not told
+SHARE = 0.01  # of the greatest: what is less is not told
+REST = "contacts and the rest"
 
 
 def saved(plant: FleetPlant) -> Array:
@@ -97,12 +98,22 @@ def holding(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:
     return found
 
 
+def balance(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:
+    """The same as :func:`holding`, with what is left of u beside them."""
+    found = holding(plant, u, steps)
+    return {**found, REST: u - np.sum(list(found.values()), axis=0)}
+
+
 def told(parts: dict[str, float], unit: str = "") -> str:
-    """Inputs by what they hold, the greatest first, in words; empty if there are none."""
+    """An input by what it balances, the greatest first, in words.
+
+    Empty where there is nothing to say: no load, or parts that contacts balance between them.
+    """
     whole = max((abs(value) for value in parts.values()), default=0.0)
-    shown = [
+    if abs(sum(parts.values())) <= SHARE * whole:
+        return ""
+    return ", ".join(
         f"{value:.3g}{f' {unit}' if unit else ''} {name}"
         for name, value in sorted(parts.items(), key=lambda item: -abs(item[1]))
-        if abs(value) > SHARE * whole and abs(value) > 1e-9
-    ]
-    return ", ".join(shown)
+        if abs(value) > SHARE * whole
+    )

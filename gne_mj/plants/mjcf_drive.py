@@ -28,11 +28,21 @@ class Driving:
     Args:
         channels, actuators: (drives,) r and the entry of ctrl.
         factors: (drives,) of each.
+        most: (drives,) the greatest |control| that passes unchanged, infinite for any.
     """
 
     channels: NDArray[np.int64]
     actuators: NDArray[np.int64]
     factors: NDArray[np.float64]
+    most: NDArray[np.float64]
+
+    def lets_through(self, channels: int) -> NDArray[np.float64]:
+        """(m,) the greatest |u| of each channel that passes if those it shares with ask as much."""
+        found, size = np.full(channels, np.inf), np.abs(self.factors)
+        for channel, ctrl, most in zip(self.channels, self.actuators, self.most, strict=True):
+            together = size[self.actuators == ctrl].sum()
+            found[channel] = min(found[channel], most / together)
+        return found
 
     @property
     def numbers(self) -> list[int]:
@@ -84,6 +94,10 @@ def add_effort(spec: Any, given: str | Input | Controlled, channel: int, path: P
             spec.worldbody.add_site(name=_WORLD)
         actuator.refsite = _WORLD
     actuator.gear = np.eye(6)[given.axis + 3 * given.torque]
+    # whatever the file's defaults are
+    actuator.ctrllimited = actuator.forcelimited = actuator.actlimited = 0
+    actuator.dyntype, actuator.biastype = mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtBias.mjBIAS_NONE
+    actuator.gaintype, actuator.gainprm[0] = mujoco.mjtGain.mjGAIN_FIXED, 1.0
 
 
 def _effort(channel: int) -> str:
@@ -132,6 +146,7 @@ def driving(model: mujoco.MjModel, data: mujoco.MjData, agents: MjcfRobots) -> D
         np.array([row[0] for row in rows], dtype=np.int64),
         np.array([row[1] for row in rows], dtype=np.int64),
         np.array([row[2] for row in rows], dtype=np.float64),
+        np.array([clamps[row[1]][1] for row in rows], dtype=np.float64),
     )
     _check_limits(found, clamps, agents)
     return found

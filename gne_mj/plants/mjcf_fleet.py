@@ -225,6 +225,11 @@ class MjcfPlant(FleetPlant):
         return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self._controls.controllers)
 
     @property
+    def lets_through(self) -> NDArray[np.float64]:
+        """(m,) the greatest |u| that the files' clamps let through unchanged."""
+        return self._driving.lets_through(self.agents.channels)
+
+    @property
     def measures_every_stage(self) -> bool:
         """Whether outputs are fresh at every stage: MuJoCo's sensors are so at the first only."""
         return all(term.fresh for term in self._terms)

@@ -1,0 +1,240 @@
+"""What is told of a robot before it plays, against closed forms and MuJoCo's own numbers."""
+
+import json
+import tomllib
+
+import mujoco
+import numpy as np
+import pytest
+from commands import gne_here
+
+import gne_mj as gm
+from gne_mj.errors import InvalidInput
+
+CART = """
+<mujoco>
+  <option gravity="0 0 {gravity}"/>
+  <worldbody>
+    <body name="cart" euler="0 {slope} 0">
+      <joint name="x" type="slide" axis="1 0 0" damping="{damping}" frictionloss="{friction}"
+             stiffness="{stiffness}" {more}/>
+      <geom type="box" size=".2 .1 .1" mass="2" contype="0" conaffinity="0"/>
+      <body pos="0 0 .1">
+        <joint name="mast" type="slide" axis="1 0 0" stiffness="8" damping="{between}"/>
+        <geom size=".05" mass="1" contype="0" conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>{actuator}</actuator>
+</mujoco>
+"""
+SOUND = {
+    "gravity": 0, "slope": 0, "damping": 0, "friction": 0, "stiffness": 0, "more": "",
+    "between": 1, "actuator": '<motor name="drive" joint="x"/>',
+}  # fmt: skip
+PLAIN = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body><joint name="x" type="slide" axis="1 0 0" {joint}/>
+      <geom size=".1" mass="2" contype="0" conaffinity="0"/></body>
+  </worldbody>
+  <actuator><motor name="drive" joint="x"/></actuator>
+</mujoco>
+"""
+
+
+def look(output="x", passivity=False, at=0.5, input="drive", **faults):
+    text = CART.format(**{**SOUND, **faults})
+    return gm.examine(text, output=output, input=input, at=at, passivity=passivity)
+
+
+def test_a_sound_robot_needs_nothing_to_be_held_and_its_slope_is_the_masses():
+    """Over a step the cart's mass alone is moved: dy+/du = h / 2 kg; over longer periods both."""
+    seen = look()
+    assert seen.rest.held
+    assert seen.wished.held
+    assert np.abs([*seen.rest.input, *seen.wished.input]).max() < 1e-9
+    h = seen.slopes.periods[0]
+    assert seen.slopes.least[0] == pytest.approx(h / 2.0, rel=5e-3)
+    assert seen.slopes.longest == seen.slopes.periods[-1]
+    assert seen.degrees == [1]
+    assert seen.limits == [np.inf]
+    assert not seen.recommendation.cautions
+
+
+@pytest.mark.parametrize(
+    ("fault", "rest", "wished", "kind"),
+    [
+        ({"damping": 3}, 0.0, 1.5, "damping"),
+        ({"friction": 0.8}, 0.0, 0.8, "dry friction"),
+        ({"gravity": -9.81, "slope": -4}, None, None, "gravity"),
+    ],
+)
+def test_what_holds_it_is_the_files_load(fault, rest, wished, kind):
+    seen = look(between=6, **fault)
+    if rest is None:  # both bodies' weight along the slope
+        rest = wished = 3.0 * 9.81 * np.sin(np.radians(4.0)) * np.sign(seen.rest.input[0])
+    assert seen.rest.input[0] == pytest.approx(rest, rel=0.01, abs=1e-3)
+    assert seen.wished.input[0] == pytest.approx(wished, rel=0.01)
+    parts = seen.wished.parts
+    # the mast's weight comes by its spring
+    assert parts[kind][0] + parts["springs"][0] == pytest.approx(wished, rel=0.02)
+    assert kind in str(seen)
+    assert "rest where costs rise" in str(seen)
+
+
+def test_relative_degrees_are_those_of_the_equations():
+    """Of the mast behind a damper 2, behind a spring alone 3; a filter adds one."""
+    assert look("mast").degrees == [1]  # a relative joint: the cart's own acceleration moves it
+    mast = {"sum": [{"joint": "x"}, {"joint": "mast"}]}
+    assert look(mast).degrees == [2]
+    assert look(mast, between=0).degrees == [3]
+    late = '<general name="drive" joint="x" dyntype="filter" dynprm="0.1"/>'
+    assert look(actuator=late).degrees == [2]
+    text = str(look(mast))
+    assert "relative degree is 2" in text
+
+
+def test_limits_and_what_holding_asks_of_them():
+    limited = '<motor name="drive" joint="x" gear="2" ctrlrange="-1 1"/>'
+    seen = look(damping=3, actuator=limited)
+    assert seen.limits == [2.0]
+    assert seen.wished.held
+    assert seen.recommendation.tables["systems"]["robots"]["agents"]["input_limit"] == 2.0
+    far = look(damping=3, actuator=limited, at=1.0)
+    assert not far.wished.held
+    assert "inputs are at the limit 2" in far.wished.why
+    assert far.wished.output[0] == pytest.approx(2.0 / 3.0, rel=0.01)
+
+
+def test_a_stop_is_named_and_a_look_ahead_advised():
+    seen = look(more='limited="true" range="-.2 .2"')
+    assert seen.wished.why.startswith("joint 'x' is at its stop")
+    assert any("lookahead" in each for each in seen.recommendation.cautions)
+
+
+@pytest.mark.parametrize(
+    ("joint", "fastest", "rk4", "euler"),
+    [
+        # x'' = -w^2 x: RK4's stability ends at 2 sqrt(2) / w, semi-implicit Euler's at 2 / w
+        ('stiffness="20000"', 100.0, 2.0 * np.sqrt(2.0) / 100.0, 2.0 / 100.0),
+        # v' = -c/m v: RK4's ends at 2.7853 m/c; MuJoCo's Euler takes dampers implicitly
+        ('damping="1000"', 500.0, 2.785293 / 500.0, 0.2),
+    ],
+)
+def test_the_longest_stable_steps_are_those_of_the_methods(joint, fastest, rk4, euler):
+    seen = gm.examine(
+        PLAIN.format(joint=joint), output="x", input="drive", passivity=False
+    )  # fmt: skip
+    assert seen.steps.fastest == pytest.approx(fastest, rel=1e-3)
+    assert seen.steps.longest["rk4"] == pytest.approx(rk4, rel=0.03)
+    assert seen.steps.longest["euler"] == pytest.approx(euler, rel=0.03)
+
+
+def test_an_input_the_wrong_way_round_is_turned():
+    seen = look(input={"actuators": ["drive"], "factors": [-2.0]})
+    agents = seen.recommendation.tables["systems"]["robots"]["agents"]
+    assert agents["input"] == {"actuators": ["drive"], "factors": [2.0]}
+    assert "falls where its input rises" in str(seen)
+
+
+def test_the_transition_is_that_of_mujoco():
+    """Against mjd_transitionFD, whose controls and step are the same."""
+    from gne_mj.examination.bench import bench
+    from gne_mj.examination.proposal import agents_of
+    from gne_mj.examination.stable_steps import transition
+    from gne_mj.interface.agents import path_of
+
+    path = path_of(CART.format(**{**SOUND, "damping": 3, "stiffness": 5}))
+    own = bench(agents_of(path, "x", "drive", 1), 0.01, "euler")
+    found = transition(own, own.start, np.zeros(1))
+    own.go(own.start)
+    model, data = own.plant.model, own.plant.data
+    expected = np.zeros((4, 4))
+    mujoco.mjd_transitionFD(model, data, 1e-6, True, expected, None, None, None)
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
+def test_what_is_proposed_runs_and_reaches(tmp_path):
+    """A file alone: output and input are found, and the recommended scenario settles."""
+    file = tmp_path / "cart.xml"
+    file.write_text(CART.format(**SOUND), encoding="utf-8")
+    seen = gm.examine(file)
+    assert seen.usable
+    assert seen.passivity.startswith("no violation found")
+    agents = seen.recommendation.tables["systems"]["robots"]["agents"]
+    assert (agents["output"], agents["input"]) == ("x", "drive")
+    run = gm.run(tomllib.loads(seen.recommendation.toml))
+    assert run.reports["robots"]["settling_time"] < 8.0
+
+
+def test_a_file_without_a_way_to_move_is_told_so():
+    still = "<mujoco><worldbody><geom type='plane' size='1 1 1'/></worldbody></mujoco>"
+    seen = gm.examine(still)
+    assert not seen.usable
+    assert "No actuator" in str(seen)
+
+
+def test_what_cannot_be_examined_is_refused_by_name():
+    text = CART.format(**SOUND)
+    for key, given in (
+        ("output", {"output": "y", "input": "drive"}),
+        ("input", {"output": "x"}),
+        ("at", {"output": "x", "input": "drive", "at": np.nan}),
+    ):
+        with pytest.raises(InvalidInput, match=rf"^{key}\b"):
+            gm.examine(text, **given)
+
+
+def test_robots_of_a_scenario_are_examined_at_their_equilibrium():
+    seen = gm.examine("examples/robot/scenario.toml", agent=2, passivity=False)
+    assert seen.file.endswith("cart.xml")
+    assert seen.wished.wanted == pytest.approx([2.0])
+
+
+def test_the_command(tmp_path, monkeypatch):
+    (tmp_path / "cart.xml").write_text(CART.format(**SOUND), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    done = gne_here("examine", "cart.xml", "--no-passivity", "--scenario", "made.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)["cart.xml"]
+    assert report["limits"] == [None]
+    made = tomllib.loads((tmp_path / "made.toml").read_text(encoding="utf-8"))
+    assert made["systems"]["robots"]["agents"]["file"] == "cart.xml"
+    gone = gne_here("examine", "gone.xml")
+    assert gone.returncode == 2
+    assert gone.stderr.count("\n") == 1
+
+
+def told(text, **options):
+    """What is told before a run of two such robots."""
+    game = gm.game(
+        2, lambda i, y, p: (y[i] - 0.5) ** 2, lambda y, p: [("gap", abs(y[0] - y[1]) <= 2.0)]
+    )
+    given = {"timestep": 0.002, "control_period": 0.01, "duration": 0.1, "start": 0.0, **options}
+    agents = gm.mjcf_robots(
+        2, text, output="x", input=given.pop("input", "drive"), spacing=1.0,
+        input_limit=given.pop("input_limit", None),
+    )  # fmt: skip
+    made = gm.setup(game, agents=agents, law=gm.full_information(mode="sampled"), **given)
+    (found,) = made.simulation_object().doubts().values()
+    return found
+
+
+def test_before_a_run_only_what_is_wrong_is_told():
+    """One fault a file; a sound one and one that falls over by itself are nothing to tell."""
+    assert told(CART.format(**SOUND)) == []
+    assert told(PLAIN.format(joint='stiffness="-20"')) == []
+    stiff = PLAIN.format(joint='stiffness="20000"')  # stable up to 28 ms with rk4
+    assert told(stiff, timestep=0.01) == []
+    (long,) = told(stiff, timestep=0.05, control_period=0.05, duration=0.5)
+    assert "beyond the longest stable step" in long
+    (turned,) = told(CART.format(**SOUND), input={"actuators": ["drive"], "factors": [-1.0]})
+    assert "does not rise with its input" in turned
+    slope = CART.format(**{**SOUND, "gravity": -9.81, "slope": -10})
+    (weak,) = told(slope, input_limit=2.0)
+    assert "beyond its limit 2" in weak
+    need = 2.0 * 9.81 * np.sin(np.radians(10.0))
+    asked = float(weak.split("about ")[1].split(",")[0])
+    assert abs(asked) == pytest.approx(need, rel=0.01)
