@@ -31,7 +31,8 @@ class Held:
 
     Args:
         wanted: (d,) the outputs.
-        output, input: (d,) means of the last part.
+        output: (d,) the mean of the last part.
+        input: (d,) likewise.
         off: greatest distance from the wished ones then.
         ripple: (d,) half of the input's range then.
         held: whether it was there.

@@ -41,12 +41,14 @@ class Examination:
 
     Args:
         file: its MJCF file.
-        output, input: which were examined; empty if none could be proposed.
+        output: which was examined; empty if none could be proposed.
+        input: likewise.
         units: of output and input.
         offers: what else the file has.
         timestep: s, of the trials.
         limits: (d,) greatest |u| that is let through; infinite for no limit.
-        rest, wished: holding it at 0 and at the wished output; None where inputs do not show.
+        rest: holding it at 0; None where inputs do not show.
+        wished: holding it at the wished output.
         slopes: dy+/du.
         degrees: (d,) relative degrees; None for an input that does not show soon.
         dead_time: s until an input shows; None for never.

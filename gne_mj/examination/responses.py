@@ -21,7 +21,8 @@ class Slopes:
 
     Args:
         periods: in s.
-        least, most: of each period: the eigenvalues of its symmetric part, over all states.
+        least: of each period the least eigenvalue of its symmetric part, over all states.
+        most: likewise the greatest.
         positive: of each period the share of states at which it is positive.
         states: how many.
         coupling: greatest share that one channel's input has in another one's output.

@@ -43,8 +43,8 @@ def examine(
 
     Args:
         source: an MJCF file, or its text, which begins with ``<``; or a scenario with such robots.
-        output, input: of a file, as :func:`gne_mj.mjcf_robots` has them; both proposed if left
-            out.
+        output: of a file, as :func:`gne_mj.mjcf_robots` has it; proposed if left out.
+        input: likewise; given together with the output, or not at all.
         at: wished outputs, one or one an entry of the action, in the output's unit; 0.5 if left
             out, of a scenario's robots y*.
         system: of a scenario, which; may be left out if there is only one.
