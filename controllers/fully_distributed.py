@@ -107,6 +107,20 @@ class FullyDistributed(Law):
         """See the base class."""
         return self._over_fewer(there)
 
+    def memory_storage(
+        self,
+        memory: NDArray[np.float64],
+        owner: NDArray[np.int64],
+        equilibrium: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """See the base class."""
+        if self.kept is not None:  # of which nothing is claimed
+            return np.zeros(len(memory))
+        m = len(owner)
+        rows = memory[:, : (owner[-1] + 2) * m].reshape(len(memory), -1, m)
+        own = rows[:, owner, np.arange(m)]
+        return 0.5 * self.fast_weight * np.sum((rows - own[:, None]) ** 2, axis=(1, 2))
+
     def initial_memory(
         self,
         y: NDArray[np.float64],

@@ -31,6 +31,7 @@ memory, out)``                                        agents in J_i only; its sy
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import replace
 from types import ModuleType
 from typing import ClassVar, NamedTuple
@@ -243,6 +244,38 @@ class Law(ABC):
         assert self.graph is not None
         fewer: Law = replace(self, graph=self.graph.among(there))  # type: ignore[type-var]
         return fewer
+
+    def without_links(self, lost: Iterable[tuple[int, int]]) -> "Law":
+        """The law of agents between whom these links, pairs from 0, are lost; all others are there.
+
+        Raises:
+            InvalidInput: its graph stays as it is, or it has none.
+        """
+        if self.graph is None:
+            raise InvalidInput("link", "any", f"the {self.information} law has no links to lose")
+        if self.graph.changes:
+            raise InvalidInput("link", "any", "its graph changes by itself already")
+        if self.kept is not None:
+            raise InvalidInput("link", "any", "agents must keep all estimates: estimates = 'all'")
+        if not hasattr(self, "__dataclass_fields__"):
+            raise InvalidInput("link", "any", "a law of one's own keeps its links")
+        fewer: Law = replace(self, graph=self.graph.without(lost))  # type: ignore[type-var]
+        return fewer
+
+    def memory_storage(
+        self,
+        memory: NDArray[np.float64],
+        owner: NDArray[np.int64],
+        equilibrium: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """The memory's part of the Lyapunov function, (samples,), as the kernel ``storage`` has it.
+
+        Args:
+            memory: (samples, entries), with agents' own actions in place.
+            owner: the agent that each entry of a profile belongs to, (m,).
+            equilibrium: y*, (m,).
+        """
+        return np.zeros(len(memory))
 
     def barrier_profiles(
         self, game_actions: NDArray[np.int64], memory: NDArray[np.float64]

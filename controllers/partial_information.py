@@ -103,6 +103,17 @@ class PartialInformation(Law):
         """See the base class."""
         return self._over_fewer(there)
 
+    def memory_storage(
+        self,
+        memory: NDArray[np.float64],
+        owner: NDArray[np.int64],
+        equilibrium: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """See the base class."""
+        found = [self.estimates_in(row, owner) for row in memory]
+        total = [np.sum((values - equilibrium[of]) ** 2) for of, values in found]
+        return 0.5 * self.time_constant * np.array(total)
+
     def initial_memory(
         self,
         y: NDArray[np.float64],

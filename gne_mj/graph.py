@@ -1,7 +1,7 @@
 """Who hears whom: undirected communication graphs (paper, section II-C)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
@@ -32,6 +32,8 @@ class Graph:
     Args:
         agents: N.
         edges: pairs of agents, numbered from 0; order and repetition do not matter.
+        rest_of: the graph that this is what is left of, where links were lost; it need not be
+            connected then.
 
     Attributes:
         changes: whether it becomes another one during a run, ``edges`` being all that it can have.
@@ -43,6 +45,7 @@ class Graph:
     changes: ClassVar[bool] = False
     agents: int
     edges: tuple[tuple[int, int], ...]
+    rest_of: "Graph | None" = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         unique = set()
@@ -57,7 +60,7 @@ class Graph:
         object.__setattr__(self, "edges", tuple(sorted(unique)))
         first, second = np.array(self.edges, dtype=np.int64).reshape(-1, 2).T
         part = parts(first, second, self.agents)
-        if np.any(part > 0):
+        if np.any(part > 0) and self.rest_of is None:
             apart = [int(i) + 1 for i in np.flatnonzero(part > 0)]
             shown = ", ".join(map(str, apart[:5])) + (", ..." if len(apart) > 5 else "")
             raise InvalidInput(
@@ -137,6 +140,19 @@ class Graph:
             (int(number[i]), int(number[j])) for i, j in self.edges if there[i] and there[j]
         )
         return Graph(int(np.sum(there)), kept)
+
+    @property
+    def whole(self) -> "Graph":
+        """The graph with the links that were lost."""
+        return self if self.rest_of is None else self.rest_of
+
+    def without(self, lost: Iterable[tuple[int, int]]) -> "Graph":
+        """The whole graph without these edges."""
+        whole, gone = self.whole, set(lost)
+        if not gone:
+            return whole
+        kept = tuple(edge for edge in whole.edges if edge not in gone)
+        return Graph(whole.agents, kept, rest_of=whole)
 
     @property
     def members(self) -> "tuple[Graph, ...] | None":

@@ -17,6 +17,7 @@ from gne_mj.controllers import Law
 from gne_mj.controllers.keepers import Keepers
 from gne_mj.controllers.kept import Kept
 from gne_mj.controllers.law import MemoryPart
+from gne_mj.controllers.theorem import LawTheorem
 from gne_mj.errors import InvalidInput
 from gne_mj.faults import Fault
 from gne_mj.game_model import Game
@@ -36,6 +37,7 @@ _ALL = "all"  # in place of a list of all agents, or of all edges
 def structure_of(system: SystemData) -> str:
     """What a system's results do not say of it, as JSON; agents are numbered from 1."""
     game, graph, apart = system.game, system.law.graph, system.separation
+    graph = None if graph is None else graph.whole
     edges = None if graph is None else [[i + 1, j + 1] for i, j in graph.edges]
     everyone = edges is not None and 2 * len(edges) == game.agents * (game.agents - 1)
     return json.dumps(
@@ -48,6 +50,9 @@ def structure_of(system: SystemData) -> str:
             "quantities": [quantity.name for quantity in game.quantities],
             "graph": _ALL if everyone else edges,
             "graph_changes": graph is not None and graph.changes,
+            "room": [
+                each if np.isfinite(each) else None for each in system.constraint_room.tolist()
+            ],
             "separation": None if apart is None else [apart.distance, apart.reach, apart.turn],
             "estimates": [part.name for part in system.law.memory_parts if part.rows],
             "kept_estimates": [part.name for part in system.law.memory_parts if part.kept],
@@ -98,7 +103,7 @@ def recorded_system(
         quantities=tuple(_quantity(data, each) for each in known["quantities"]),
         tested=True,
     )
-    return SystemData(
+    found = SystemData(
         name=name,
         game=game,
         agents=agents,
@@ -115,6 +120,9 @@ def recorded_system(
         separation=None if known["separation"] is None else Separation(*known["separation"]),
         observer=float("load" in data),  # there was one; its gain nobody asks of results
     )
+    room = known.get("room", [None] * game.constraints_count)  # which older results do not have
+    vars(found)["constraint_room"] = np.array(room, dtype=np.float64)  # None is not a number
+    return found
 
 
 class _ChangedGraph(Graph):
@@ -127,6 +135,7 @@ class _RecordedLaw(Law):
     """What is known of a law."""
 
     def __init__(self, data: "xarray.Dataset", known: dict[str, Any]) -> None:
+        self._storage = "lyapunov" in data
         edges, agents = known["graph"], len(known["sizes"])
         if edges is not None:
             pairs = tuple((i - 1, j - 1) for i, j in edges) if edges != _ALL else None
@@ -145,6 +154,11 @@ class _RecordedLaw(Law):
             for name in (*known["estimates"], *kept)
         ]
         vars(self).update(information=data.attrs["information"], memory_parts=tuple(parts))
+
+    @property
+    def theorem(self) -> LawTheorem | None:
+        """Some, where V was recorded; which one nobody asks of results."""
+        return LawTheorem("") if self._storage else None
 
     @property
     def kernels(self) -> ModuleType:

@@ -308,6 +308,21 @@ def _messages(rows: Rows) -> Array:
     return memory[:, end - game.agents : end]
 
 
+def _lyapunov(rows: Rows) -> Array:
+    """V about y*, of the agents and of the law's memory; not numbers where y* is not known."""
+    system, game = rows.system, rows.system.game
+    known = system.known_equilibrium
+    if known is None:
+        return np.full(len(rows.time), np.nan)
+    rest, owner = system.agents.equilibrium(known.action), game.agent_of_action
+    stored = np.sum(system.agents.storage(rows.samples.state, rest), axis=1)
+    memory = rows.samples.memory[:, : len(system.memory)].copy()
+    if system.law.has_estimates and system.law.kept is None:
+        own = memory[:, : game.agents * game.actions].reshape(len(memory), game.agents, -1)
+        own[:, owner, np.arange(game.actions)] = rows.y
+    return stored + system.law.memory_storage(memory, owner, known.action)
+
+
 def _there(rows: Rows) -> Array:
     first = np.searchsorted(rows.system.game.agent_of_action, np.arange(rows.system.game.agents))
     return np.isfinite(rows.y[:, first])
@@ -366,6 +381,10 @@ SIGNALS: tuple[Variable | Callable[[SystemData], Iterator[Variable]], ...] = (
         figure=True, page="line",
     ),
     _memory,
+    Variable(
+        "lyapunov", ("time",), _lyapunov, there=lambda system: system.measures_storage,
+        long_name="Lyapunov function V", symbol="V", page="line", batch=False,
+    ),
     Variable(
         "linked", ("time", "edge"), _linked, there=_network_changes,
         long_name="whether the two agents hear each other", page="behind", batch=False,

@@ -2,11 +2,11 @@
 
 import time as real_time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from gne_mj.bounds import MOST_RECORDED, check_room
-from gne_mj.errors import InvalidInput, named, part_of
+from gne_mj.errors import GneError, InvalidInput, named, part_of
 from gne_mj.interruption import interruption
 from gne_mj.loops.base import Present
 from gne_mj.motion import motion_of
@@ -58,8 +58,9 @@ class Simulation:
         planned: what is done while it runs.
 
     Attributes:
-        interventions: what :meth:`change` and :meth:`push` did, each with its "time" in s, its
-            "system", and "what" in words; changes of a scenario's keys with these ("keys").
+        interventions: what :meth:`change`, :meth:`push` and :meth:`link` did, each with its "time"
+            in s, its "system", and "what" in words; changes of a scenario's keys with these
+            ("keys").
 
     >>> simulation = Simulation([system], clock)
     >>> snapshot = simulation.step()["robots"]    # one integration step
@@ -87,6 +88,7 @@ class Simulation:
         self.clock, self.tolerance = clock, tolerance
         self.seed, self.source = seed, source
         self._remade = remade
+        self._lost: dict[str, set[tuple[int, int]]] = {}  # links of each system, from 0
         self.interventions: list[dict[str, Any]] = []
         self._planned = sorted(planned, key=lambda each: clock.steps(each.time))
         self._runs: dict[str, SystemRun] = {}
@@ -191,6 +193,9 @@ class Simulation:
         self._remade = remade
 
     def _change(self, system: System, what: str, about: Mapping[str, Any]) -> None:
+        lost = self._lost.get(system.name)
+        if lost:
+            system = replace(system, law=system.law.without_links(lost))
         if motion_of(system.game) is not None or motion_of(self._runs[system.name].system.game):
             raise InvalidInput(
                 "changes", what or system.name,
@@ -231,6 +236,37 @@ class Simulation:
         unit = run.loop.push_unit(channel)
         what = f"{game.agent_name} {agent} pushed{along} by {force:g} {unit} for {duration:g} s"
         self._note(system, what, about)
+
+    def link(self, system: str, agents: tuple[int, int], *, lost: bool = True) -> None:
+        """Lose the link between two agents, or have it again, as of the next step.
+
+        In the held modes estimates move over the period that has begun by the new links. The
+        Lyapunov function knows no graph; what is proven of it asks for one that is connected.
+
+        Args:
+            system: its name.
+            agents: the two, from 0.
+            lost: whether it is lost now.
+
+        Raises:
+            InvalidInput: there is no such link, or this law's links stay.
+        """
+        run = self._runs[system]
+        if not run.inside:
+            raise InvalidInput("system", system, "it must not have left its set")
+        edge, before = check_link(run.system, agents), self._lost.get(system, set())
+        after = before | {edge} if lost else before - {edge}
+        law = run.system.law.without_links(after)
+        first, second = edge[0] + 1, edge[1] + 1
+        state = "lost" if lost else "there again"
+        what = f"link between {run.system.game.agent_name}s {first} and {second} {state}"
+        self._lost[system] = after
+        try:
+            system_then = replace(run.system, law=law)
+            self._change(system_then, what, {"link": [first, second], "lost": lost})
+        except GneError:
+            self._lost[system] = before
+            raise
 
     def _note(self, system: str, what: str, about: Mapping[str, Any]) -> None:
         note = {"time": self.time, "system": system, "what": what, **about}
@@ -287,6 +323,21 @@ class Simulation:
             wall_time=sum(run.wall_time for run in self._runs.values()),
             interventions=self.interventions,
         )
+
+
+def check_link(system: System, agents: tuple[int, int]) -> tuple[int, int]:
+    """The edge of a system's graph between two agents, from 0.
+
+    Raises:
+        InvalidInput: there is none, or the law's links cannot be lost.
+    """
+    system.law.without_links(())
+    assert system.law.graph is not None
+    edge = min(agents), max(agents)
+    if edge not in system.law.graph.whole.edges:
+        pair = [agents[0] + 1, agents[1] + 1]
+        raise InvalidInput("agents", pair, "there is no link between them")
+    return edge
 
 
 def check_recording(systems: Sequence[System], clock: Clock) -> None:

@@ -157,7 +157,10 @@ class SystemRun:
         found = {}
         for variable in self._shown:
             rows = instant if variable.instant else self._last
-            if rows is not None:
+            if variable.name == "lyapunov":  # which the monitor knows of the last step's start
+                known = self.loop.monitor.started and self.system.known_equilibrium is not None
+                found[variable.name] = np.array([self.loop.monitor.storage if known else np.nan])
+            elif rows is not None:
                 found[variable.name] = variable.source(rows)
         return found
 

@@ -345,7 +345,7 @@ def test_tables_of_any_texts_are_written_and_read():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"time": 0.1}, "interventions.0: .*either changes or a push"),
+        ({"time": 0.1}, "interventions.0: .*either changes, a push or a link"),
         ({"time": -1.0, "changes": {"barrier.rho": 1.0}}, "interventions.0.time: got -1.0"),
         ({"time": 0.1, "changes": {"barrier.roh": 1.0}}, "did you mean 'rho'"),
         ({"time": 0.1, "changes": {"simulation.duration": 1.0}}, "it stays as it is"),
@@ -353,6 +353,7 @@ def test_tables_of_any_texts_are_written_and_read():
          "interventions.0.push.agent: got 6, but agents are numbered 1 to 5"),
         ({"time": 0.1, "push": {"agent": 1, "axis": "y", "force": 1.0, "duration": 1.0}},
          "interventions.0.push.axis: got 'y'"),
+        ({"time": 0.1, "link": {"agents": [1, 2]}}, r"interventions.0.link.*no links to lose"),
         ({"time": 0.1, "push": {"system": "r", "agent": 1, "force": 1.0, "duration": 1.0}},
          "interventions.0.push.system: got 'r'"),
     ],
@@ -374,3 +375,68 @@ def test_what_knows_no_interventions_refuses_them():
     for what in (gne_mj.certify, gne_mj.load_environment):
         with pytest.raises(InvalidInput, match="know none: leave them out"):
             what(scenario)
+
+
+LINKED = {
+    "simulation.duration": 1.0,
+    "controller": {"information": "partial", "graph": "ring", "coupling": 5.0},
+}
+
+
+def test_links_that_were_lost_are_lost_again_by_a_file():
+    simulation = load_scenario("velocity-sync", LINKED).simulation_object()
+    simulation.advance(100)
+    simulation.link("robots", (1, 0))
+    simulation.advance(50)
+    simulation.link("robots", (2, 3))  # two parts from here on
+    simulation.change({"barrier.rho": 0.3})  # which brings no link back
+    graph = simulation.systems[0].law.graph
+    assert graph.edges == ((0, 4), (1, 2), (3, 4))
+    simulation.advance(50)
+    simulation.link("robots", (0, 1), lost=False)
+    by_hand = simulation.run()
+    assert simulation.systems[0].law.graph.edges == ((0, 1), (0, 4), (1, 2), (3, 4))
+    again = gne_mj.run(tomllib.loads(scenario_of(by_hand).toml()))
+    assert same(again, by_hand)
+    assert again.interventions[:2] == by_hand.interventions[:2]
+    assert by_hand.interventions[0]["what"] == "link between robots 1 and 2 lost"
+    assert not by_hand.reports["robots"]["lyapunov"]["claimed"]
+
+
+def test_agents_of_two_parts_estimate_as_two_networks_do():
+    """Over the cut ring 3 and 4 hear only each other: with a small rate as Euler steps do."""
+    ring = {**LINKED, "plant.engine": "ode", "initial.estimate": [0.0, 1.0, 2.0, 3.0, 4.0]}
+    cut = load_scenario("velocity-sync", ring).simulation_object()
+    for link in ((1, 2), (0, 4)):  # 3, 4 and 5 are left to themselves
+        cut.link("robots", link)
+    cut.advance(1)
+    present = cut.runs["robots"].loop.present()
+    y, rows = present.state[:, 1], present.memory.reshape(5, 5)
+    assert np.allclose(rows[0, 2:], [2.0, 3.0, 4.0], atol=1e-12)  # 1 and 2 agree of the others
+    system = load_scenario("velocity-sync", ring).system_objects()[0]
+    rows, y = system.memory.reshape(5, 5), system.start
+    own = np.where(np.eye(5, dtype=bool), y, rows)
+    rate = -5.0 * ((own[2, 4] - own[3, 4]) * np.ones(1))  # 3 hears 4 alone of the two
+    found = present.memory.reshape(5, 5)[2, 4]
+    h = cut.clock.timestep
+    assert abs(found - (own[2, 4] + h * rate[0])) < 100 * h * h
+
+
+@pytest.mark.parametrize(
+    ("changes", "link", "words"),
+    [
+        ({}, (0, 1), "the full law has no links to lose"),
+        (LINKED, (0, 2), "there is no link between them"),
+        ({**LINKED, "controller": {**LINKED["controller"], "graph":
+          {"type": "switching", "graphs": ["ring", "line"], "every": 0.5}}}, (0, 1),
+         "changes by itself"),
+        ({**LINKED, "controller": {**LINKED["controller"], "mode": "sampled"},
+          "faults": [{"type": "message-loss", "probability": 0.5}]}, (0, 1),
+         "of a graph that stays"),
+    ],
+)  # fmt: skip
+def test_links_that_cannot_be_lost_are_refused(changes, link, words):
+    simulation = load_scenario("velocity-sync", changes).simulation_object()
+    with pytest.raises(InvalidInput, match=words):
+        simulation.link("robots", link)
+    assert simulation.interventions == []

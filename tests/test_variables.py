@@ -137,7 +137,7 @@ def test_a_signal_more_is_in_trajectories_replays_and_figures():
     assert json.loads(data.attrs["quantities"]) == ["gap", "constraint", "delivered_power"]
 
     meta, arrays = unpack(replay_pack(trajectory))
-    line = meta["systems"][0]["quantities"][2]
+    line = meta["systems"][0]["quantities"][-1]
     assert (line["name"], line["unit"]) == ("delivered_power", "W")
     assert line["labels"] == ["1", "2", "3", "4", "5"]
     assert line["bound"] == [90.0] * 5
@@ -175,7 +175,7 @@ def test_a_signal_more_has_a_panel_for_each_axis_of_its_agents():
         mine = data["delivered_power"].to_numpy()[:, data["axis"].to_numpy() == axis]
         assert [line.get_ydata().tolist() for line in axes.lines[:6]] == mine.T.tolist()
     system = unpack(replay_pack(trajectory))[0]["systems"][0]
-    labels = system["quantities"][2]["labels"]
+    labels = system["quantities"][-1]["labels"]
     assert labels[:3] == ["1 x", "1 y", "2 x"]
     assert len(labels) == 12
 
@@ -187,7 +187,7 @@ def test_a_signal_more_is_on_the_live_page_as_it_was_last_recorded():
     try:
         (system,) = session._scene.meta()["systems"]
         names = [each["name"] for each in system["quantities"]]
-        assert names == ["gap", "constraint", "delivered_power"]
+        assert names == ["gap", "constraint", "lyapunov", "delivered_power"]
         key = "robots/quantity/delivered_power"
         assert key not in unpack(session._frame())[1]  # nothing is recorded yet
         session._move(60)  # samples at 0, 0.05 and 0.1 s

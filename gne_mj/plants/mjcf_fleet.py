@@ -364,6 +364,10 @@ class MjcfPlant(FleetPlant):
                 "near the file's reference pose no joint positions give it its initial position",
             )
 
+    def controls(self, u: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Write into out (nu,) what inputs u (m,) make of the controls that follow from them."""
+        self._driving.set(out, u)
+
     def step(self, u: ArrayLike, steps: int = 1) -> None:
         """See the base class."""
         block = self._parameter_block.address

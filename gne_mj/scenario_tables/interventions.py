@@ -1,4 +1,4 @@
-"""What is done to a run while it goes on: numbers changed, robots pushed."""
+"""What is done to a run while it goes on: numbers changed, robots pushed, links lost."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from gne_mj.errors import InvalidInput, nearest, part_of
-from gne_mj.simulation import Simulation
+from gne_mj.simulation import Simulation, check_link
 from gne_mj.system import System
 from gne_mj.toml_table import Table, Unit
 
@@ -48,19 +48,44 @@ class PushTable(Table):
         return act
 
 
+class LinkTable(Table):
+    """A link of the communication graph that is lost, or there again."""
+
+    system: str | None = Field(None, description="whose; may be left out if there is only one")
+    agents: tuple[int, int] = Field(description="the two that it is between")
+    lost: bool = Field(True, description="whether it is lost from then on; else it is there again")
+
+    def build(self, system: System) -> Act:
+        """What takes a link of a system away, or gives it back.
+
+        Raises:
+            InvalidInput: there is no such link, or this law's links stay.
+        """
+        first, second = (agent - 1 for agent in self.agents)
+        check_link(system, (first, second))
+
+        def act(simulation: Simulation) -> None:
+            if simulation.runs[system.name].inside:
+                simulation.link(system.name, (first, second), lost=self.lost)
+
+        return act
+
+
 class InterventionTable(Table):
-    """Something that is done while it runs: either ``changes`` or a ``push``."""
+    """Something that is done while it runs: ``changes``, a ``push`` or a ``link``."""
 
     time: Annotated[float, Unit("s")] = Field(ge=0, description="as of the step that begins there")
     changes: dict[str, Any] = Field(
         {}, description="dotted keys of games, barriers and controllers, and their new values"
     )
     push: PushTable | None = Field(None, description="a robot in MuJoCo is pushed")
+    link: LinkTable | None = Field(None, description="two agents lose their link, or have it again")
 
     @model_validator(mode="after")
     def _one(self) -> "InterventionTable":
-        if bool(self.changes) == (self.push is not None):
-            raise PydanticCustomError("one", "it must have either changes or a push")
+        given = bool(self.changes), self.push is not None, self.link is not None
+        if sum(given) != 1:
+            raise PydanticCustomError("one", "it must have either changes, a push or a link")
         return self
 
     def change(self, key: str) -> Act:
@@ -88,6 +113,9 @@ def tables_of(done: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         if "channel" in each:
             keys = ("system", "agent", "axis", "force", "duration")
             table["push"] = {key: each[key] for key in keys if key in each}
+        elif "link" in each:
+            table["link"] = {key: each[key] for key in ("system", "lost")}
+            table["link"]["agents"] = each["link"]
         elif "keys" in each:
             table["changes"] = each["keys"]
             if table in found[-1:]:  # it is noted for each of several systems

@@ -148,10 +148,12 @@ class Scenario(Table):
         scenario, found = self, []
         for number, table in enumerate(self.interventions):
             key = f"interventions.{number}"
-            if table.push is not None:
-                with part_of(f"{key}.push"):
-                    name = self.name_of(table.push.system)
-                    act = table.push.build(next(each for each in systems if each.name == name))
+            done = {"push": table.push, "link": table.link}
+            what, given = next(((k, v) for k, v in done.items() if v is not None), ("", None))
+            if given is not None:
+                with part_of(f"{key}.{what}"):
+                    name = self.name_of(given.system)
+                    act = given.build(next(each for each in systems if each.name == name))
             else:
                 with part_of(f"{key}.changes"):
                     after = changed(scenario, table.changes)

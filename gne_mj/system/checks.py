@@ -265,6 +265,8 @@ def check_adaptive(system: SystemData) -> None:
 def check_network(system: SystemData) -> None:
     """Refuse a graph that changes where what it changes is not known."""
     graph, key = system.law.graph, "law.graph"
+    if graph is not None and graph.rest_of is not None and strikes_messages(system.faults):
+        raise InvalidInput(key, "without a link", "faults of messages are of a graph that stays")
     if not isinstance(graph, ChangingGraph):
         return
     if system.integrator in ("rosenbrock", "tsit5"):

@@ -17,7 +17,7 @@ from gne_mj.equilibrium import (
     variational_equilibrium,
 )
 from gne_mj.equilibrium_path import EquilibriumPath
-from gne_mj.errors import SolverError
+from gne_mj.errors import GneError, SolverError
 from gne_mj.faults import Fault, links_memory, message_delay, strikes_messages, triggered
 from gne_mj.game_model import Game
 from gne_mj.graph import GraphData
@@ -33,6 +33,7 @@ from gne_mj.loops import faults as native_faults
 from gne_mj.margins import Disturbance, of_the_set
 from gne_mj.membership import Membership
 from gne_mj.motion import motion_of
+from gne_mj.plain import forgive_pending
 from gne_mj.plants.agent_type import followed_position, placed_state
 from gne_mj.plants.agents import Agents
 from gne_mj.separation import Separation
@@ -195,6 +196,27 @@ class SystemData:
         known = self.known_equilibrium
         middle = np.full(self.game.actions, np.nan) if known is None else known.action
         return np.broadcast_to(middle, (len(times), self.game.actions))
+
+    @cached_property
+    def constraint_room(self) -> NDArray[np.float64]:
+        """(p,) -g(0), how far each constraint's bound is from where nothing is done; not a number
+        where that is not inside, and of games that move."""
+        game = self.game
+        if motion_of(game) is not None:
+            return np.full(game.constraints_count, np.nan)
+        try:
+            room = -of_the_set(game).constraints(np.zeros(game.actions))
+            forgive_pending()
+        except GneError:  # functions of a user's own may not be defined there
+            return np.full(game.constraints_count, np.nan)
+        return np.where(np.isfinite(room) & (room > 0.0), room, np.nan)
+
+    @property
+    def measures_storage(self) -> bool:
+        """Whether runs show V: it is known of the agents and proven to fall under the law, about
+        a y* that stands still."""
+        proven = self.law.theorem is not None
+        return proven and self.agents.knows_storage and not self.moves and self.membership is None
 
     @property
     def game_kernels(self) -> ModuleType:

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 
+from gne_mj.game_model import Game
 from gne_mj.scenario import Scenario
+from gne_mj.viewer.fleet import Fleet
 from gne_mj.viewer.shown_system import ShownSystem
 
 DECADES = 100.0  # a positive number's slider goes so many times up and down
@@ -90,32 +93,46 @@ def controls_of(scenario: Scenario) -> list[Control]:
 
 
 def pushes_of(shown_systems: list[ShownSystem]) -> list[dict[str, Any]]:
-    """Whose agents have push buttons: robots that MuJoCo moves."""
+    """Whose agents can be pushed, robots that MuJoCo moves; and how, see the page's ``Push``."""
     found = []
     for shown_system in shown_systems:
-        system = shown_system.system
-        if system.engine != "mujoco" or shown_system.fleet is None:
+        system, fleet = shown_system.system, shown_system.fleet
+        if system.engine != "mujoco" or fleet is None:
             continue
         axes = max(system.game.sizes)
         found.append(
             {
                 "system": system.name,
                 "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
-                "unit": _push_unit(shown_system),
                 "force": PUSH_FORCE,
                 "duration": PUSH_DURATION,
+                "ways": _ways(fleet, system.game),
             }
         )
     return found
 
 
-def _push_unit(shown_system: ShownSystem) -> str:
-    """Of forces at the outputs' joints."""
-    assert shown_system.fleet is not None
-    plant = shown_system.fleet.plant
-    channels = np.flatnonzero(plant.output_joints >= 0).tolist()
-    units = sorted({plant.push_unit(channel) for channel in channels})
-    return " or ".join(units) or "N"
+def _ways(fleet: Fleet, game: Game) -> list[list[dict[str, Any] | None]]:
+    """Of each agent and axis the unit, and the direction in the world where the output's joint
+    slides (of others None); None where no joint can be pushed."""
+    plant, model, kinds = fleet.plant, fleet.plant.model, mujoco.mjtJoint
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found: list[list[dict[str, Any] | None]] = [[] for _ in range(game.agents)]
+    for channel, (agent, dof) in enumerate(
+        zip(game.agent_of_action, plant.output_joints, strict=True)
+    ):
+        if dof < 0:
+            found[agent].append(None)
+            continue
+        joint, along = int(model.dof_jntid[dof]), None
+        place = int(dof - model.jnt_dofadr[joint])
+        if model.jnt_type[joint] == kinds.mjJNT_SLIDE:
+            along = data.xaxis[joint].tolist()
+        elif model.jnt_type[joint] == kinds.mjJNT_FREE and place < 3:
+            along = np.eye(3)[place].tolist()
+        found[agent].append({"unit": plant.push_unit(channel), "along": along})
+    return found
 
 
 def _positive(key: str, label: str, system: str, unit: str, value: float) -> Control:

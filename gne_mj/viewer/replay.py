@@ -13,9 +13,10 @@ from gne_mj.errors import InvalidInput
 from gne_mj.recorded import recorded_system, sizes_of
 from gne_mj.scenario import Scenario, load_scenario, scenario_of
 from gne_mj.trajectory import Trajectory
+from gne_mj.viewer.joints import MOST
 from gne_mj.viewer.pack import packed_small
 from gne_mj.viewer.scene import Scene
-from gne_mj.viewer.shown_system import Arrays, ShownSystem, is_line
+from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values, is_line
 
 if TYPE_CHECKING:
     import xarray
@@ -142,6 +143,7 @@ class Recording:
             if left["exit_agents"]:
                 mark_outside(arrays, name, left["exit_agents"], time >= ended - 1e-9)
             arrays |= _messages(shown_system, np.minimum(time, ended))
+            arrays |= _joints(shown_system, values[name])
         poses = scene.poses(values).reshape(len(time), -1)
         varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
         arrays["pose_base"] = poses[0]
@@ -257,11 +259,21 @@ def _messages(shown_system: ShownSystem, time: NDArray[np.float64]) -> Arrays:
     return {key: np.stack([row[key] for row in rows]) for key in rows[0]} if rows else {}
 
 
+def _joints(shown_system: ShownSystem, values: Values) -> Arrays:
+    """Numbers of the joints, unless they are many."""
+    joints, samples = shown_system.joints, len(values["action"])
+    if joints is None or joints.size * samples > MOST:
+        return {}
+    return {f"{shown_system.system.name}/joints": joints.recorded(values)}
+
+
 def _lean(name: str, array: NDArray[Any]) -> NDArray[Any]:
     """What is looked at only, with the digits that can be seen; poses as they are."""
     if name.startswith("pose") or array.dtype.kind != "f" or name == "time":
         return array
-    return _rounded(array.astype(np.float32), bits=9 if name.endswith("/estimate") else 0)
+    return _rounded(
+        array.astype(np.float32), bits=9 if name.endswith(("/estimate", "/joints")) else 0
+    )
 
 
 def _rounded(array: NDArray[np.float32], bits: int) -> NDArray[np.float32]:

@@ -21,7 +21,7 @@ from gne_mj.viewer.replay import cut, mark_outside, outcome, scene_pack
 from gne_mj.viewer.scene import Scene
 from gne_mj.viewer.server import Browser, Server
 from gne_mj.viewer.shown_system import ShownSystem
-from gne_mj.viewer.sliders import Sliders, finite
+from gne_mj.viewer.sliders import Sliders, finite, in_words
 
 FRAME = 1 / 60  # s between frames, at best
 SHARE = 0.015  # of the time at most goes into frames while a run is as fast as it can
@@ -30,6 +30,7 @@ HISTORY = 1.0  # s between histories, while frames are far apart
 ENTRIES, LEAST_ROWS = 100_000, 200  # actions in a history, but at least so many samples of them
 PIECE = 0.05  # s of computing between looks at what the page asks for
 Begin = Literal["now", "viewer", "paused"]  # when the first run goes on
+LONGEST_PUSH = 100.0  # s
 FASTEST = 1000.0  # times real time; beyond, ask for as fast as possible
 
 
@@ -65,6 +66,7 @@ class Session:
         self._ended: Trajectory | None = None
         self._next: Scenario | None = None  # that viewers have asked for
         self._missed = 0
+        self._looked_at: set[str] = set()  # systems whose joints somebody looks at
         self._asked: queue.Queue[tuple[dict[str, Any], Browser]] = queue.Queue()
         self._begin(scenario)
         self._waits, self._playing = begin == "viewer", begin == "now"
@@ -190,12 +192,21 @@ class Session:
             try:
                 self._do(message, browser)
             except GneError as error:
-                key = str(message.get("key", ""))
-                self._notice(self._sliders.refused(error, key), browser, about=key)
+                self._refuse(error, message, browser)
             except Exception as error:  # no message may end a run
                 self._notice(f"This failed: {type(error).__name__}: {error}", browser)
         if asked:
             self._next_frame = 0.0  # show at once what it did
+
+    def _refuse(self, error: GneError, message: Mapping[str, Any], browser: Browser) -> None:
+        """Say why something is not done, in the page's words; the same again takes its place."""
+        do, key = message.get("do"), str(message.get("key", ""))
+        if do in ("push", "link"):
+            what = {"push": "this push", "link": "this link"}[str(do)]
+            text = f"{message.get('system')}, {what}: {in_words(error)}"
+            self._notice(text, browser, about=f"{do} {message.get('system')}")
+        else:
+            self._notice(self._sliders.refused(error, key), browser, about=key)
 
     def _do(self, message: Mapping[str, Any], browser: Browser) -> None:
         match message.get("do"):
@@ -219,6 +230,10 @@ class Session:
                 self._set(message.get("key"), message.get("value"))
             case "push":
                 self._push(message)
+            case "link":
+                self._link(message)
+            case "look":
+                self._look_at(message.get("system"))
             case "scenario":
                 scenario = as_done(self.simulation.source, self.simulation.interventions)
                 self.server.tell({"kind": "scenario", "text": scenario.toml()}, browser)
@@ -265,21 +280,65 @@ class Session:
             self._notice("This holds from the next start on: its run has ended.", level="info")
 
     def _push(self, message: Mapping[str, Any]) -> None:
-        name, agent, axis = message.get("system"), message.get("agent"), message.get("axis", 0)
+        """Push an agent along its axes, with "force" along "axis" or "forces" along the first."""
+        name, agent = message.get("system"), message.get("agent")
         about = next((each for each in self._pushes if each["system"] == name), None)
         if about is None:
             raise InvalidInput("push", name, "only robots in MuJoCo can be pushed")
         game = self.simulation.runs[str(name)].system.game
         if not isinstance(agent, int) or not 1 <= agent <= game.agents:
             raise InvalidInput("push", agent, f"agents are numbered 1 to {game.agents}")
+        axis, forces = message.get("axis", 0), message.get("forces")
         if not isinstance(axis, int) or not 0 <= axis < game.sizes[agent - 1]:
             raise InvalidInput("push", axis, f"agent {agent} has {game.sizes[agent - 1]} axes")
-        force = finite("push", message.get("force", about["force"]))
-        channel = int(game.data.offsets[agent - 1]) + axis
+        if forces is None:
+            forces = [0.0] * axis + [message.get("force", about["force"])]
+        if not isinstance(forces, list) or not 0 < len(forces) <= game.sizes[agent - 1]:
+            raise InvalidInput("push", forces, f"agent {agent} has {game.sizes[agent - 1]} axes")
+        forces = [finite("push", force) for force in forces]
+        duration = finite("push", message.get("duration", about["duration"]))
+        if not 0.0 < duration <= LONGEST_PUSH:
+            raise InvalidInput(
+                "push", duration, f"it must last longer than 0 s, and at most {LONGEST_PUSH:g} s"
+            )
         if self.simulation.ended:
             raise InvalidInput("push", name, "its run has ended; restart it")
-        self.simulation.push(str(name), channel, force, about["duration"])
+        first = int(game.data.offsets[agent - 1])
+        for channel, force in enumerate(forces, first):
+            if force != 0.0:
+                self.simulation.push(str(name), channel, force, duration)
         self._tell_interventions()
+
+    def _link(self, message: Mapping[str, Any]) -> None:
+        """Two agents of a system lose their link, or have it again."""
+        name, pair, lost = (message.get(key) for key in ("system", "agents", "lost"))
+        if name not in self.simulation.runs:
+            raise InvalidInput("link", name, "there is no such system")
+        pair = pair if isinstance(pair, list) and all(type(i) is int for i in pair) else []
+        if len(pair) != 2 or not isinstance(lost, bool):
+            raise InvalidInput("link", pair, "it is between two agents, and lost or not")
+        if self.simulation.ended:
+            raise InvalidInput("link", name, "its run has ended; restart it")
+        first, second = pair[0] - 1, pair[1] - 1
+        self.simulation.link(str(name), (first, second), lost=lost)
+        self._tell_interventions()
+
+    def _look_at(self, name: Any) -> None:
+        """Frames have the joints of this system from now on, since somebody looks at them."""
+        if name in self.simulation.runs:
+            self._looked_at.add(str(name))
+
+    def _joints(self, values: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        """Numbers of the joints that somebody looks at, by the names of arrays."""
+        found = {}
+        for shown_system in self._scene.shown_systems:
+            name, joints = shown_system.system.name, shown_system.joints
+            if joints is None or name not in self._looked_at:
+                continue
+            data = getattr(getattr(self.simulation.runs[name].loop, "plant", None), "data", None)
+            rows = joints.recorded(values[name])[0] if data is None else joints.live(data)
+            found[f"{name}/joints"] = rows.astype(np.float32)
+        return found
 
     def _tell_controls(self, browser: Browser | None = None) -> None:
         self.server.tell({"kind": "controls", "values": self._sliders.values}, browser)
@@ -354,6 +413,7 @@ class Session:
                 mark_outside(rows, name, states[name]["exit_agents"], np.array([True]))
         arrays = {name: row[0] for name, row in rows.items()}
         arrays["poses"] = self._scene.poses(values)[0]
+        arrays |= self._joints(values) if self._looked_at else {}
         step = simulation.clock.steps(time)
         for shown_system in self._scene.shown_systems:
             own = simulation.runs[shown_system.system.name].loop.time

@@ -20,6 +20,7 @@ from gne_mj.system import Clock, mode_of
 from gne_mj.system.data import SystemData
 from gne_mj.variables import Variable
 from gne_mj.viewer.fleet import fleet_of
+from gne_mj.viewer.joints import Joints
 
 Arrays = dict[str, NDArray[Any]]
 Values = Mapping[str, NDArray[np.float64]]
@@ -34,11 +35,13 @@ class ShownSystem:
 
     Attributes:
         fleet: its robots; None for agents without bodies.
+        joints: of these.
     """
 
     def __init__(self, system: SystemData, clock: Clock) -> None:
         self.system, self.clock = system, clock
         self.fleet = fleet_of(system, clock)
+        self.joints = None if self.fleet is None else Joints(self.fleet)
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the system; constant while it runs."""
@@ -73,9 +76,10 @@ class ShownSystem:
             "anchors": [],
             "height": 0.0,
             "tints": [],
+            "joints": [],
         }
-        if self.fleet is not None:
-            about |= self.fleet.places
+        if self.fleet is not None and self.joints is not None:
+            about |= self.fleet.places | {"joints": self.joints.meta()}
         return about
 
     def _shown(self, page: str) -> list[Variable]:
@@ -93,7 +97,7 @@ class ShownSystem:
             values: of leading dimension T, of the variables that the page has; without some that
                 an older trajectory, or the present instant, does not know.
         """
-        name, game = self.system.name, self.system.game
+        name, system, game = self.system.name, self.system, self.system.game
         found: Arrays = {}
         for variable in (*self._shown("line"), *self._shown("bound")):
             if variable.name in values:
@@ -101,7 +105,7 @@ class ShownSystem:
                 found[line_key(name, variable.name)] = rows.reshape(len(rows), -1)
         margin = -np.fmax.reduce(values["constraint"], axis=1)  # of constraints that there are
         found[f"{name}/margin"] = margin.astype(np.float32)
-        found[f"{name}/share"] = shares(game, values).astype(np.float32)
+        found[f"{name}/share"] = shares(game, values, system.constraint_room).astype(np.float32)
         if self._network_changes and "linked" in values:
             found[f"{name}/linked"] = values["linked"].astype(np.float32)
         if "there" in values:  # where agents leave and join
@@ -207,11 +211,19 @@ def _radii(system: SystemData) -> list[float | None]:
     return [float(radius) if np.isfinite(radius) else None for radius in found]
 
 
-def shares(game: Game, values: Values) -> NDArray[np.float64]:
+def shares(
+    game: Game, values: Values, room: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
 
     A quantity's bounds count for the agent or for the owners of the constraint that it is of, and
-    for all agents if it is one number. Those that move are of each sample.
+    for all agents if it is one number. Those that move are of each sample. An agent of which no
+    quantity says anything has the share of the bounds of its own constraints, 1 + g(y) / room.
+
+    Args:
+        game: whose.
+        values: of the samples.
+        room: (p,) -g(0), what there is to use of each constraint; not a number where it is none.
     """
     found = np.full((len(values["action"]), game.agents), np.nan)
     for index, quantity in enumerate(game.quantities):
@@ -230,7 +242,15 @@ def shares(game: Game, values: Values) -> NDArray[np.float64]:
         for column, owners in enumerate(game.owned_by):
             agents = list(owners)
             found[:, agents] = np.fmax(found[:, agents], used[:, column, None])
-    return found
+    unknown = np.all(np.isnan(found), axis=0)
+    if room is None or not np.any(unknown) or not np.any(np.isfinite(room)):
+        return found
+    used = np.maximum(1.0 + values["constraint"] / room, 0.0)
+    own = np.full_like(found, np.nan)
+    for column, owners in enumerate(game.owned_by):
+        agents = list(owners)
+        own[:, agents] = np.fmax(own[:, agents], used[:, column, None])
+    return np.where(unknown, own, found)
 
 
 @lru_cache

@@ -106,9 +106,7 @@ class Sliders:
         if control is None:
             return str(error)
         stays = f"it stays at {self.values[key]:.4g}"
-        return (
-            f"{control.system}, {control.label}: {_rest(error, 'at the present outputs')}; {stays}"
-        )
+        return f"{control.system}, {control.label}: {in_words(error)}; {stays}"
 
     def refused_start(self, error: GneError) -> str:
         """Why a run cannot begin where sliders stand, and which of them to set back."""
@@ -118,7 +116,7 @@ class Sliders:
             if self.values[key] != each.value
         ]
         set_back = f"set back {', or '.join(moved)}"
-        return f"It cannot begin so: {_rest(error, 'at the start')}; {set_back}"
+        return f"It cannot begin so: {in_words(error, 'at the start')}; {set_back}"
 
 
 def _changed(run: SystemRun, scenario: Scenario, control: Control, value: float) -> System:
@@ -152,7 +150,7 @@ def finite(key: Any, value: Any) -> float:
     return number
 
 
-def _rest(error: GneError, where: str) -> str:
+def in_words(error: GneError, where: str = "at the present outputs") -> str:
     """What an error says, without the key of the scenario's file; where a constraint is broken."""
     if isinstance(error, InfeasibleStart):
         return (

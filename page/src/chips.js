@@ -26,7 +26,7 @@ export class Chips {
     const { plot } = this;
     const { spec, lines } = plot;
     const [k] = spec.groups[group];
-    const value = element("span", { class: "chip-value", "aria-hidden": true });
+    const value = element("span", { class: "chip-value" });
     const what = `${spec.noun} ${spec.lines[k].label}`.trim();
     const chip = element(
       "button",
@@ -34,15 +34,16 @@ export class Chips {
         type: "button",
         class: "plot-chip",
         title: `${what}: click switches the line, a double click shows it alone`,
-        "aria-label": `line of ${what}`,
         onmouseenter: () => plot.point(k),
         onmouseleave: () => plot.point(null),
         onclick: () => this.change(() => lines.toggle(group)),
         ondblclick: () => this.change(() => lines.showOnly(group)),
       },
+      element("span", { class: "unseen", text: `line of ${what}: ` }),
       swatchOf(lines.lookOf(k)),
-      spec.total === 1 ? "" : spec.shorts[k],
+      element("span", { "aria-hidden": true, text: spec.total === 1 ? "" : spec.shorts[k] }),
       value,
+      element("span", { class: "unseen", text: ` ${spec.unit}` }),
     );
     this.root.append(chip);
     return value;

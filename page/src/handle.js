@@ -1,5 +1,6 @@
 // What a developer, or a test, may ask of a page: window.gne, the only name that the page defines.
 import { css } from "./colours.js";
+import { along } from "./links.js";
 import { theme } from "./theme.js";
 /** @import { Page } from "./page.js" */
 /** @import { Scene, Source, Three } from "./types.d.ts" */
@@ -29,6 +30,11 @@ export const handleOf = (page) => ({
   plan: (/** @type {string} */ system) => planOf(page, system),
   /** How each system is drawn, beside those of other runs or over them. */
   compared: () => comparedOf(page),
+  /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
+  head: (/** @type {string} */ system, /** @type {number} */ a, /** @type {number} */ b = a) =>
+    headOf(page, system, a, b),
+  /** The labels of robots, px. */
+  labels: () => page.overlay.labels.drawn,
   /** What is plotted. */
   get plots() {
     return page.plots.describe();
@@ -73,6 +79,20 @@ const planOf = ({ scene }, name) => {
   };
 };
 
+/**
+ * @param {Page} page
+ * @param {string} name of the system
+ * @param {number} a
+ * @param {number} b
+ */
+const headOf = ({ meta, overlay, scene }, name, a, b) => {
+  const system = meta?.systems.find((each) => each.name === name);
+  if (!system) return null;
+  if (a === b) return scene.camera.project(scene.layout.headOf(system, a));
+  const curve = overlay.links.curve(system, a, b);
+  return curve && along(curve, 0.5);
+};
+
 /** @param {Page} page */
 const isAlive = ({ scene }) => {
   const gl = scene.viewer.renderer.getContext();
@@ -96,13 +116,15 @@ const comparedOf = ({ meta, scene }) =>
   });
 
 /** @param {Page} page */
-const stateOf = ({ meta, mode, live, overlay, playback, scene, source, tuning }) => ({
+const stateOf = ({ hands, meta, mode, live, overlay, playback, scene, source, tuning }) => ({
   mode,
   replaying: playback !== null,
   connected: live?.connected ?? false,
   theme: theme(),
   controls: [...(tuning?.sliders.keys() ?? [])],
   pulses: overlay.links.pulses.length,
+  chosen: hands.chosen.which,
+  lost: [...hands.switching.lost],
   following: scene.camera.following,
   follow: scene.camera.follow,
   ghosts: scene.ghosts.shown,

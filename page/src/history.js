@@ -12,7 +12,7 @@ export class History {
     this.most = most;
     this.names = systems.flatMap((system) =>
       partsOf(system)
-        .filter((part) => part !== "estimate")
+        .filter((part) => !["estimate", "joints"].includes(part))
         .map((part) => `${system.name}/${part}`),
     );
     /** @type {number[]} */

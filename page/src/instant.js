@@ -13,6 +13,7 @@ export const partsOf = (system) => [
   "share",
   "margin",
   "estimate",
+  "joints",
   "linked",
   "there",
 ];

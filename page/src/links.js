@@ -17,7 +17,7 @@ const DENSE = 300; // edges, from which on they are straight
  * @param {{x: number, y: number}[]} curve its two ends, with the point that bends it between
  * @param {number} t
  */
-const along = ([a, c, b], t) => {
+export const along = ([a, c, b], t) => {
   const u = 1 - t;
   return {
     x: u * u * a.x + 2 * u * t * c.x + t * t * b.x,
@@ -42,6 +42,8 @@ export class Links {
     this.linked = new Map(); // of graphs that change: which of a system's edges there are now
     /** @type {Map<string, Instant["systems"][string]>} */
     this.arrays = new Map(); // of each system now
+    /** @type {(system: System, pair: [number, number]) => boolean} */
+    this.isLost = () => false; // whether a link, of agents from 1, was taken away
   }
 
   /** Another scene. */
@@ -95,13 +97,13 @@ export class Links {
   }
 
   /**
-   * Whether both agents, from 1, are there.
+   * Whether both agents, from 1, are there, and hear each other if they ever do.
    * @param {System} system
    * @param {[number, number]} pair
    */
   among(system, [a, b]) {
     const own = this.arrays.get(system.name);
-    return isThere(own, a - 1) && isThere(own, b - 1);
+    return isThere(own, a - 1) && isThere(own, b - 1) && !this.isLost(system, [a, b]);
   }
 
   get pulsing() {
@@ -203,6 +205,54 @@ export class Links {
     context.stroke();
     context.setLineDash([]);
     context.globalAlpha = 1;
+    for (const pair of system.edges) if (this.isLost(system, pair)) this.lostEdge(system, pair);
+  }
+
+  /**
+   * A link that was taken away: a broken line and a cross.
+   * @param {System} system
+   * @param {[number, number]} pair
+   */
+  lostEdge(system, [a, b]) {
+    const { context } = this;
+    const curve = this.curve(system, a - 1, b - 1);
+    if (!curve) return;
+    const [from, bend, to] = curve;
+    context.strokeStyle = colour("bad");
+    context.lineWidth = 1.2;
+    context.setLineDash([3, 6]);
+    context.beginPath();
+    context.moveTo(from.x, from.y);
+    context.quadraticCurveTo(bend.x, bend.y, to.x, to.y);
+    context.stroke();
+    context.setLineDash([]);
+    const { x, y } = along(curve, 0.5);
+    this.cross(x, y, 1);
+  }
+
+  /**
+   * The edge that is nearest to a point of the pane, if one is near.
+   * @param {System[]} systems
+   * @param {number} x
+   * @param {number} y
+   * @param {number} near px
+   */
+  nearest(systems, x, y, near) {
+    /** @type {{system: System, edge: [number, number]} | null} */
+    let best = null;
+    let least = near;
+    for (const system of systems)
+      for (const edge of system.edges) {
+        const curve = this.curve(system, edge[0] - 1, edge[1] - 1);
+        if (!curve) continue;
+        // not at its ends, where several meet
+        for (let k = 3; k <= 29; k++) {
+          const at = along(curve, k / 32);
+          const away = Math.hypot(at.x - x, at.y - y);
+          if (away < least) [best, least] = [{ system, edge }, away];
+        }
+      }
+    return best;
   }
 
   /**

@@ -1,7 +1,6 @@
 // Drawn flat over the 3-D pane: labels, links, messages on their way, distances on the ground.
-import { line } from "./colours.js";
 import { headingTexts, isSolid } from "./compare.js";
-import { isThere } from "./instant.js";
+import { Labels } from "./labels.js";
 import { Links } from "./links.js";
 import { colour } from "./theme.js";
 import { decimals, fixed, number } from "./words.js";
@@ -9,20 +8,25 @@ import { decimals, fixed, number } from "./words.js";
 /** @import { Agent, Instant, Run, Scene as Meta, System, Text } from "./types.d.ts" */
 
 /** @typedef {{x: number, y: number, w: number, h: number}} Box in CSS pixels */
-/** @typedef {Box & {wide: number, text: string}} Pill of an agent's number, so wide, and a text */
-
-/**
- * Agents in the order in which they get a label when there is no room for all: 1, 9, 5, ...
- * @param {number} n
- */
-const labelOrder = (n) => {
-  const zeros = (/** @type {number} */ k) => (k === 0 ? 32 : Math.log2(k & -k));
-  return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
-};
-
 /** @param {Partial<Text>} kind */
 const colourOf = ({ bad, limit, chosen, title }) =>
   bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+
+const BODY = 24; // px from a robot's middle line, within which it is touched
+
+/**
+ * How far a point is from the straight line between two others, px.
+ * @param {{x: number, y: number}} a
+ * @param {{x: number, y: number}} b
+ * @param {number} x
+ * @param {number} y
+ */
+const awayFrom = (a, b, x, y) => {
+  const [dx, dy] = [b.x - a.x, b.y - a.y];
+  const along = ((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1);
+  const t = Math.min(Math.max(along, 0), 1);
+  return Math.hypot(a.x + t * dx - x, a.y + t * dy - y);
+};
 
 export class Overlay {
   /**
@@ -34,13 +38,14 @@ export class Overlay {
     this.scene = scene;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.links = new Links(this.context, scene);
+    this.labels = new Labels(this);
+    /** @type {{draw: (context: CanvasRenderingContext2D) => void} | null} */
+    this.hands = null; // what hands do in the pane
     this.labelled = true;
     /** @type {System[]} */
     this.systems = [];
     /** @type {Run[]} */
     this.runs = []; // if several are compared
-    /** @type {Map<string, number[]>} */
-    this.orders = new Map();
     /** @type {Box[]} */
     this.taken = []; // where texts are
     /** @type {(Agent & {x: number, y: number})[]} */
@@ -53,7 +58,7 @@ export class Overlay {
   setMeta({ systems, runs = [] }) {
     this.systems = systems;
     this.runs = runs;
-    this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
+    this.labels.begin(systems);
     this.links.begin();
   }
 
@@ -80,14 +85,16 @@ export class Overlay {
     context.clearRect(0, 0, w, h);
     this.taken = [];
     this.marks = [];
+    this.labels.drawn = [];
     const solid = this.systems.filter(isSolid);
     this.links.draw(solid, instant, now);
     if (this.runs.length && solid.length === this.systems.length)
       for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
     for (const system of solid)
       if (system.drawn_as === "bars") this.barTexts(system);
-      else if (this.labelled) this.labels(system, instant);
+      else this.labels.draw(system, instant, this.labelled);
     this.distances();
+    this.hands?.draw(context);
   }
 
   /** Metres along the lane, at the ground's stronger lines. */
@@ -127,108 +134,11 @@ export class Overlay {
 
   /**
    * @param {System} system
-   * @param {Instant} instant
-   */
-  labels(system, instant) {
-    const shares = instant.systems[system.name].share;
-    const share = (/** @type {number} */ agent) => (shares ? shares[agent] : NaN);
-    const first = (/** @type {number} */ agent) =>
-      this.isHighlighted(system, agent) || share(agent) > 1;
-    const order = this.orders.get(system.name) ?? [];
-    const away = (/** @type {number} */ agent) => !isThere(instant.systems[system.name], agent);
-    const urgent = order.filter(first);
-    for (const agent of [...urgent, ...order.filter((each) => !first(each))])
-      if (!away(agent)) this.label(system, agent, share(agent));
-  }
-
-  /**
-   * @param {System} system
    * @param {number} agent
    */
   isHighlighted(system, agent) {
     const which = this.highlighted;
     return which?.system === system.name && which?.agent === agent;
-  }
-
-  /**
-   * @param {System} system
-   * @param {number} agent
-   * @param {number} share
-   */
-  label(system, agent, share) {
-    const [x, y, z] = this.scene.layout.agentAt(system, agent);
-    const p = this.scene.camera.project([x, y, z + system.height]);
-    if (!p) return;
-    this.marks.push({ x: p.x, y: p.y, system: system.name, agent });
-    const name = String(agent + 1);
-    const out = share > 1;
-    const digits = out && share < 1.1 ? 1 : 0; // not "100 %" of what is outside
-    const used = out ? "outside" : "";
-    const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
-    for (const text of percent ? [percent, ""] : [""]) {
-      const box = this.pillBox(p, name, out ? `⚠ ${text}` : text);
-      if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
-      this.taken.push(box);
-      return this.pill(box, { name, system, agent, out });
-    }
-  }
-
-  /**
-   * @param {{x: number, y: number}} p
-   * @param {string} name
-   * @param {string} text
-   */
-  pillBox(p, name, text) {
-    const context = this.context;
-    context.font = "600 13px system-ui, sans-serif";
-    const wide = context.measureText(name).width;
-    context.font = "12px system-ui, sans-serif";
-    const more = text ? context.measureText(text).width + 7 : 0;
-    const w = wide + more + 14;
-    return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text };
-  }
-
-  /**
-   * @param {Pill} box
-   * @param {{name: string, system: System, agent: number, out: boolean}} about
-   */
-  pill(box, { name, system, agent, out }) {
-    const context = this.context;
-    const chosen = this.isHighlighted(system, agent);
-    context.beginPath();
-    context.roundRect(box.x, box.y, box.w, box.h, 5);
-    context.fillStyle = out ? colour("bad-fill") : colour("pill");
-    context.fill();
-    context.lineWidth = chosen ? 2 : 1;
-    context.strokeStyle = colour(chosen ? "accent" : "pill-edge");
-    context.stroke();
-    context.textBaseline = "middle";
-    context.textAlign = "left";
-    context.fillStyle = out ? "#fff" : colour("text");
-    context.font = "600 13px system-ui, sans-serif";
-    context.fillText(name, box.x + 7, box.y + 10.5);
-    context.font = "12px system-ui, sans-serif";
-    if (!out) context.fillStyle = colour("muted");
-    context.fillText(box.text, box.x + 14 + box.wide, box.y + 10.5);
-    if (system.agents <= 14 && !out) this.swatch(box, agent);
-  }
-
-  /**
-   * The look of the agent's line in the plots, under its label.
-   * @param {Box} box
-   * @param {number} agent
-   */
-  swatch(box, agent) {
-    const context = this.context;
-    const look = line(agent);
-    context.strokeStyle = look.colour;
-    context.lineWidth = 2.5;
-    context.setLineDash(look.dash);
-    context.beginPath();
-    context.moveTo(box.x + 5, box.y + box.h);
-    context.lineTo(box.x + box.w - 5, box.y + box.h);
-    context.stroke();
-    context.setLineDash([]);
   }
 
   /** @param {System} system */
@@ -286,6 +196,29 @@ export class Overlay {
     context.strokeStyle = colour("halo");
     context.strokeText(text, x, y);
     context.fillText(text, x, y);
+  }
+
+  /**
+   * The agent at a point of the pane: its label, or what stands there, from the ground to its head.
+   * @param {number} x
+   * @param {number} y
+   */
+  agentAt(x, y) {
+    const near = this.agentNear(x, y);
+    if (near) return near;
+    const { camera, layout } = this.scene;
+    /** @type {Agent | null} */
+    let best = null;
+    let nearest = BODY;
+    for (const system of this.scene.fleets)
+      for (let agent = 0; agent < system.agents; agent++) {
+        const foot = camera.project(layout.agentAt(system, agent));
+        const head = camera.project(layout.headOf(system, agent));
+        if (!foot || !head) continue;
+        const away = awayFrom(foot, head, x, y);
+        if (away < nearest) [best, nearest] = [{ system: system.name, agent }, away];
+      }
+    return best;
   }
 
   /**

@@ -1,6 +1,7 @@
 // The page: puts a source of instants, the scene, plots and controls together.
 import { byId } from "./dom.js";
 import { Comparison, isSolid } from "./compare.js";
+import { HandsOn } from "./handson.js";
 import { Header, warn } from "./header.js";
 import { Keep, momentAsked } from "./keep.js";
 import { Live } from "./live.js";
@@ -38,6 +39,7 @@ export class Page {
     this.transport = new Transport(this);
     this.keep = new Keep(this);
     new Video(this);
+    this.hands = new HandsOn(this);
     /** @type {Live | null} */
     this.live = null; // the simulation, in mode "live"
     /** @type {Playback | null} */
@@ -99,7 +101,7 @@ export class Page {
   }
 
   startLive() {
-    const tuning = new Tuning((message) => live.send(message));
+    const tuning = new Tuning((message) => live.send(message), this.hands.pushing);
     const live = new Live({
       opened: () => this.opened(),
       lost: (why) => this.lost(why),
@@ -142,6 +144,7 @@ export class Page {
     this.playback = playback;
     this.plots.setSource(playback);
     this.transport.mark(marksOf(playback), playback.end);
+    this.hands.renew();
     playback.seek(momentAsked() ?? playback.end);
   }
 
@@ -178,6 +181,7 @@ export class Page {
     this.overlay.setMeta(meta);
     this.plots.setScene(meta, source);
     this.toolbar.setMeta(meta);
+    this.hands.setMeta(meta);
   }
 
   // ---- what users ask for
@@ -284,6 +288,7 @@ export class Page {
       this.plots.setTime(instant.time);
     } else if (this.instant && this.scene.stale) this.scene.apply(this.instant, source.store);
     if (!this.instant) return;
+    this.hands.follow(source, this.instant);
     const render = this.scene.needsRender;
     if (render) this.scene.render();
     if (render || this.overlay.moving || this.wasMoving) this.overlay.draw(this.instant, now);
@@ -306,6 +311,7 @@ export class Page {
     } else this.plots.writeValues();
     this.header.show(meta, source);
     this.toolbar.showLegend(this.instant);
+    this.hands.chosen.show(this.instant);
     this.transport.show(source, this.live);
     this.keep.show();
     // slow plots must not take more than a sixth of the time

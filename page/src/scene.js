@@ -5,6 +5,7 @@ import { Camera } from "./camera.js";
 import { ramp } from "./colours.js";
 import { Ghosts } from "./ghosts.js";
 import { Ground } from "./ground.js";
+import { Hidden } from "./hidden.js";
 import { Layout } from "./layout.js";
 import { THREE } from "./meshcat.js";
 import { plansOf } from "./plan.js";
@@ -25,6 +26,7 @@ export class Scene {
     this.ground = new Ground(this.viewer.scene);
     this.batches = new Batches(this.viewer.scene);
     this.ghosts = new Ghosts(this);
+    this.hidden = new Hidden();
     /** @type {Bars[]} */
     this.bars = [];
     /** @type {Plan[]} */
@@ -116,6 +118,7 @@ export class Scene {
     if (!this.stale && (this.complete || now < this.nextLook)) return;
     this.objects = meta.items.map((path) => nodeAt(this.viewer, path)?.object);
     this.tinted = new Map(this.fleets.map((system) => [system.name, this.tintedOf(system)]));
+    this.hidden.build(this.tinted.values());
     this.statics = this.staticMeshes();
     this.dimStatics();
     this.complete = !this.objects.includes(undefined);
@@ -235,6 +238,7 @@ export class Scene {
         for (const mesh of meshes) mesh.material.color.setRGB(r, g, b);
       });
     }
+    this.hidden.colour();
   }
 
   /** Found once: robots of a lane may float around z = 0. */

@@ -39,11 +39,13 @@ export class Toolbar {
   }
 
   /** @param {Scene} meta */
-  setMeta({ systems }) {
+  setMeta({ systems, controls }) {
     this.systems = systems;
+    const live = controls !== undefined; // a run that goes on
     this.fillFollow();
+    this.setFollow(byId("follow").value); // which is everything again
     this.fillGhosts();
-    this.describeLinks();
+    this.describeLinks(live);
   }
 
   // ---- labels and links
@@ -61,7 +63,8 @@ export class Toolbar {
     this.scene.dirty();
   }
 
-  describeLinks() {
+  /** @param {boolean} live whether they can be lost */
+  describeLinks(live) {
     const linked = this.systems.filter((system) => system.edges.length > 0);
     byId("links").hidden = linked.length === 0;
     const words = new Set(linked.map((system) => system.edges_are));
@@ -70,6 +73,7 @@ export class Toolbar {
     if (words.has("measurements")) parts.push("dashed lines: measured directly");
     if (linked.some((system) => system.links.length && system.message_period !== null))
       parts.push("✕ lost");
+    if (words.has("messages") && live) parts.push("click a line: the link is lost, or there again");
     if (linked.some((system) => system.triggered)) parts.push("sent by triggers: see the plot");
     const planned = this.systems.filter(({ plan }) => plan);
     if (planned.length) parts.push("rings: outputs, where robots head");

@@ -1,15 +1,20 @@
 // Sliders and pushes of a live simulation.
+import { arrows } from "./arrows.js";
 import { byId, element } from "./dom.js";
 import { Slider } from "./slider.js";
-import { number, withUnit } from "./words.js";
+/** @import { Pushing } from "./push.js" */
 /** @import { Control, Push, Scene, System } from "./types.d.ts" */
 
 const MOST_PUSHED = 8; // agents, up to which each has push buttons of its own
 
 export class Tuning {
-  /** @param {(message: object) => void} send to the simulation */
-  constructor(send) {
+  /**
+   * @param {(message: object) => void} send to the simulation
+   * @param {Pushing} pushing
+   */
+  constructor(send, pushing) {
     this.send = send;
+    this.pushing = pushing;
     /** @type {Map<string, Slider>} */
     this.sliders = new Map();
   }
@@ -39,7 +44,7 @@ export class Tuning {
       { class: "tuning-row", role: "group", "aria-label": system.name },
       element("h3", { text: system.name }),
       ...controls.map((control) => this.slider(control)),
-      ...pushes.map((push) => this.pushes(push, system)),
+      ...pushes.map(() => this.pushes(system)),
     );
   }
 
@@ -51,30 +56,56 @@ export class Tuning {
     return slider.root;
   }
 
-  /**
-   * @param {Push} push
-   * @param {System} system
-   */
-  pushes(push, system) {
-    const force = withUnit(push.force, push.unit);
-    const title = `Push with ${force} for ${number(push.duration)} s`;
+  /** @param {System} system */
+  pushes(system) {
+    const unit = this.pushing.unitOf(system, 0);
     return element(
       "div",
-      { class: "pushes", role: "group", "aria-label": title },
-      element("p", { class: "small", text: title }),
-      system.agents <= MOST_PUSHED ? this.pushList(push, system) : this.pushChoice(push, system),
+      { class: "pushes", role: "group", "aria-label": `pushes of ${system.name}` },
+      element(
+        "p",
+        { class: "small" },
+        "Drag a robot to push it, or with ",
+        this.field(system, "force", `force of a push, in ${unit}`, 1000),
+        ` ${unit} for `,
+        this.field(system, "duration", "duration of a push, in s", 100),
+        " s:",
+      ),
+      system.agents <= MOST_PUSHED ? this.pushList(system) : this.pushChoice(system),
     );
   }
 
   /**
+   * A number of all pushes of a system.
+   * @param {System} system
+   * @param {"force" | "duration"} key
+   * @param {string} label
+   * @param {number} max
+   */
+  field({ name }, key, label, max) {
+    const push = /** @type {Push} */ (this.pushing.pushes.get(name));
+    const field = element("input", {
+      ...{ type: "number", min: 0, max, step: "any", class: "push-number", title: label },
+      "aria-label": label,
+      value: push[key],
+    });
+    field.onchange = () => {
+      const value = Number(field.value);
+      if (value > 0 && value <= max) push[key] = value;
+      field.value = String(push[key]); // what cannot be is not taken
+    };
+    return field;
+  }
+
+  /**
    * Buttons for each agent.
-   * @param {Push} push
    * @param {System} system
    */
-  pushList(push, { agents, agent_name: noun }) {
+  pushList(system) {
+    const { agents, agent_name: noun } = system;
     const list = element("div", { class: "push-list" });
     for (let agent = 1; agent <= agents; agent++) {
-      const buttons = this.arrows(push, () => agent, `${noun} ${agent}`);
+      const buttons = arrows(this.pushing, system, () => agent - 1, `${noun} ${agent}`);
       const name = element("b", { text: agent });
       list.append(element("span", { class: "push-one" }, name, ...buttons));
     }
@@ -83,36 +114,20 @@ export class Tuning {
 
   /**
    * Buttons for the agent that is chosen, when agents are many.
-   * @param {Push} push
    * @param {System} system
    */
-  pushChoice(push, { agents, agent_name: noun }) {
+  pushChoice(system) {
+    const { agents, agent_name: noun } = system;
     const select = element("select", { "aria-label": `${noun} to push` });
     for (let agent = 1; agent <= agents; agent++)
       select.append(element("option", { value: agent, text: `${noun} ${agent}` }));
-    const buttons = this.arrows(push, () => Number(select.value), `the chosen ${noun}`);
+    const buttons = arrows(
+      this.pushing,
+      system,
+      () => Number(select.value) - 1,
+      `the chosen ${noun}`,
+    );
     return element("span", { class: "push-one" }, select, ...buttons);
-  }
-
-  /**
-   * @param {Push} push
-   * @param {() => number} agentOf from 1
-   * @param {string} whom in words
-   */
-  arrows({ system, axes, force }, agentOf, whom) {
-    const arrow = (/** @type {string} */ axis, /** @type {number} */ k, sign = 1) => {
-      const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
-      return element("button", {
-        type: "button",
-        class: "push",
-        text: (axis === "y" ? "↓↑" : "←→")[sign < 0 ? 0 : 1],
-        title: what,
-        "aria-label": what,
-        onclick: () =>
-          this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force }),
-      });
-    };
-    return axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow(axis, k, sign)));
   }
 
   /**

@@ -51,6 +51,7 @@ export interface System {
   anchors: number[]; // the item at which each robot is
   height: number; // m
   plan: Plan | null;
+  joints: JointRow[][]; // of each robot
   tints: string[][]; // paths of what has each agent's colour
   items: [number, number]; // the first of its items, and how many they are
   root?: string; // the path below which a fleet is drawn
@@ -89,12 +90,26 @@ export interface Control {
   scale: "linear" | "log";
 }
 
+/** How an agent is pushed along one of its axes. */
+export interface Way {
+  unit: string; // N, or N m
+  along: number[] | null; // in the world; null where it turns
+}
+
 export interface Push {
   system: string;
   axes: string[];
-  unit: string;
-  force: number;
+  force: number; // in the way's unit
   duration: number; // s
+  ways: (Way | null)[][]; // of each agent and axis; null where nothing can be pushed
+}
+
+/** A joint or an actuator of a robot: where its numbers are among all joints', and their units. */
+export interface JointRow {
+  name: string;
+  position?: [number, string];
+  velocity?: [number, string];
+  control?: [number, string];
 }
 
 /** How a system's run stands, or how it ended. */
@@ -110,6 +125,9 @@ export interface State {
 export interface Intervention {
   time: number; // s
   what: string;
+  system?: string;
+  link?: [number, number]; // agents from 1
+  lost?: boolean;
 }
 
 export interface Scene {
@@ -241,6 +259,7 @@ export interface Elements {
   "tuning-body": HTMLElement;
   main: HTMLElement;
   pane: HTMLElement;
+  chosen: HTMLElement;
   overlay: HTMLCanvasElement;
   waiting: HTMLElement;
   ramp: HTMLElement;

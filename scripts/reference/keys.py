@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from gne_mj.controllers.table import DiscTable, EventTable, SwitchingTable
 from gne_mj.registry import LOW_LEVEL, TIMES, Names, Registry
 from gne_mj.scenario_tables import Scenario, SystemTable
-from gne_mj.scenario_tables.interventions import InterventionTable, PushTable
+from gne_mj.scenario_tables.interventions import InterventionTable, LinkTable, PushTable
 from gne_mj.toml_table import Table, Unit
 
 PAGE = Path(__file__).parents[2] / "docs" / "keys.md"
@@ -37,8 +37,9 @@ A table without `information` is of full information.
 """
 
 
-INTERVENTIONS = """What is [done while it runs](view.md#keep-it), each of either changes or a push:
-`changes = {"barrier.rho" = 0.02}`, `push = {agent = 2, force = 5.0, duration = 0.2}`.
+INTERVENTIONS = """What is [done while it runs](view.md#keep-it), each of changes, a push or a link:
+`changes = {"barrier.rho" = 0.02}`, `push = {agent = 2, force = 5.0, duration = 0.2}`,
+`link = {agents = [3, 4]}`.
 """
 
 
@@ -59,7 +60,7 @@ def page() -> str:
     for name in ("simulation", "recording"):
         parts += [f"## `[{name}]`\n", _rows(_table_of(Scenario.model_fields[name]))]
     parts += ["## `[[interventions]]`\n", INTERVENTIONS, _rows(InterventionTable)]
-    parts += ["`push` has\n", _rows(PushTable)]
+    parts += ["`push` has\n", _rows(PushTable), "`link` has\n", _rows(LinkTable)]
     parts += ["## `[systems.NAME]`\n", _rows(SystemTable)]
     for name, field in SystemTable.model_fields.items():
         parts += [f"## {TITLES.get(name, f'`[systems.NAME.{name}]`')}\n"]

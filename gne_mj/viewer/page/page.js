@@ -87,6 +87,287 @@
     };
   };
 
+  // src/instant.js
+  var partsOf = (system) => [
+    "action",
+    ...system.quantities.flatMap(
+      ({ name, moving_bounds: moving }) => [name, ...Object.values(moving)].map((each) => `quantity/${each}`)
+    ),
+    "share",
+    "margin",
+    "estimate",
+    "joints",
+    "linked",
+    "there"
+  ];
+  var isThere = (own, agent) => !own?.there || own.there[agent] > 0.5;
+  var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
+  var instantOfFrame = (pack, systems) => {
+    const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
+    for (const system of systems) {
+      const own = instant.systems[system.name] = {};
+      for (const part of [...partsOf(system), "messages"])
+        own[part] = pack.arrays[`${system.name}/${part}`]?.data;
+    }
+    return instant;
+  };
+
+  // src/links.js
+  var TRAVEL = 650;
+  var REST = 400;
+  var FLOW = 1800;
+  var MANY = 160;
+  var DENSE = 300;
+  var along = ([a, c, b], t) => {
+    const u = 1 - t;
+    return {
+      x: u * u * a.x + 2 * u * t * c.x + t * t * b.x,
+      y: u * u * a.y + 2 * u * t * c.y + t * t * b.y
+    };
+  };
+  var Links = class {
+    /**
+     * @param {CanvasRenderingContext2D} context
+     * @param {Scene} scene
+     */
+    constructor(context, scene) {
+      this.context = context;
+      this.scene = scene;
+      this.shown = true;
+      this.pulses = [];
+      this.lastPulse = /* @__PURE__ */ new Map();
+      this.heads = /* @__PURE__ */ new Map();
+      this.linked = /* @__PURE__ */ new Map();
+      this.arrays = /* @__PURE__ */ new Map();
+      this.isLost = () => false;
+    }
+    /** Another scene. */
+    begin() {
+      this.pulses = [];
+      this.lastPulse.clear();
+    }
+    /**
+     * Starts pulses for messages, not more than the eye can follow.
+     * @param {System} system
+     * @param {Numbers | undefined} counts links x [passed, lost]
+     * @param {number} now
+     */
+    messages(system, counts, now) {
+      if (!this.pulsing || !counts || document.hidden) return;
+      const every = Math.max(1, Math.ceil(system.links.length / MANY));
+      for (let link = 0; link < system.links.length; link += every) {
+        if (!this.among(system, system.links[link])) continue;
+        const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
+        if (passed + lost > 0) this.pulse(system, link, lost > 0, now, REST);
+      }
+    }
+    /**
+     * A slow steady flow, where messages have no instants.
+     * @param {System[]} systems
+     * @param {number} now
+     */
+    flow(systems, now) {
+      if (!this.pulsing) return;
+      for (const system of systems)
+        if (system.message_period === null && !system.triggered) this.flowIn(system, now);
+    }
+    /**
+     * @param {System} system
+     * @param {number} now
+     */
+    flowIn(system, now) {
+      const every = Math.max(1, Math.ceil(system.links.length / MANY));
+      const linked = this.linked.get(system.name);
+      for (let link = 0; link < system.links.length; link += every) {
+        if (linked && !(linked[link >> 1] > 0.5)) continue;
+        if (!this.among(system, system.links[link])) continue;
+        const key = `${system.name}/${link}`;
+        if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - link * 617 % FLOW);
+        this.pulse(system, link, false, now, FLOW);
+      }
+    }
+    /**
+     * Whether both agents, from 1, are there, and hear each other if they ever do.
+     * @param {System} system
+     * @param {[number, number]} pair
+     */
+    among(system, [a, b]) {
+      const own = this.arrays.get(system.name);
+      return isThere(own, a - 1) && isThere(own, b - 1) && !this.isLost(system, [a, b]);
+    }
+    get pulsing() {
+      return this.shown && !reducedMotion();
+    }
+    /**
+     * @param {System} system
+     * @param {number} link
+     * @param {boolean} lost
+     * @param {number} now ms
+     * @param {number} rest ms since the one before
+     */
+    pulse(system, link, lost, now, rest) {
+      const key = `${system.name}/${link}`;
+      if (now - (this.lastPulse.get(key) ?? -Infinity) < rest) return;
+      this.lastPulse.set(key, now);
+      const [hearer, sender] = system.links[link];
+      this.pulses.push({ system, from: sender - 1, to: hearer - 1, lost, born: now });
+    }
+    /**
+     * Curve between two agents on the screen: its two ends and the point that bends it.
+     * @param {System} system
+     * @param {number} a
+     * @param {number} b
+     */
+    curve(system, a, b) {
+      if (system.edges.length > DENSE) return this.straight(system, a, b);
+      const { camera, layout } = this.scene;
+      const [p, q] = [layout.headOf(system, a), layout.headOf(system, b)];
+      const length = Math.hypot(...p.map((v, k) => v - q[k]));
+      const middle = p.map((v, k) => (v + q[k]) / 2);
+      middle[2] += Math.max(0.25, 0.22 * length);
+      const ends = [p, middle, q].map((point) => camera.project(point));
+      return ends.includes(null) ? null : ends;
+    }
+    /**
+     * @param {System} system
+     * @param {number} a
+     * @param {number} b
+     */
+    straight(system, a, b) {
+      const [from, to2] = [this.headAt(system, a), this.headAt(system, b)];
+      return from && to2 && [from, { x: (from.x + to2.x) / 2, y: (from.y + to2.y) / 2 }, to2];
+    }
+    /**
+     * Where the links of an agent begin on the screen; once a picture for each.
+     * @param {System} system
+     * @param {number} agent
+     */
+    headAt(system, agent) {
+      const key = `${system.name}/${agent}`;
+      const { camera, layout } = this.scene;
+      if (!this.heads.has(key)) this.heads.set(key, camera.project(layout.headOf(system, agent)));
+      return this.heads.get(key);
+    }
+    /**
+     * @param {System[]} systems
+     * @param {Instant} instant
+     * @param {number} now
+     */
+    draw(systems, instant, now) {
+      if (!this.shown) return void (this.pulses = []);
+      this.heads.clear();
+      for (const system of systems) {
+        const linked = instant.systems[system.name].linked;
+        this.linked.set(system.name, linked);
+        this.arrays.set(system.name, instant.systems[system.name]);
+        this.edges(system, (edge) => !linked || linked[edge] > 0.5);
+      }
+      this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
+      for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
+    }
+    /**
+     * @param {System} system
+     * @param {(edge: number) => boolean} there
+     */
+    edges(system, there) {
+      const { context } = this;
+      const dense = system.edges.length > 60;
+      context.lineWidth = dense ? 0.8 : 1.4;
+      context.strokeStyle = colour("link");
+      context.globalAlpha = dense ? Math.max(0.15, 30 / system.edges.length) : 0.75;
+      context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
+      context.beginPath();
+      for (const [edge, [a, b]] of system.edges.entries()) {
+        if (!there(edge) || !this.among(system, [a, b])) continue;
+        const curve = this.curve(system, a - 1, b - 1);
+        if (!curve) continue;
+        const [from, bend, to2] = curve;
+        context.moveTo(from.x, from.y);
+        context.quadraticCurveTo(bend.x, bend.y, to2.x, to2.y);
+      }
+      context.stroke();
+      context.setLineDash([]);
+      context.globalAlpha = 1;
+      for (const pair of system.edges) if (this.isLost(system, pair)) this.lostEdge(system, pair);
+    }
+    /**
+     * A link that was taken away: a broken line and a cross.
+     * @param {System} system
+     * @param {[number, number]} pair
+     */
+    lostEdge(system, [a, b]) {
+      const { context } = this;
+      const curve = this.curve(system, a - 1, b - 1);
+      if (!curve) return;
+      const [from, bend, to2] = curve;
+      context.strokeStyle = colour("bad");
+      context.lineWidth = 1.2;
+      context.setLineDash([3, 6]);
+      context.beginPath();
+      context.moveTo(from.x, from.y);
+      context.quadraticCurveTo(bend.x, bend.y, to2.x, to2.y);
+      context.stroke();
+      context.setLineDash([]);
+      const { x, y } = along(curve, 0.5);
+      this.cross(x, y, 1);
+    }
+    /**
+     * The edge that is nearest to a point of the pane, if one is near.
+     * @param {System[]} systems
+     * @param {number} x
+     * @param {number} y
+     * @param {number} near px
+     */
+    nearest(systems, x, y, near) {
+      let best = null;
+      let least = near;
+      for (const system of systems)
+        for (const edge of system.edges) {
+          const curve = this.curve(system, edge[0] - 1, edge[1] - 1);
+          if (!curve) continue;
+          for (let k = 3; k <= 29; k++) {
+            const at = along(curve, k / 32);
+            const away = Math.hypot(at.x - x, at.y - y);
+            if (away < least) [best, least] = [{ system, edge }, away];
+          }
+        }
+      return best;
+    }
+    /**
+     * @param {Pulse} pulse
+     * @param {number} age in times that a message is seen
+     */
+    drawPulse({ system, from, to: to2, lost }, age) {
+      const { context } = this;
+      const curve = this.curve(system, from, to2);
+      if (!curve) return;
+      const { x, y } = along(curve, lost ? Math.min(age, 0.5) : age);
+      context.fillStyle = context.strokeStyle = colour(lost ? "bad" : "pulse");
+      if (lost && age > 0.5) return this.cross(x, y, Math.max(0, 1.5 - age));
+      context.beginPath();
+      context.arc(x, y, 3, 0, 2 * Math.PI);
+      context.fill();
+    }
+    /**
+     * A message that is lost.
+     * @param {number} x
+     * @param {number} y
+     * @param {number} alpha
+     */
+    cross(x, y, alpha) {
+      const { context } = this;
+      context.globalAlpha = alpha;
+      context.lineWidth = 2;
+      context.beginPath();
+      context.moveTo(x - 4, y - 4);
+      context.lineTo(x + 4, y + 4);
+      context.moveTo(x + 4, y - 4);
+      context.lineTo(x - 4, y + 4);
+      context.stroke();
+      context.globalAlpha = 1;
+    }
+  };
+
   // src/handle.js
   var handleOf = (page2) => ({
     /** Whether something has been drawn. */
@@ -112,6 +393,10 @@
     plan: (system) => planOf(page2, system),
     /** How each system is drawn, beside those of other runs or over them. */
     compared: () => comparedOf(page2),
+    /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
+    head: (system, a, b = a) => headOf(page2, system, a, b),
+    /** The labels of robots, px. */
+    labels: () => page2.overlay.labels.drawn,
     /** What is plotted. */
     get plots() {
       return page2.plots.describe();
@@ -142,6 +427,13 @@
       discs: plan.discs.map((disc) => disc && disc.geometry.parameters.outerRadius)
     };
   };
+  var headOf = ({ meta, overlay, scene }, name, a, b) => {
+    const system = meta?.systems.find((each) => each.name === name);
+    if (!system) return null;
+    if (a === b) return scene.camera.project(scene.layout.headOf(system, a));
+    const curve = overlay.links.curve(system, a, b);
+    return curve && along(curve, 0.5);
+  };
   var isAlive = ({ scene }) => {
     const gl = scene.viewer.renderer.getContext();
     if (gl.isContextLost()) return false;
@@ -159,13 +451,15 @@
     });
     return { name, opacity, visible: object?.visible ?? false, offset: shown2.offset };
   });
-  var stateOf = ({ meta, mode: mode2, live, overlay, playback, scene, source, tuning }) => ({
+  var stateOf = ({ hands, meta, mode: mode2, live, overlay, playback, scene, source, tuning }) => ({
     mode: mode2,
     replaying: playback !== null,
     connected: live?.connected ?? false,
     theme: theme(),
     controls: [...tuning?.sliders.keys() ?? []],
     pulses: overlay.links.pulses.length,
+    chosen: hands.chosen.which,
+    lost: [...hands.switching.lost],
     following: scene.camera.following,
     follow: scene.camera.follow,
     ghosts: scene.ghosts.shown,
@@ -467,6 +761,536 @@
     return { point, text: runs[system.run].heading, bold: true, title: true };
   });
 
+  // src/arrows.js
+  var SIGNS = { y: "↓↑", z: "⇓⇑" };
+  var arrows = (pushing, system, agentOf, whom) => {
+    const push = (
+      /** @type {Push} */
+      pushing.pushes.get(system.name)
+    );
+    const arrow2 = (axis, k, sign = 1) => {
+      const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
+      const forces = () => push.axes.map((_, each) => each === k ? sign * push.force : 0);
+      return element("button", {
+        type: "button",
+        class: "push",
+        text: (SIGNS[axis] ?? "←→")[sign < 0 ? 0 : 1],
+        title: what,
+        "aria-label": what,
+        onclick: () => pushing.send({ system: system.name, agent: agentOf() }, forces().slice(0, k + 1))
+      });
+    };
+    return push.axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow2(axis, k, sign)));
+  };
+
+  // src/chosen.js
+  var COLUMNS = (
+    /** @type {const} */
+    ["position", "velocity", "control"]
+  );
+  var DIGITS2 = 3;
+  var Chosen = class {
+    /** @param {Page} page */
+    constructor(page2) {
+      this.page = page2;
+      this.panel = byId("chosen");
+      this.which = null;
+      this.values = [];
+      this.links = [];
+      this.asked = "";
+      byId("follow").addEventListener("change", () => this.chooseFollowed());
+    }
+    /** @param {Scene} meta */
+    setMeta({ systems }) {
+      this.asked = "";
+      const still2 = systems.some(
+        ({ name, agents }) => name === this.which?.system && agents > this.which.agent
+      );
+      this.choose(still2 ? this.which : null);
+    }
+    chooseFollowed() {
+      const { value } = byId("follow");
+      if (value.startsWith("{")) this.choose(JSON.parse(value));
+    }
+    get system() {
+      return this.page.meta?.systems.find(({ name }) => name === this.which?.system);
+    }
+    /** @param {Agent | null} which */
+    choose(which) {
+      this.which = which;
+      const { system } = this;
+      this.panel.hidden = !which || !system;
+      this.values = [];
+      this.links = [];
+      if (!which || !system) return;
+      if (system.joints.length && this.asked !== system.name) {
+        this.page.live?.send({ do: "look", system: system.name });
+        this.asked = system.name;
+      }
+      this.panel.setAttribute("aria-label", `${system.agent_name} ${which.agent + 1}`);
+      this.panel.replaceChildren(
+        this.head(system, which),
+        ...this.pushButtons(system, which),
+        ...this.table(system.joints[which.agent] ?? []),
+        ...this.linkButtons(system, which)
+      );
+      this.page.slowDue = 0;
+    }
+    /**
+     * @param {System} system
+     * @param {Agent} which
+     */
+    head(system, which) {
+      const close = element("button", {
+        type: "button",
+        class: "icon",
+        text: "✕",
+        "aria-label": "close",
+        onclick: () => this.choose(null)
+      });
+      const follow = element("button", {
+        type: "button",
+        text: "Follow",
+        onclick: () => this.page.toolbar.followAgent(which)
+      });
+      const name = element("b", { text: `${system.agent_name} ${which.agent + 1}` });
+      const fleet = system.drawn_as === "fleet";
+      return element("div", { class: "chosen-head" }, name, fleet ? follow : null, close);
+    }
+    /**
+     * @param {System} system
+     * @param {Agent} which
+     */
+    pushButtons(system, which) {
+      const { live, playback } = this.page;
+      const { pushing } = this.page.hands;
+      const push = pushing.pushes.get(system.name);
+      const can = pushing.waysOf(system, which.agent).some((way) => way);
+      if (!live || playback || !push || !can) return [];
+      const buttons = arrows(pushing, system, () => which.agent, `${system.agent_name} ${which.agent + 1}`);
+      return [element("div", { class: "push-one" }, element("span", { text: "Push" }), ...buttons)];
+    }
+    /** @param {JointRow[]} rows of joints, then of actuators */
+    table(rows) {
+      const columns = COLUMNS.filter((column) => rows.some((row) => row[column]));
+      if (!columns.length) return [];
+      const cell = (row, column) => {
+        const there = row[column];
+        if (!there) return element("td");
+        const place = element("span", { text: "–" });
+        this.values.push({ at: there[0], unit: there[1], place });
+        return element("td", {}, place, element("small", { text: ` ${there[1]}` }));
+      };
+      const body = rows.map(
+        (row) => element(
+          "tr",
+          {},
+          element("th", { scope: "row", text: row.name.replaceAll("_", " ") }),
+          ...columns.map((column) => cell(row, column))
+        )
+      );
+      const heads = columns.map((text2) => element("th", { scope: "col", text: text2 }));
+      const head = element("tr", {}, element("th", { scope: "col", text: "joint, actuator" }), ...heads);
+      return [element("table", {}, element("thead", {}, head), element("tbody", {}, ...body))];
+    }
+    /**
+     * @param {System} system
+     * @param {Agent} which
+     */
+    linkButtons(system, which) {
+      const { live, playback } = this.page;
+      const { switching } = this.page.hands;
+      const own = system.edges.filter((edge) => edge.includes(which.agent + 1));
+      if (!live || playback || system.edges_are !== "messages" || !own.length) return [];
+      const buttons = own.map((pair) => {
+        const other = pair[0] === which.agent + 1 ? pair[1] : pair[0];
+        const button = element("button", {
+          type: "button",
+          class: "toggle",
+          text: String(other),
+          title: `The link with ${system.agent_name} ${other}: there, or lost`,
+          "aria-label": `link with ${system.agent_name} ${other}`,
+          onclick: () => switching.toggle(system, pair)
+        });
+        this.links.push({ pair, button });
+        return button;
+      });
+      const title = element("span", { text: "Links with" });
+      return [element("div", { class: "push-one chosen-links" }, title, ...buttons)];
+    }
+    /**
+     * The numbers of now.
+     * @param {Instant | null} instant
+     */
+    show(instant) {
+      const { which, system } = this;
+      if (!which || !system || !instant) return;
+      const numbers = instant.systems[system.name]?.joints;
+      for (const { at, place } of this.values) {
+        const text2 = fixed(numbers ? numbers[at] : NaN, DIGITS2);
+        if (place.textContent !== text2) place.textContent = text2;
+      }
+      for (const { pair, button } of this.links)
+        press(button, !this.page.hands.switching.isLost(system, pair));
+    }
+  };
+
+  // src/notices.js
+  var MOST = 3;
+  var STAYS = { info: 5e3, error: 12e3 };
+  var shown = /* @__PURE__ */ new Map();
+  var notify = (text2, level = "info", about = text2) => {
+    shown.get(about)?.();
+    const error = level === "error";
+    const notice = element(
+      "div",
+      { class: `toast ${error ? "error" : ""}` },
+      element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
+      element("span", { class: "said", text: text2 }),
+      element("button", {
+        type: "button",
+        class: "icon",
+        text: "✕",
+        "aria-label": "close this message",
+        onclick: () => close()
+      })
+    );
+    const due = setTimeout(() => close(), STAYS[level]);
+    const close = () => {
+      clearTimeout(due);
+      notice.remove();
+      if (shown.get(about) === close) shown.delete(about);
+    };
+    shown.set(about, close);
+    const place = byId(error ? "alerts" : "notices");
+    place.append(notice);
+    while (place.children.length > MOST) place.firstChild?.remove();
+  };
+
+  // src/push.js
+  var STILL = 6;
+  var FULL = 50;
+  var sizeOf = ({ x, y }) => Math.hypot(x, y);
+  var Pushing = class {
+    /** @param {Page} page */
+    constructor(page2) {
+      this.page = page2;
+      this.pushes = /* @__PURE__ */ new Map();
+      this.drag = null;
+      this.pressed = null;
+      const pane = byId("pane");
+      pane.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
+      pane.addEventListener("pointermove", (event) => this.move(event), { capture: true });
+      pane.addEventListener("pointerup", (event) => this.release(event), { capture: true });
+      pane.addEventListener("pointercancel", () => this.abandon(), { capture: true });
+      addEventListener("keydown", ({ key }) => key === "Escape" && this.abandon());
+    }
+    /** @param {Scene} meta */
+    setMeta({ pushes = [] }) {
+      this.pushes = new Map(pushes.map((push) => [push.system, { ...push }]));
+      this.drag = null;
+    }
+    // ---- hands
+    /**
+     * @param {PointerEvent} event
+     * @returns {Place}
+     */
+    place({ clientX, clientY }) {
+      const box = byId("pane").getBoundingClientRect();
+      return { x: clientX - box.left, y: clientY - box.top };
+    }
+    /** @param {PointerEvent} event */
+    press(event) {
+      this.pressed = null;
+      if (!event.isPrimary || event.button !== 0) return this.abandon();
+      const from = this.place(event);
+      const which = this.page.overlay.agentAt(from.x, from.y);
+      const system = this.page.meta?.systems.find(({ name }) => name === which?.system);
+      if (!which || !system) return void (this.pressed = from);
+      this.drag = { which, system, from, to: from, up: false };
+      if (!this.page.live || this.page.playback) return;
+      event.stopImmediatePropagation();
+      byId("pane").setPointerCapture(event.pointerId);
+      byId("pane").focus({ preventScroll: true });
+    }
+    /** @param {PointerEvent} event */
+    move(event) {
+      const { drag, pushing } = this;
+      if (!drag) return;
+      drag.to = this.place(event);
+      drag.up = event.shiftKey;
+      if (!pushing) return;
+      event.stopImmediatePropagation();
+      this.page.scene.dirty();
+    }
+    /** @param {PointerEvent} event */
+    release(event) {
+      const { drag, pressed } = this;
+      const at = this.place(event);
+      const from = drag?.from ?? pressed;
+      const still2 = from !== null && sizeOf({ x: at.x - from.x, y: at.y - from.y }) <= STILL;
+      this.abandon();
+      if (still2 && drag) return this.page.hands.chosen.choose(drag.which);
+      if (still2 && from) return this.page.hands.switching.click(from.x, from.y, event.pointerType);
+      if (!drag || !this.page.live || this.page.playback) return;
+      event.stopImmediatePropagation();
+      drag.to = at;
+      const forces = this.forces(drag);
+      if (forces) this.send(drag.which, forces);
+      else notify(this.refusal(drag.system), "info", `push ${drag.system.name}`);
+    }
+    abandon() {
+      if (this.drag) this.page.scene.dirty();
+      this.drag = null;
+      this.pressed = null;
+    }
+    /** Whether a robot is dragged that can be pushed. */
+    get pushing() {
+      const { drag } = this;
+      return drag !== null && this.page.live !== null && !this.page.playback;
+    }
+    // ---- forces
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @returns {(Way | null)[]}
+     */
+    waysOf({ name }, agent) {
+      return this.pushes.get(name)?.ways[agent] ?? [];
+    }
+    /** @param {System} system */
+    refusal({ name, agent_name: noun }) {
+      return this.pushes.has(name) ? `${name}: this ${noun} cannot be pushed, since its output is no joint's velocity.` : `${name}: only robots that MuJoCo moves can be pushed.`;
+    }
+    /**
+     * The unit that an agent is pushed in.
+     * @param {System} system
+     * @param {number} agent
+     */
+    unitOf(system, agent) {
+      return this.waysOf(system, agent).find((way) => way)?.unit ?? "N";
+    }
+    /**
+     * Along which way on the screen an axis goes, px a m; to the right where it turns.
+     * @param {System} system
+     * @param {number} agent
+     * @param {Way} way
+     * @returns {Place}
+     */
+    onScreen(system, agent, { along: along2 }) {
+      const { camera, layout } = this.page.scene;
+      const here = (
+        /** @type {Point} */
+        Array.from(layout.agentAt(system, agent))
+      );
+      const a = camera.project(here);
+      const b = along2 && camera.project(here.map((v, k) => v + 0.1 * along2[k]));
+      if (!a || !b) return { x: 1, y: 0 };
+      return { x: (b.x - a.x) / 0.1, y: (b.y - a.y) / 0.1 };
+    }
+    /**
+     * The force along each axis that a drag asks for, or null where none can act: along the only
+     * axis; in the plane of the first two; with shift along the third.
+     * @param {NonNullable<Pushing["drag"]>} drag
+     */
+    forces({ which, system, from, to: to2, up }) {
+      const push = this.pushes.get(system.name);
+      const ways = this.waysOf(system, which.agent);
+      const there = [...ways.keys()].filter((k2) => ways[k2]);
+      if (!push || !there.length) return null;
+      const by = { x: to2.x - from.x, y: to2.y - from.y };
+      const force = push.force / FULL;
+      const forces = ways.map(() => 0);
+      const screen = (k2) => this.onScreen(
+        system,
+        which.agent,
+        /** @type {Way} */
+        ways[k2]
+      );
+      const [k, l] = up && there.length > 2 ? [there[2]] : there;
+      const p = screen(k);
+      const q = l === void 0 ? null : screen(l);
+      const area = q ? p.x * q.y - p.y * q.x : 0;
+      if (!q || Math.abs(area) < 1e-3 * sizeOf(p) * sizeOf(q)) {
+        const part = (by.x * p.x + by.y * p.y) / (sizeOf(p) || 1);
+        forces[k] = Number((force * part).toPrecision(3));
+        return forces;
+      }
+      const a = (by.x * q.y - by.y * q.x) / area;
+      const b = (p.x * by.y - p.y * by.x) / area;
+      const scale = force * sizeOf(by) / (Math.hypot(a, b) || 1);
+      forces[k] = Number((scale * a).toPrecision(3));
+      forces[l] = Number((scale * b).toPrecision(3));
+      return forces;
+    }
+    /**
+     * @param {Agent} which
+     * @param {number[]} forces along its axes
+     */
+    send({ system, agent }, forces) {
+      const { duration } = (
+        /** @type {Push} */
+        this.pushes.get(system)
+      );
+      this.page.live?.send({ do: "push", system, agent: agent + 1, forces, duration });
+    }
+    // ---- the arrow
+    /** @param {CanvasRenderingContext2D} context of the overlay */
+    draw(context) {
+      const { drag } = this;
+      if (!drag || !this.pushing) return;
+      const forces = this.forces(drag);
+      const by = { x: drag.to.x - drag.from.x, y: drag.to.y - drag.from.y };
+      if (!forces || sizeOf(by) <= STILL) return;
+      const { which, system } = drag;
+      const force = Math.hypot(...forces);
+      const { duration } = (
+        /** @type {Push} */
+        this.pushes.get(system.name)
+      );
+      const from = this.page.scene.camera.project(this.page.scene.layout.headOf(system, which.agent));
+      if (!from || !force) return;
+      const to2 = this.tip(drag, from, forces);
+      arrow(context, from, to2);
+      const unit = this.unitOf(system, which.agent);
+      const text2 = `${withUnit(force, unit)} for ${number(duration)} s`;
+      context.font = "600 13px system-ui, sans-serif";
+      context.textAlign = to2.x >= from.x ? "left" : "right";
+      context.textBaseline = "middle";
+      context.fillStyle = colour("accent");
+      this.page.overlay.haloed(text2, to2.x + (to2.x >= from.x ? 12 : -12), to2.y);
+    }
+    /**
+     * Where the arrow ends: along what acts, as far as was dragged.
+     * @param {NonNullable<Pushing["drag"]>} drag
+     * @param {Place} from
+     * @param {number[]} forces
+     */
+    tip({ which, system, from: begun, to: to2 }, from, forces) {
+      const along2 = { x: 0, y: 0 };
+      this.waysOf(system, which.agent).forEach((way, k) => {
+        if (!way || !forces[k]) return;
+        const { x, y } = this.onScreen(system, which.agent, way);
+        along2.x += forces[k] * x;
+        along2.y += forces[k] * y;
+      });
+      const far = Math.hypot(to2.x - begun.x, to2.y - begun.y) / (sizeOf(along2) || 1);
+      return { x: from.x + far * along2.x, y: from.y + far * along2.y };
+    }
+  };
+  var arrow = (context, from, to2) => {
+    const angle = Math.atan2(to2.y - from.y, to2.x - from.x);
+    context.strokeStyle = context.fillStyle = colour("accent");
+    context.lineWidth = 3;
+    context.lineCap = "round";
+    context.beginPath();
+    context.moveTo(from.x, from.y);
+    context.lineTo(to2.x, to2.y);
+    context.stroke();
+    context.beginPath();
+    context.moveTo(to2.x + 4 * Math.cos(angle), to2.y + 4 * Math.sin(angle));
+    for (const side of [2.6, -2.6])
+      context.lineTo(to2.x + 13 * Math.cos(angle + side), to2.y + 13 * Math.sin(angle + side));
+    context.fill();
+  };
+
+  // src/switching.js
+  var NEAR = 8;
+  var NEAR_FINGER = 16;
+  var nameOf = (system, [a, b]) => `${system} ${Math.min(a, b)}-${Math.max(a, b)}`;
+  var Switching = class {
+    /** @param {Page} page */
+    constructor(page2) {
+      this.page = page2;
+      this.done = [];
+      this.count = -1;
+      this.time = NaN;
+      this.lost = /* @__PURE__ */ new Set();
+    }
+    /**
+     * Whether the link between two agents, from 1, is lost at the time that is shown.
+     * @param {System} system
+     * @param {[number, number]} pair
+     */
+    isLost({ name }, pair) {
+      return this.lost.size > 0 && this.lost.has(nameOf(name, pair));
+    }
+    /**
+     * What was done up to a time in s.
+     * @param {Intervention[]} done
+     * @param {number} time
+     */
+    follow(done, time) {
+      if (done === this.done && done.length === this.count && time === this.time) return;
+      this.done = done;
+      this.count = done.length;
+      this.time = time;
+      this.lost = /* @__PURE__ */ new Set();
+      for (const { system = "", link, lost, time: when } of done) {
+        if (!link || when > time + 1e-9) continue;
+        if (lost) this.lost.add(nameOf(system, link));
+        else this.lost.delete(nameOf(system, link));
+      }
+    }
+    /**
+     * A click in the pane on nobody, px.
+     * @param {number} x
+     * @param {number} y
+     * @param {string} by mouse, pen or touch
+     */
+    click(x, y, by) {
+      const { overlay, meta, live, playback } = this.page;
+      if (!live || playback || !overlay.links.shown || !meta) return;
+      const near = by === "touch" ? NEAR_FINGER : NEAR;
+      const found = overlay.links.nearest(meta.systems, x, y, near);
+      if (found) this.toggle(found.system, found.edge);
+    }
+    /**
+     * @param {System} system
+     * @param {[number, number]} agents from 1
+     */
+    toggle(system, agents) {
+      const { live, playback } = this.page;
+      if (!live || playback) return;
+      if (system.edges_are !== "messages") {
+        const text2 = `${system.name}: dashed lines are measurements, so that there is no link to lose.`;
+        return notify(text2, "info", `link ${system.name}`);
+      }
+      const lost = !this.isLost(system, agents);
+      live.send({ do: "link", system: system.name, agents, lost });
+    }
+  };
+
+  // src/handson.js
+  var HandsOn = class {
+    /** @param {Page} page */
+    constructor(page2) {
+      const { overlay } = page2;
+      this.pushing = new Pushing(page2);
+      this.switching = new Switching(page2);
+      this.chosen = new Chosen(page2);
+      overlay.hands = this.pushing;
+      overlay.links.isLost = (system, pair) => this.switching.isLost(system, pair);
+    }
+    /** @param {Scene} meta */
+    setMeta(meta) {
+      this.pushing.setMeta(meta);
+      this.chosen.setMeta(meta);
+    }
+    /** Another source of the same scene: what can be done is another thing. */
+    renew() {
+      this.chosen.choose(this.chosen.which);
+    }
+    /**
+     * Before a picture.
+     * @param {Source} source
+     * @param {Instant} instant
+     */
+    follow({ interventions }, { time }) {
+      this.switching.follow(interventions, time);
+    }
+  };
+
   // src/header.js
   var Header = class {
     chipKey = "";
@@ -563,38 +1387,6 @@
     return `${system.name}: ${status(word).words}${when}${message ? `: ${message}` : ""}`;
   };
 
-  // src/notices.js
-  var MOST = 3;
-  var STAYS = { info: 5e3, error: 12e3 };
-  var shown = /* @__PURE__ */ new Map();
-  var notify = (text2, level = "info", about = text2) => {
-    shown.get(about)?.();
-    const error = level === "error";
-    const notice = element(
-      "div",
-      { class: `toast ${error ? "error" : ""}` },
-      element("span", { "aria-hidden": true, text: error ? "⚠" : "ℹ" }),
-      element("span", { class: "said", text: text2 }),
-      element("button", {
-        type: "button",
-        class: "icon",
-        text: "✕",
-        "aria-label": "close this message",
-        onclick: () => close()
-      })
-    );
-    const due = setTimeout(() => close(), STAYS[level]);
-    const close = () => {
-      clearTimeout(due);
-      notice.remove();
-      if (shown.get(about) === close) shown.delete(about);
-    };
-    shown.set(about, close);
-    const place = byId(error ? "alerts" : "notices");
-    place.append(notice);
-    while (place.children.length > MOST) place.firstChild?.remove();
-  };
-
   // src/keep.js
   var momentAsked = () => {
     const found = /^#t=(\d+(?:\.\d+)?)$/.exec(location.hash);
@@ -647,30 +1439,6 @@
     }
   };
 
-  // src/instant.js
-  var partsOf = (system) => [
-    "action",
-    ...system.quantities.flatMap(
-      ({ name, moving_bounds: moving }) => [name, ...Object.values(moving)].map((each) => `quantity/${each}`)
-    ),
-    "share",
-    "margin",
-    "estimate",
-    "linked",
-    "there"
-  ];
-  var isThere = (own, agent) => !own?.there || own.there[agent] > 0.5;
-  var orNull = (value) => value !== void 0 && Number.isFinite(value) ? value : null;
-  var instantOfFrame = (pack, systems) => {
-    const instant = { time: pack.meta.time, poses: pack.arrays.poses?.data, systems: {} };
-    for (const system of systems) {
-      const own = instant.systems[system.name] = {};
-      for (const part of [...partsOf(system), "messages"])
-        own[part] = pack.arrays[`${system.name}/${part}`]?.data;
-    }
-    return instant;
-  };
-
   // src/history.js
   var History = class {
     /**
@@ -680,7 +1448,7 @@
     constructor(systems, most = 3e3) {
       this.most = most;
       this.names = systems.flatMap(
-        (system) => partsOf(system).filter((part) => part !== "estimate").map((part) => `${system.name}/${part}`)
+        (system) => partsOf(system).filter((part) => !["estimate", "joints"].includes(part)).map((part) => `${system.name}/${part}`)
       );
       this.time = [];
       this.columns = {};
@@ -812,7 +1580,7 @@
 
   // src/socket.js
   var AGAIN = 2e3;
-  var FULL = 1013;
+  var FULL2 = 1013;
   var Socket = class {
     /**
      * @param {object} callbacks
@@ -835,7 +1603,7 @@
       socket.onmessage = ({ data }) => this.receive(data);
       socket.onclose = ({ code, reason }) => {
         this.callbacks.lost(
-          code === FULL ? `this page is not connected: ${reason}` : "connection lost: the simulation has ended or the server is gone"
+          code === FULL2 ? `this page is not connected: ${reason}` : "connection lost: the simulation has ended or the server is gone"
         );
         setTimeout(() => this.socket = this.connect(), AGAIN);
       };
@@ -1038,223 +1806,192 @@
     }
   };
 
-  // src/links.js
-  var TRAVEL = 650;
-  var REST = 400;
-  var FLOW = 1800;
-  var MANY = 160;
-  var DENSE = 300;
-  var along = ([a, c, b], t) => {
-    const u = 1 - t;
-    return {
-      x: u * u * a.x + 2 * u * t * c.x + t * t * b.x,
-      y: u * u * a.y + 2 * u * t * c.y + t * t * b.y
-    };
-  };
-  var Links = class {
-    /**
-     * @param {CanvasRenderingContext2D} context
-     * @param {Scene} scene
-     */
-    constructor(context, scene) {
-      this.context = context;
-      this.scene = scene;
-      this.shown = true;
-      this.pulses = [];
-      this.lastPulse = /* @__PURE__ */ new Map();
-      this.heads = /* @__PURE__ */ new Map();
-      this.linked = /* @__PURE__ */ new Map();
-      this.arrays = /* @__PURE__ */ new Map();
-    }
-    /** Another scene. */
-    begin() {
-      this.pulses = [];
-      this.lastPulse.clear();
-    }
-    /**
-     * Starts pulses for messages, not more than the eye can follow.
-     * @param {System} system
-     * @param {Numbers | undefined} counts links x [passed, lost]
-     * @param {number} now
-     */
-    messages(system, counts, now) {
-      if (!this.pulsing || !counts || document.hidden) return;
-      const every = Math.max(1, Math.ceil(system.links.length / MANY));
-      for (let link = 0; link < system.links.length; link += every) {
-        if (!this.among(system, system.links[link])) continue;
-        const [passed, lost] = [counts[2 * link], counts[2 * link + 1]];
-        if (passed + lost > 0) this.pulse(system, link, lost > 0, now, REST);
-      }
-    }
-    /**
-     * A slow steady flow, where messages have no instants.
-     * @param {System[]} systems
-     * @param {number} now
-     */
-    flow(systems, now) {
-      if (!this.pulsing) return;
-      for (const system of systems)
-        if (system.message_period === null && !system.triggered) this.flowIn(system, now);
-    }
-    /**
-     * @param {System} system
-     * @param {number} now
-     */
-    flowIn(system, now) {
-      const every = Math.max(1, Math.ceil(system.links.length / MANY));
-      const linked = this.linked.get(system.name);
-      for (let link = 0; link < system.links.length; link += every) {
-        if (linked && !(linked[link >> 1] > 0.5)) continue;
-        if (!this.among(system, system.links[link])) continue;
-        const key = `${system.name}/${link}`;
-        if (!this.lastPulse.has(key)) this.lastPulse.set(key, now - link * 617 % FLOW);
-        this.pulse(system, link, false, now, FLOW);
-      }
-    }
-    /**
-     * Whether both agents, from 1, are there.
-     * @param {System} system
-     * @param {[number, number]} pair
-     */
-    among(system, [a, b]) {
-      const own = this.arrays.get(system.name);
-      return isThere(own, a - 1) && isThere(own, b - 1);
-    }
-    get pulsing() {
-      return this.shown && !reducedMotion();
-    }
-    /**
-     * @param {System} system
-     * @param {number} link
-     * @param {boolean} lost
-     * @param {number} now ms
-     * @param {number} rest ms since the one before
-     */
-    pulse(system, link, lost, now, rest) {
-      const key = `${system.name}/${link}`;
-      if (now - (this.lastPulse.get(key) ?? -Infinity) < rest) return;
-      this.lastPulse.set(key, now);
-      const [hearer, sender] = system.links[link];
-      this.pulses.push({ system, from: sender - 1, to: hearer - 1, lost, born: now });
-    }
-    /**
-     * Curve between two agents on the screen: its two ends and the point that bends it.
-     * @param {System} system
-     * @param {number} a
-     * @param {number} b
-     */
-    curve(system, a, b) {
-      if (system.edges.length > DENSE) return this.straight(system, a, b);
-      const { camera, layout } = this.scene;
-      const [p, q] = [layout.headOf(system, a), layout.headOf(system, b)];
-      const length = Math.hypot(...p.map((v, k) => v - q[k]));
-      const middle = p.map((v, k) => (v + q[k]) / 2);
-      middle[2] += Math.max(0.25, 0.22 * length);
-      const ends = [p, middle, q].map((point) => camera.project(point));
-      return ends.includes(null) ? null : ends;
-    }
-    /**
-     * @param {System} system
-     * @param {number} a
-     * @param {number} b
-     */
-    straight(system, a, b) {
-      const [from, to2] = [this.headAt(system, a), this.headAt(system, b)];
-      return from && to2 && [from, { x: (from.x + to2.x) / 2, y: (from.y + to2.y) / 2 }, to2];
-    }
-    /**
-     * Where the links of an agent begin on the screen; once a picture for each.
-     * @param {System} system
-     * @param {number} agent
-     */
-    headAt(system, agent) {
-      const key = `${system.name}/${agent}`;
-      const { camera, layout } = this.scene;
-      if (!this.heads.has(key)) this.heads.set(key, camera.project(layout.headOf(system, agent)));
-      return this.heads.get(key);
-    }
-    /**
-     * @param {System[]} systems
-     * @param {Instant} instant
-     * @param {number} now
-     */
-    draw(systems, instant, now) {
-      if (!this.shown) return void (this.pulses = []);
-      this.heads.clear();
-      for (const system of systems) {
-        const linked = instant.systems[system.name].linked;
-        this.linked.set(system.name, linked);
-        this.arrays.set(system.name, instant.systems[system.name]);
-        this.edges(system, (edge) => !linked || linked[edge] > 0.5);
-      }
-      this.pulses = this.pulses.filter(({ born, lost }) => now - born < (lost ? 1.5 : 1) * TRAVEL);
-      for (const pulse of this.pulses) this.drawPulse(pulse, (now - pulse.born) / TRAVEL);
-    }
-    /**
-     * @param {System} system
-     * @param {(edge: number) => boolean} there
-     */
-    edges(system, there) {
-      const { context } = this;
-      const dense = system.edges.length > 60;
-      context.lineWidth = dense ? 0.8 : 1.4;
-      context.strokeStyle = colour("link");
-      context.globalAlpha = dense ? Math.max(0.15, 30 / system.edges.length) : 0.75;
-      context.setLineDash(system.edges_are === "messages" ? [] : [4, 4]);
-      context.beginPath();
-      for (const [edge, [a, b]] of system.edges.entries()) {
-        if (!there(edge) || !this.among(system, [a, b])) continue;
-        const curve = this.curve(system, a - 1, b - 1);
-        if (!curve) continue;
-        const [from, bend, to2] = curve;
-        context.moveTo(from.x, from.y);
-        context.quadraticCurveTo(bend.x, bend.y, to2.x, to2.y);
-      }
-      context.stroke();
-      context.setLineDash([]);
-      context.globalAlpha = 1;
-    }
-    /**
-     * @param {Pulse} pulse
-     * @param {number} age in times that a message is seen
-     */
-    drawPulse({ system, from, to: to2, lost }, age) {
-      const { context } = this;
-      const curve = this.curve(system, from, to2);
-      if (!curve) return;
-      const { x, y } = along(curve, lost ? Math.min(age, 0.5) : age);
-      context.fillStyle = context.strokeStyle = colour(lost ? "bad" : "pulse");
-      if (lost && age > 0.5) return this.cross(x, y, Math.max(0, 1.5 - age));
-      context.beginPath();
-      context.arc(x, y, 3, 0, 2 * Math.PI);
-      context.fill();
-    }
-    /**
-     * A message that is lost.
-     * @param {number} x
-     * @param {number} y
-     * @param {number} alpha
-     */
-    cross(x, y, alpha) {
-      const { context } = this;
-      context.globalAlpha = alpha;
-      context.lineWidth = 2;
-      context.beginPath();
-      context.moveTo(x - 4, y - 4);
-      context.lineTo(x + 4, y + 4);
-      context.moveTo(x + 4, y - 4);
-      context.lineTo(x - 4, y + 4);
-      context.stroke();
-      context.globalAlpha = 1;
-    }
-  };
-
-  // src/overlay.js
+  // src/labels.js
+  var HIGH = 20;
+  var STEP = HIGH + 4;
+  var PLACES = [
+    [0, 0],
+    [0, -1],
+    [0.65, -0.5],
+    [-0.65, -0.5],
+    [0, -2],
+    [0.8, -1.5],
+    [-0.8, -1.5],
+    [0, -3],
+    [0.9, 0.4],
+    [-0.9, 0.4],
+    [0, -4]
+  ];
   var labelOrder = (n) => {
     const zeros = (k) => k === 0 ? 32 : Math.log2(k & -k);
     return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
   };
+  var Labels = class {
+    /** @param {Overlay} overlay */
+    constructor(overlay) {
+      this.overlay = overlay;
+      this.orders = /* @__PURE__ */ new Map();
+      this.places = /* @__PURE__ */ new Map();
+      this.drawn = [];
+    }
+    /** @param {System[]} systems of another scene */
+    begin(systems) {
+      this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
+      this.places.clear();
+    }
+    /**
+     * @param {System} system
+     * @param {Instant} instant
+     * @param {boolean} labelled whether they are to be seen, besides the one that is pointed at
+     */
+    draw(system, instant, labelled) {
+      const shares = instant.systems[system.name].share;
+      const share = (agent) => shares ? shares[agent] : NaN;
+      const pointed = (agent) => this.overlay.isHighlighted(system, agent);
+      const first = (agent) => pointed(agent) || share(agent) > 1;
+      const order = this.orders.get(system.name) ?? [];
+      const urgent = order.filter(first);
+      for (const agent of [...urgent, ...order.filter((each) => !first(each))])
+        if (isThere(instant.systems[system.name], agent) && (labelled || pointed(agent)))
+          this.label(system, agent, share(agent));
+    }
+    /**
+     * @param {System} system
+     * @param {number} agent
+     * @param {number} share
+     */
+    label(system, agent, share) {
+      const { overlay } = this;
+      const [x, y, z] = overlay.scene.layout.agentAt(system, agent);
+      const p = overlay.scene.camera.project([x, y, z + system.height]);
+      if (!p) return;
+      overlay.marks.push({ x: p.x, y: p.y, system: system.name, agent });
+      const name = String(agent + 1);
+      const out = share > 1;
+      const digits = out && share < 1.1 ? 1 : 0;
+      const used2 = out ? "outside" : "";
+      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
+      for (const text2 of percent ? [percent, ""] : [""]) {
+        const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text2}` : text2));
+        if (!pill) continue;
+        overlay.taken.push(pill);
+        this.drawn.push({ ...pill, system: system.name });
+        overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH / 2, system: system.name, agent });
+        return this.pill(pill, p, { name, system, agent, out });
+      }
+      this.places.delete(`${system.name} ${agent}`);
+    }
+    /**
+     * A label where there is room for it, first where it was; null where there is none.
+     * @param {System} system
+     * @param {number} agent
+     * @param {Pill} pill at its head
+     */
+    room(system, agent, pill) {
+      const { overlay } = this;
+      const key = `${system.name} ${agent}`;
+      const before = this.places.get(key) ?? 0;
+      const wide = overlay.canvas.clientWidth;
+      for (const k of [before, ...PLACES.keys()]) {
+        const [right, down] = PLACES[k];
+        const box = { ...pill, x: pill.x + right * pill.w, y: pill.y + down * STEP };
+        const seen = k === 0 || box.x >= 0 && box.x + box.w <= wide && box.y >= 0;
+        if (!seen || !overlay.free(box)) continue;
+        this.places.set(key, k === before && before > 0 && this.lonely(pill) ? 0 : k);
+        return box;
+      }
+      return overlay.isHighlighted(system, agent) ? pill : null;
+    }
+    /** @param {Box} box */
+    lonely({ x, y, w, h }) {
+      return this.overlay.free({ x: x - 8, y: y - 8, w: w + 16, h: h + 16 });
+    }
+    /**
+     * @param {{x: number, y: number}} p
+     * @param {string} name
+     * @param {string} text
+     * @returns {Pill}
+     */
+    pillBox(p, name, text2) {
+      const { context } = this.overlay;
+      context.font = "600 13px system-ui, sans-serif";
+      const wide = context.measureText(name).width;
+      context.font = "12px system-ui, sans-serif";
+      const more = text2 ? context.measureText(text2).width + 7 : 0;
+      const w = wide + more + 14;
+      return { x: p.x - w / 2, y: p.y - 22, w, h: HIGH, wide, text: text2 };
+    }
+    /**
+     * @param {Pill} box
+     * @param {{x: number, y: number}} p the head
+     * @param {{name: string, system: System, agent: number, out: boolean}} about
+     */
+    pill(box, p, { name, system, agent, out }) {
+      const { context } = this.overlay;
+      const chosen = this.overlay.isHighlighted(system, agent);
+      this.lead(box, p);
+      context.beginPath();
+      context.roundRect(box.x, box.y, box.w, box.h, 5);
+      context.fillStyle = out ? colour("bad-fill") : colour("pill");
+      context.fill();
+      context.lineWidth = chosen ? 2 : 1;
+      context.strokeStyle = colour(chosen ? "accent" : "pill-edge");
+      context.stroke();
+      context.textBaseline = "middle";
+      context.textAlign = "left";
+      context.fillStyle = out ? "#fff" : colour("text");
+      context.font = "600 13px system-ui, sans-serif";
+      context.fillText(name, box.x + 7, box.y + 10.5);
+      context.font = "12px system-ui, sans-serif";
+      if (!out) context.fillStyle = colour("muted");
+      context.fillText(box.text, box.x + 14 + box.wide, box.y + 10.5);
+      if (system.agents <= 14 && !out) this.swatch(box, agent);
+    }
+    /**
+     * A line to the head, where the label is not at it.
+     * @param {Box} box
+     * @param {{x: number, y: number}} p
+     */
+    lead(box, p) {
+      const x = Math.min(Math.max(p.x, box.x + 4), box.x + box.w - 4);
+      const y = Math.min(Math.max(p.y, box.y), box.y + box.h);
+      if (Math.hypot(p.x - x, p.y - y) < 8) return;
+      const { context } = this.overlay;
+      context.strokeStyle = colour("muted");
+      context.lineWidth = 1;
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(p.x, p.y);
+      context.stroke();
+    }
+    /**
+     * The look of the agent's line in the plots, under its label.
+     * @param {Box} box
+     * @param {number} agent
+     */
+    swatch(box, agent) {
+      const { context } = this.overlay;
+      const look = line(agent);
+      context.strokeStyle = look.colour;
+      context.lineWidth = 2.5;
+      context.setLineDash(look.dash);
+      context.beginPath();
+      context.moveTo(box.x + 5, box.y + box.h);
+      context.lineTo(box.x + box.w - 5, box.y + box.h);
+      context.stroke();
+      context.setLineDash([]);
+    }
+  };
+
+  // src/overlay.js
   var colourOf = ({ bad, limit, chosen, title }) => bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+  var BODY = 24;
+  var awayFrom = (a, b, x, y) => {
+    const [dx, dy] = [b.x - a.x, b.y - a.y];
+    const along2 = ((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1);
+    const t = Math.min(Math.max(along2, 0), 1);
+    return Math.hypot(a.x + t * dx - x, a.y + t * dy - y);
+  };
   var Overlay = class {
     /**
      * @param {HTMLCanvasElement} canvas
@@ -1266,10 +2003,11 @@
       this.context = /** @type {CanvasRenderingContext2D} */
       canvas.getContext("2d");
       this.links = new Links(this.context, scene);
+      this.labels = new Labels(this);
+      this.hands = null;
       this.labelled = true;
       this.systems = [];
       this.runs = [];
-      this.orders = /* @__PURE__ */ new Map();
       this.taken = [];
       this.marks = [];
       this.highlighted = null;
@@ -1278,7 +2016,7 @@
     setMeta({ systems, runs = [] }) {
       this.systems = systems;
       this.runs = runs;
-      this.orders = new Map(systems.map((system) => [system.name, labelOrder(system.agents)]));
+      this.labels.begin(systems);
       this.links.begin();
     }
     /** Whether pictures must go on although nothing new came. */
@@ -1302,14 +2040,16 @@
       context.clearRect(0, 0, w, h);
       this.taken = [];
       this.marks = [];
+      this.labels.drawn = [];
       const solid = this.systems.filter(isSolid);
       this.links.draw(solid, instant, now);
       if (this.runs.length && solid.length === this.systems.length)
         for (const text2 of headingTexts(solid, this.runs, this.scene.layout)) this.text(text2);
       for (const system of solid)
         if (system.drawn_as === "bars") this.barTexts(system);
-        else if (this.labelled) this.labels(system, instant);
+        else this.labels.draw(system, instant, this.labelled);
       this.distances();
+      this.hands?.draw(context);
     }
     /** Metres along the lane, at the ground's stronger lines. */
     distances() {
@@ -1341,102 +2081,11 @@
     }
     /**
      * @param {System} system
-     * @param {Instant} instant
-     */
-    labels(system, instant) {
-      const shares = instant.systems[system.name].share;
-      const share = (agent) => shares ? shares[agent] : NaN;
-      const first = (agent) => this.isHighlighted(system, agent) || share(agent) > 1;
-      const order = this.orders.get(system.name) ?? [];
-      const away = (agent) => !isThere(instant.systems[system.name], agent);
-      const urgent = order.filter(first);
-      for (const agent of [...urgent, ...order.filter((each) => !first(each))])
-        if (!away(agent)) this.label(system, agent, share(agent));
-    }
-    /**
-     * @param {System} system
      * @param {number} agent
      */
     isHighlighted(system, agent) {
       const which = this.highlighted;
       return which?.system === system.name && which?.agent === agent;
-    }
-    /**
-     * @param {System} system
-     * @param {number} agent
-     * @param {number} share
-     */
-    label(system, agent, share) {
-      const [x, y, z] = this.scene.layout.agentAt(system, agent);
-      const p = this.scene.camera.project([x, y, z + system.height]);
-      if (!p) return;
-      this.marks.push({ x: p.x, y: p.y, system: system.name, agent });
-      const name = String(agent + 1);
-      const out = share > 1;
-      const digits = out && share < 1.1 ? 1 : 0;
-      const used2 = out ? "outside" : "";
-      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
-      for (const text2 of percent ? [percent, ""] : [""]) {
-        const box = this.pillBox(p, name, out ? `⚠ ${text2}` : text2);
-        if (!this.free(box) && !this.isHighlighted(system, agent)) continue;
-        this.taken.push(box);
-        return this.pill(box, { name, system, agent, out });
-      }
-    }
-    /**
-     * @param {{x: number, y: number}} p
-     * @param {string} name
-     * @param {string} text
-     */
-    pillBox(p, name, text2) {
-      const context = this.context;
-      context.font = "600 13px system-ui, sans-serif";
-      const wide = context.measureText(name).width;
-      context.font = "12px system-ui, sans-serif";
-      const more = text2 ? context.measureText(text2).width + 7 : 0;
-      const w = wide + more + 14;
-      return { x: p.x - w / 2, y: p.y - 22, w, h: 20, wide, text: text2 };
-    }
-    /**
-     * @param {Pill} box
-     * @param {{name: string, system: System, agent: number, out: boolean}} about
-     */
-    pill(box, { name, system, agent, out }) {
-      const context = this.context;
-      const chosen = this.isHighlighted(system, agent);
-      context.beginPath();
-      context.roundRect(box.x, box.y, box.w, box.h, 5);
-      context.fillStyle = out ? colour("bad-fill") : colour("pill");
-      context.fill();
-      context.lineWidth = chosen ? 2 : 1;
-      context.strokeStyle = colour(chosen ? "accent" : "pill-edge");
-      context.stroke();
-      context.textBaseline = "middle";
-      context.textAlign = "left";
-      context.fillStyle = out ? "#fff" : colour("text");
-      context.font = "600 13px system-ui, sans-serif";
-      context.fillText(name, box.x + 7, box.y + 10.5);
-      context.font = "12px system-ui, sans-serif";
-      if (!out) context.fillStyle = colour("muted");
-      context.fillText(box.text, box.x + 14 + box.wide, box.y + 10.5);
-      if (system.agents <= 14 && !out) this.swatch(box, agent);
-    }
-    /**
-     * The look of the agent's line in the plots, under its label.
-     * @param {Box} box
-     * @param {number} agent
-     */
-    swatch(box, agent) {
-      const context = this.context;
-      const look = line(agent);
-      context.strokeStyle = look.colour;
-      context.lineWidth = 2.5;
-      context.setLineDash(look.dash);
-      context.beginPath();
-      context.moveTo(box.x + 5, box.y + box.h);
-      context.lineTo(box.x + box.w - 5, box.y + box.h);
-      context.stroke();
-      context.setLineDash([]);
     }
     /** @param {System} system */
     barTexts(system) {
@@ -1491,6 +2140,27 @@
       context.strokeStyle = colour("halo");
       context.strokeText(text2, x, y);
       context.fillText(text2, x, y);
+    }
+    /**
+     * The agent at a point of the pane: its label, or what stands there, from the ground to its head.
+     * @param {number} x
+     * @param {number} y
+     */
+    agentAt(x, y) {
+      const near = this.agentNear(x, y);
+      if (near) return near;
+      const { camera, layout } = this.scene;
+      let best = null;
+      let nearest = BODY;
+      for (const system of this.scene.fleets)
+        for (let agent = 0; agent < system.agents; agent++) {
+          const foot = camera.project(layout.agentAt(system, agent));
+          const head = camera.project(layout.headOf(system, agent));
+          if (!foot || !head) continue;
+          const away = awayFrom(foot, head, x, y);
+          if (away < nearest) [best, nearest] = [{ system: system.name, agent }, away];
+        }
+      return best;
     }
     /**
      * The agent whose label or head is near a point of the pane.
@@ -3807,7 +4477,7 @@
       const { plot } = this;
       const { spec, lines } = plot;
       const [k] = spec.groups[group];
-      const value = element("span", { class: "chip-value", "aria-hidden": true });
+      const value = element("span", { class: "chip-value" });
       const what = `${spec.noun} ${spec.lines[k].label}`.trim();
       const chip = element(
         "button",
@@ -3815,15 +4485,16 @@
           type: "button",
           class: "plot-chip",
           title: `${what}: click switches the line, a double click shows it alone`,
-          "aria-label": `line of ${what}`,
           onmouseenter: () => plot.point(k),
           onmouseleave: () => plot.point(null),
           onclick: () => this.change(() => lines.toggle(group)),
           ondblclick: () => this.change(() => lines.showOnly(group))
         },
+        element("span", { class: "unseen", text: `line of ${what}: ` }),
         swatchOf(lines.lookOf(k)),
-        spec.total === 1 ? "" : spec.shorts[k],
-        value
+        element("span", { "aria-hidden": true, text: spec.total === 1 ? "" : spec.shorts[k] }),
+        value,
+        element("span", { class: "unseen", text: ` ${spec.unit}` })
       );
       this.root.append(chip);
       return value;
@@ -3946,7 +4617,7 @@
 
   // src/window.js
   var NARROWEST = 1e-4;
-  var STEP = 0.7;
+  var STEP2 = 0.7;
   var SLOP = 4;
   var scaled = ([from, to2], around, factor) => [
     around - (around - from) * factor,
@@ -3997,7 +4668,7 @@
       const { part, x, y } = this.at(event);
       if (part === "lines" && !event.ctrlKey) return;
       event.preventDefault();
-      const factor = event.deltaY > 0 ? 1 / STEP : STEP;
+      const factor = event.deltaY > 0 ? 1 / STEP2 : STEP2;
       if (part === "values") this.plot.zoomValues(factor, y);
       else this.plot.plots.zoom(factor, this.u.posToVal(x, "x"));
     }
@@ -4089,9 +4760,9 @@
         Home: () => this.at(u.valToIdx(this.plot.plots.window[0])),
         End: () => this.at(u.valToIdx(this.plot.plots.window[1])),
         Escape: () => this.at(null),
-        "+": () => this.plot.plots.zoom(STEP, u.data[0][now]),
-        "=": () => this.plot.plots.zoom(STEP, u.data[0][now]),
-        "-": () => this.plot.plots.zoom(1 / STEP, u.data[0][now]),
+        "+": () => this.plot.plots.zoom(STEP2, u.data[0][now]),
+        "=": () => this.plot.plots.zoom(STEP2, u.data[0][now]),
+        "-": () => this.plot.plots.zoom(1 / STEP2, u.data[0][now]),
         0: () => this.plot.plots.showAll()
       };
       if (!actions[event.key]) return;
@@ -4574,8 +5245,8 @@
       this.tools = element(
         "div",
         { id: "plot-tools", role: "toolbar", "aria-label": "time that plots show" },
-        this.tool("−", "More time (−)", () => this.zoom(1 / STEP)),
-        this.tool("+", "Less time (+)", () => this.zoom(STEP)),
+        this.tool("−", "More time (−)", () => this.zoom(1 / STEP2)),
+        this.tool("+", "Less time (+)", () => this.zoom(STEP2)),
         this.all,
         this.shown
       );
@@ -5553,6 +6224,45 @@
     }
   };
 
+  // src/hidden.js
+  var MANY2 = 60;
+  var SHARP = 35;
+  var Hidden = class {
+    constructor() {
+      this.all = [];
+    }
+    /**
+     * Outlines of what stands for agents; those of before are forgotten.
+     * @param {Iterable<Three[][]>} systems meshes of each agent, by system
+     */
+    build(systems) {
+      for (const { lines, mesh: mesh2 } of this.all) {
+        mesh2.remove(lines);
+        lines.geometry.dispose();
+        lines.material.dispose();
+      }
+      this.all = [];
+      const meshes = [...systems].flat().flat();
+      if (meshes.length > MANY2) return;
+      for (const mesh2 of meshes) {
+        const material = new THREE.LineBasicMaterial({
+          depthFunc: THREE.GreaterDepth,
+          depthWrite: false,
+          transparent: true,
+          opacity: 0.85
+        });
+        const lines = new THREE.LineSegments(new THREE.EdgesGeometry(mesh2.geometry, SHARP), material);
+        lines.renderOrder = 5;
+        mesh2.add(lines);
+        this.all.push({ lines, mesh: mesh2 });
+      }
+    }
+    /** In the colours that the robots have now. */
+    colour() {
+      for (const { lines, mesh: mesh2 } of this.all) lines.material.color.copy(mesh2.material.color);
+    }
+  };
+
   // src/layout.js
   var Layout = class {
     constructor() {
@@ -5698,7 +6408,7 @@
   var WIDTH2 = 0.05;
   var LEAD = 0.02;
   var RIM = 0.025;
-  var STEP2 = 4e-3;
+  var STEP3 = 4e-3;
   var used = (value, high, low) => {
     const middle = typeof high === "number" && typeof low === "number" ? (high + low) / 2 : 0;
     const up = typeof high === "number" ? (value - middle) / (high - middle) : -Infinity;
@@ -5793,7 +6503,7 @@
     update(instant, layout) {
       const own = instant.systems[this.system.name];
       const [x, y] = this.origin(instant.time);
-      const level = layout.floor + STEP2;
+      const level = layout.floor + STEP3;
       this.group.visible = !this.system.shown.faint && !this.system.shown.off;
       if (this.region)
         for (const part of [this.region.fill, this.region.edge]) part.position.set(x, y, level);
@@ -5802,7 +6512,7 @@
         const [px, py] = layout.agentAt(this.system, agent);
         for (const mesh2 of [this.discs[agent], this.leads[agent], this.marks[agent]])
           if (mesh2) mesh2.visible = isThere(own, agent);
-        this.discs[agent]?.position.set(px, py, level + STEP2);
+        this.discs[agent]?.position.set(px, py, level + STEP3);
         this.placeOutput(agent, [px, py], own.action, instant.time, level);
       }
     }
@@ -5820,7 +6530,7 @@
       const share = used(value, high, low);
       strip.material.color.setRGB(...ramp(share));
       const ends = [a, b].map((agent) => layout.agentAt(this.system, agent - 1));
-      this.stretch(strip, ends[0], ends[1], WIDTH2, layout.floor + 2 * STEP2);
+      this.stretch(strip, ends[0], ends[1], WIDTH2, layout.floor + 2 * STEP3);
     }
     /**
      * The mark at an agent's output, and the line that leads to it.
@@ -5837,8 +6547,8 @@
       const axes = owner.flatMap((each, k) => each === agent + 1 ? [k] : []);
       axes.forEach((k, axis) => to2[axis] += action[k]);
       if (axes.length === 1) to2[1] = from[1];
-      this.marks[agent].position.set(to2[0], to2[1], level + 3 * STEP2);
-      this.stretch(this.leads[agent], from, to2, LEAD, level + 2 * STEP2);
+      this.marks[agent].position.set(to2[0], to2[1], level + 3 * STEP3);
+      this.stretch(this.leads[agent], from, to2, LEAD, level + 2 * STEP3);
     }
     /**
      * @param {Three} strip
@@ -5868,6 +6578,7 @@
       this.ground = new Ground(this.viewer.scene);
       this.batches = new Batches(this.viewer.scene);
       this.ghosts = new Ghosts(this);
+      this.hidden = new Hidden();
       this.bars = [];
       this.plans = [];
       this.objects = [];
@@ -5942,6 +6653,7 @@
       if (!this.stale && (this.complete || now < this.nextLook)) return;
       this.objects = meta.items.map((path) => nodeAt(this.viewer, path)?.object);
       this.tinted = new Map(this.fleets.map((system) => [system.name, this.tintedOf(system)]));
+      this.hidden.build(this.tinted.values());
       this.statics = this.staticMeshes();
       this.dimStatics();
       this.complete = !this.objects.includes(void 0);
@@ -6050,6 +6762,7 @@
           for (const mesh2 of meshes) mesh2.material.color.setRGB(r, g, b);
         });
       }
+      this.hidden.colour();
     }
     /** Found once: robots of a lane may float around z = 0. */
     findFloor() {
@@ -6115,11 +6828,11 @@
   };
 
   // src/toolbar.js
-  var nameOf = (system, agent) => `${system.agent_name} ${agent + 1}`;
+  var nameOf2 = (system, agent) => `${system.agent_name} ${agent + 1}`;
   var optionsOf2 = (system) => [...Array(system.agents).keys()].map(
     (agent) => element("option", {
       value: JSON.stringify({ system: system.name, agent }),
-      text: nameOf(system, agent)
+      text: nameOf2(system, agent)
     })
   );
   var Toolbar = class {
@@ -6136,11 +6849,13 @@
       byId("ramp").style.background = rampGradient();
     }
     /** @param {Scene} meta */
-    setMeta({ systems }) {
+    setMeta({ systems, controls }) {
       this.systems = systems;
+      const live = controls !== void 0;
       this.fillFollow();
+      this.setFollow(byId("follow").value);
       this.fillGhosts();
-      this.describeLinks();
+      this.describeLinks(live);
     }
     // ---- labels and links
     toggleLabels() {
@@ -6154,7 +6869,8 @@
       press(byId("links"), links.shown);
       this.scene.dirty();
     }
-    describeLinks() {
+    /** @param {boolean} live whether they can be lost */
+    describeLinks(live) {
       const linked = this.systems.filter((system) => system.edges.length > 0);
       byId("links").hidden = linked.length === 0;
       const words = new Set(linked.map((system) => system.edges_are));
@@ -6163,6 +6879,7 @@
       if (words.has("measurements")) parts.push("dashed lines: measured directly");
       if (linked.some((system) => system.links.length && system.message_period !== null))
         parts.push("✕ lost");
+      if (words.has("messages") && live) parts.push("click a line: the link is lost, or there again");
       if (linked.some((system) => system.triggered)) parts.push("sent by triggers: see the plot");
       const planned = this.systems.filter(({ plan }) => plan);
       if (planned.length) parts.push("rings: outputs, where robots head");
@@ -6236,7 +6953,7 @@
         /** @type {System} */
         this.systems.find((each) => each.name === name)
       );
-      const who = nameOf(system, agent);
+      const who = nameOf2(system, agent);
       const others = system.kept ? "those that it estimates" : "the others";
       if (system.drawn_as === "bars")
         return `Outlines: ${system.action.name}s of ${others} as ${who} takes them to be.`;
@@ -6459,9 +7176,13 @@
   // src/tuning.js
   var MOST_PUSHED = 8;
   var Tuning = class {
-    /** @param {(message: object) => void} send to the simulation */
-    constructor(send) {
+    /**
+     * @param {(message: object) => void} send to the simulation
+     * @param {Pushing} pushing
+     */
+    constructor(send, pushing) {
       this.send = send;
+      this.pushing = pushing;
       this.sliders = /* @__PURE__ */ new Map();
     }
     /** @param {Scene} meta */
@@ -6488,7 +7209,7 @@
         { class: "tuning-row", role: "group", "aria-label": system.name },
         element("h3", { text: system.name }),
         ...controls.map((control) => this.slider(control)),
-        ...pushes.map((push) => this.pushes(push, system))
+        ...pushes.map(() => this.pushes(system))
       );
     }
     /** @param {Control} control */
@@ -6498,29 +7219,57 @@
       this.sliders.set(key, slider);
       return slider.root;
     }
-    /**
-     * @param {Push} push
-     * @param {System} system
-     */
-    pushes(push, system) {
-      const force = withUnit(push.force, push.unit);
-      const title = `Push with ${force} for ${number(push.duration)} s`;
+    /** @param {System} system */
+    pushes(system) {
+      const unit = this.pushing.unitOf(system, 0);
       return element(
         "div",
-        { class: "pushes", role: "group", "aria-label": title },
-        element("p", { class: "small", text: title }),
-        system.agents <= MOST_PUSHED ? this.pushList(push, system) : this.pushChoice(push, system)
+        { class: "pushes", role: "group", "aria-label": `pushes of ${system.name}` },
+        element(
+          "p",
+          { class: "small" },
+          "Drag a robot to push it, or with ",
+          this.field(system, "force", `force of a push, in ${unit}`, 1e3),
+          ` ${unit} for `,
+          this.field(system, "duration", "duration of a push, in s", 100),
+          " s:"
+        ),
+        system.agents <= MOST_PUSHED ? this.pushList(system) : this.pushChoice(system)
       );
     }
     /**
+     * A number of all pushes of a system.
+     * @param {System} system
+     * @param {"force" | "duration"} key
+     * @param {string} label
+     * @param {number} max
+     */
+    field({ name }, key, label, max) {
+      const push = (
+        /** @type {Push} */
+        this.pushing.pushes.get(name)
+      );
+      const field = element("input", {
+        ...{ type: "number", min: 0, max, step: "any", class: "push-number", title: label },
+        "aria-label": label,
+        value: push[key]
+      });
+      field.onchange = () => {
+        const value = Number(field.value);
+        if (value > 0 && value <= max) push[key] = value;
+        field.value = String(push[key]);
+      };
+      return field;
+    }
+    /**
      * Buttons for each agent.
-     * @param {Push} push
      * @param {System} system
      */
-    pushList(push, { agents, agent_name: noun }) {
+    pushList(system) {
+      const { agents, agent_name: noun } = system;
       const list = element("div", { class: "push-list" });
       for (let agent = 1; agent <= agents; agent++) {
-        const buttons = this.arrows(push, () => agent, `${noun} ${agent}`);
+        const buttons = arrows(this.pushing, system, () => agent - 1, `${noun} ${agent}`);
         const name = element("b", { text: agent });
         list.append(element("span", { class: "push-one" }, name, ...buttons));
       }
@@ -6528,34 +7277,20 @@
     }
     /**
      * Buttons for the agent that is chosen, when agents are many.
-     * @param {Push} push
      * @param {System} system
      */
-    pushChoice(push, { agents, agent_name: noun }) {
+    pushChoice(system) {
+      const { agents, agent_name: noun } = system;
       const select = element("select", { "aria-label": `${noun} to push` });
       for (let agent = 1; agent <= agents; agent++)
         select.append(element("option", { value: agent, text: `${noun} ${agent}` }));
-      const buttons = this.arrows(push, () => Number(select.value), `the chosen ${noun}`);
+      const buttons = arrows(
+        this.pushing,
+        system,
+        () => Number(select.value) - 1,
+        `the chosen ${noun}`
+      );
       return element("span", { class: "push-one" }, select, ...buttons);
-    }
-    /**
-     * @param {Push} push
-     * @param {() => number} agentOf from 1
-     * @param {string} whom in words
-     */
-    arrows({ system, axes, force }, agentOf, whom) {
-      const arrow = (axis, k, sign = 1) => {
-        const what = `push ${whom} ${sign < 0 ? "against" : "along"} ${axis || "its axis"}`;
-        return element("button", {
-          type: "button",
-          class: "push",
-          text: (axis === "y" ? "↓↑" : "←→")[sign < 0 ? 0 : 1],
-          title: what,
-          "aria-label": what,
-          onclick: () => this.send({ do: "push", system, agent: agentOf(), axis: k, force: sign * force })
-        });
-      };
-      return axes.flatMap((axis, k) => [-1, 1].map((sign) => arrow(axis, k, sign)));
     }
     /**
      * The simulation's values.
@@ -6999,6 +7734,7 @@
       this.transport = new Transport(this);
       this.keep = new Keep(this);
       new Video(this);
+      this.hands = new HandsOn(this);
       this.live = null;
       this.playback = null;
       this.meta = null;
@@ -7053,7 +7789,7 @@
       this.keep.go();
     }
     startLive() {
-      const tuning = new Tuning((message) => live.send(message));
+      const tuning = new Tuning((message) => live.send(message), this.hands.pushing);
       const live = new Live({
         opened: () => this.opened(),
         lost: (why) => this.lost(why),
@@ -7092,6 +7828,7 @@
       this.playback = playback;
       this.plots.setSource(playback);
       this.transport.mark(marksOf(playback), playback.end);
+      this.hands.renew();
       playback.seek(momentAsked() ?? playback.end);
     }
     /** @param {Live} live */
@@ -7125,6 +7862,7 @@
       this.overlay.setMeta(meta);
       this.plots.setScene(meta, source);
       this.toolbar.setMeta(meta);
+      this.hands.setMeta(meta);
     }
     // ---- what users ask for
     playPause() {
@@ -7217,6 +7955,7 @@
         this.plots.setTime(instant.time);
       } else if (this.instant && this.scene.stale) this.scene.apply(this.instant, source.store);
       if (!this.instant) return;
+      this.hands.follow(source, this.instant);
       const render = this.scene.needsRender;
       if (render) this.scene.render();
       if (render || this.overlay.moving || this.wasMoving) this.overlay.draw(this.instant, now);
@@ -7238,6 +7977,7 @@
       } else this.plots.writeValues();
       this.header.show(meta, source);
       this.toolbar.showLegend(this.instant);
+      this.hands.chosen.show(this.instant);
       this.transport.show(source, this.live);
       this.keep.show();
       this.slowDue = now + Math.max(SLOW2, 6 * (performance.now() - began));

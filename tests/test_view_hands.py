@@ -1,0 +1,225 @@
+"""Hands on a live page: robots dragged, joints looked at, links lost by a click, at every width."""
+
+import tomllib
+
+import numpy as np
+import pytest
+from test_view_browser import live_wait, opened, origins, quiet, seek, session, until
+
+import gne_mj
+from gne_mj.scenario import as_done
+from gne_mj.viewer import serve
+
+WIDTHS = ((390, 844), (720, 900), (1440, 900), (1920, 1080))
+PARTIAL = {"controller": {"information": "partial", "graph": "ring", "coupling": 5.0}}
+
+
+def settled(page):
+    """Two pictures, so that what was drawn is of now."""
+    page.evaluate(
+        "() => new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r())))"
+    )
+
+
+def head(page, *agents, system="robots"):
+    """Where an agent's head, or the middle of a link, from 0, is in the window."""
+    settled(page)
+    at = page.evaluate("a => window.gne.head(...a)", [system, *agents])
+    box = page.locator("#pane").bounding_box()
+    return box["x"] + at["x"], box["y"] + at["y"]
+
+
+def paused(page):
+    page.keyboard.press("Space")
+    until(page, "!window.gne.state().playing")
+
+
+def drag(page, at, by):
+    page.mouse.move(*at)
+    page.mouse.down()
+    page.mouse.move(at[0] + by[0] / 2, at[1] + by[1] / 2)
+    page.mouse.move(at[0] + by[0], at[1] + by[1])
+    settled(page)
+    page.mouse.up()
+
+
+def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
+    with session() as live:
+        opened(page, live.server.url)
+        paused(page)
+        page.evaluate("document.getElementById('tuning').open = true")
+        page.locator(".push-number").nth(1).fill("0.4")
+        page.locator(".push-number").nth(1).blur()
+        for number, (width, height) in enumerate(WIDTHS):
+            page.set_viewport_size({"width": width, "height": height})
+            page.evaluate("document.getElementById('tuning').open = false")
+            page.keyboard.press("f")
+            camera = page.evaluate("window.gne.head('robots', 0)")
+            drag(page, head(page, 1), (60.0, 0.0))
+            live_wait(lambda n=number: len(live.simulation.interventions) > n)
+            done = live.simulation.interventions[-1]
+            assert (done["agent"], done["duration"]) == (2, 0.4)
+            # 5 N are a drag of 50 px along x, which the view shows but for its perspective
+            assert done["force"] == pytest.approx(6.0, rel=0.05)
+            settled(page)
+            assert page.evaluate("window.gne.head('robots', 0)") == pytest.approx(camera, abs=2.0)
+        quiet(recorded, *origins(live.server))
+
+
+def test_a_finger_pushes_and_a_finger_beside_turns_the_view(page, recorded):
+    with session() as live:
+        opened(page, live.server.url)
+        page.set_viewport_size({"width": 390, "height": 844})
+        paused(page)
+        hands = page.context.new_cdp_session(page)
+        hands.send("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+
+        def stroke(at, by):
+            for kind, part in (("touchStart", 0.0), ("touchMove", 0.5), ("touchMove", 1.0)):
+                point = {"x": at[0] + part * by[0], "y": at[1] + part * by[1], "id": 0}
+                hands.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
+            hands.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+        page.locator("#view").scroll_into_view_if_needed()
+        stroke(head(page, 4), (-40.0, 0.0))
+        live_wait(lambda: live.simulation.interventions)
+        (done,) = live.simulation.interventions
+        assert (done["agent"], done["force"]) == (5, pytest.approx(-4.0, rel=0.05))
+        before = page.evaluate("window.gne.head('robots', 0)")
+        box = page.locator("#pane").bounding_box()
+        stroke((box["x"] + 30, box["y"] + box["height"] - 20), (60.0, 0.0))
+        settled(page)
+        assert page.evaluate("window.gne.head('robots', 0)") != before
+        assert len(live.simulation.interventions) == 1
+        quiet(recorded, *origins(live.server))
+
+
+def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
+    with session("planar-sync") as live:
+        opened(page, live.server.url)
+        paused(page)
+        here = head(page, 2)
+        drag(page, here, (45.0, -30.0))
+        live_wait(lambda: len(live.simulation.interventions) == 2)
+        one, other = live.simulation.interventions
+        assert (one["axis"], other["axis"], one["time"]) == ("x", "y", other["time"])
+        force = 5.0 * np.hypot(45.0, 30.0) / 50.0
+        assert np.hypot(one["force"], other["force"]) == pytest.approx(force, rel=0.01)
+        assert min(one["force"], other["force"]) > 0  # to the right, and away
+        assert page.evaluate("window.gne.state().follow.kind") == "fleet"
+        quiet(recorded, *origins(live.server))
+
+
+def test_joints_are_read_and_robots_pushed_by_keyboard(page, recorded):
+    with session() as live:
+        opened(page, live.server.url)
+        paused(page)
+        page.mouse.click(*head(page, 2))
+        until(page, "window.gne.state().chosen?.agent === 2")
+        panel = page.locator("#chosen")
+        until(page, "!document.querySelector('#chosen td span').textContent.includes('–')")
+        data = live.simulation.runs["robots"].loop.plant.data
+        shown = [text.replace("−", "-") for text in panel.locator("td span").all_inner_texts()]
+        expected = [data.qpos[4], data.qvel[4], data.qpos[5], data.qvel[5], data.ctrl[2]]
+        assert np.allclose([float(text) for text in shown], expected, atol=1e-3)
+        assert panel.locator("small").all_inner_texts() == [" m", " m/s", " m", " m/s", " N"]
+        panel.get_by_label("push robot 3 against its axis").focus()
+        page.keyboard.press("Enter")
+        live_wait(lambda: live.simulation.interventions)
+        assert live.simulation.interventions[0]["what"] == "robot 3 pushed by -5 N for 0.2 s"
+        for width, height in WIDTHS:
+            page.set_viewport_size({"width": width, "height": height})
+            settled(page)
+            inner, outer = panel.bounding_box(), page.locator("#view").bounding_box()
+            assert inner["x"] >= outer["x"]
+            assert inner["x"] + inner["width"] <= outer["x"] + outer["width"]
+            low, high = inner["y"], inner["y"] + inner["height"]
+            bottom = outer["y"] + outer["height"]
+            beside = low >= bottom if width < 1000 else low >= outer["y"] and high <= bottom
+            assert beside, width
+        panel.get_by_label("close").click()
+        assert panel.is_hidden()
+        quiet(recorded, *origins(live.server))
+
+
+def test_joints_of_a_replay(page, recorded):
+    trajectory = gne_mj.run("velocity-sync", {"simulation.duration": 1.0})
+    data, server = trajectory["robots"], serve(trajectory)
+    try:
+        opened(page, server.url)
+        page.locator("#follow").select_option(index=3)  # robot 3
+        seek(page, 0.5)
+        until(page, "document.querySelectorAll('#chosen td span')[1].textContent !== '–'")
+        row = data.sel(time=0.5, agent=3)
+        expected = [
+            float(row[name]) for name in ("position", "action", "appendage_velocity", "input")
+        ]
+        shown = page.locator("#chosen td span").all_inner_texts()
+        found = [float(shown[k].replace("−", "-")) for k in (0, 1, 3, 4)]
+        assert np.allclose(found, expected, atol=2e-3)
+        assert page.locator("#chosen button.push").count() == 0
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
+
+
+def test_links_are_lost_by_a_click_and_kept_in_the_scenario(page, recorded):
+    with session(changes=PARTIAL) as live:
+        opened(page, live.server.url)
+        paused(page)
+        for number, (width, height) in enumerate(WIDTHS):
+            page.set_viewport_size({"width": width, "height": height})
+            page.keyboard.press("f")
+            page.mouse.click(*head(page, 1, 2))
+            live_wait(lambda n=number: len(live.simulation.interventions) > n)
+            lost = number % 2 == 0
+            assert live.simulation.interventions[-1]["link"] == [2, 3]
+            assert live.simulation.interventions[-1]["lost"] == lost
+            until(page, "lost => (window.gne.state().lost.length === 1) === lost", arg=lost)
+        page.mouse.click(*head(page, 3))  # the other way: a button of a robot that is chosen
+        button = page.locator("#chosen").get_by_label("link with robot 3")
+        button.click()
+        until(page, "window.gne.state().lost.includes('robots 3-4')")
+        live_wait(lambda: live.simulation.interventions[-1]["lost"])
+        text = as_done(live.simulation.source, live.simulation.interventions).toml()
+        assert tomllib.loads(text)["interventions"][-1]["link"]["agents"] == [3, 4]
+        quiet(recorded, *origins(live.server))
+
+
+def test_what_cannot_be_done_is_told_once(page, recorded):
+    with session(changes={"plant.engine": "ode"}) as live:
+        opened(page, live.server.url)
+        paused(page)
+        for _ in range(2):
+            drag(page, head(page, 1), (60.0, 0.0))
+            page.mouse.click(*head(page, 0, 1))
+        said = page.locator(".toast .said").all_inner_texts()
+        assert said == [
+            "robots: only robots that MuJoCo moves can be pushed.",
+            "robots: dashed lines are measurements, so that there is no link to lose.",
+        ]
+        assert live.simulation.interventions == []
+        quiet(recorded, *origins(live.server))
+
+
+def test_labels_make_way_and_the_selector_agrees_with_the_view(page, recorded):
+    trajectory = gne_mj.run("paper", {"simulation.duration": 1.0})
+    server = serve(trajectory)
+    try:
+        opened(page, server.url)
+        for width, height in WIDTHS:
+            page.set_viewport_size({"width": width, "height": height})
+            page.keyboard.press("f")
+            settled(page)
+            labels = page.evaluate("window.gne.labels()")
+            assert sum(label["system"] == "robots" for label in labels) == 5
+            for n, one in enumerate(labels):
+                for other in labels[:n]:
+                    apart = (
+                        one["x"] >= other["x"] + other["w"] or other["x"] >= one["x"] + one["w"]
+                        or one["y"] >= other["y"] + other["h"] or other["y"] >= one["y"] + one["h"]
+                    )  # fmt: skip
+                    assert apart, (width, one, other)
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
