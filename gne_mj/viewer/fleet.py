@@ -27,16 +27,14 @@ class Fleet:
         agents: N.
 
     Attributes:
-        prefix: of the paths at which they are drawn: the name, in parts.
-        mirror: draws them there.
+        mirror: draws them below the name.
     """
 
     def __init__(self, plant: FleetPlant, name: str, agents: int) -> None:
         self.plant, self.agents = plant, agents
-        self.prefix = tuple(part for part in name.split("/") if part)
         self.mirror = Mirror(
             plant.model,
-            prefix=self.prefix,
+            prefix=tuple(part for part in name.split("/") if part),
             tinted=[geom for geoms in self._tinted for geom in geoms],
             coils=self._coils,
         )

@@ -62,6 +62,7 @@ class Mirror:
     Attributes:
         items: K paths of what moves: bodies, which have the path of their name, then segments of
             tendons.
+        world: the path of what never moves.
         objects: path and object of all that is drawn, to be set once.
 
     Raises:
@@ -91,6 +92,7 @@ class Mirror:
         self._wraps, self._wrapped = b"", (first[:0], first[:0])
 
         world, *self.items = self._paths(prefix)
+        self.world = world
         self._rest = np.zeros((len(self.items), 8))
         self._rest[:, QUATERNION.start] = 1.0
         self._rest[: len(self._bodies), LENGTH] = 1.0

@@ -49,7 +49,7 @@ class Scene:
             about["shift"], about["beside"] = self._shifts[k].tolist(), self._beside[k].tolist()
             about["items"] = [len(items), 0]
             if shown_system.fleet is not None:
-                about["root"] = f"{ROOT}/{'/'.join(shown_system.fleet.prefix)}"
+                about["world"] = f"{ROOT}/{shown_system.fleet.mirror.world}"
                 about["items"][1] = len(shown_system.fleet.mirror.items)
                 about["anchors"] = [len(items) + anchor for anchor in about["anchors"]]
                 about["tints"] = [[f"{ROOT}/{path}" for path in each] for each in about["tints"]]

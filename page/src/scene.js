@@ -15,6 +15,7 @@ import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
 /** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
 const FAINT = 0.3; // opacity of what lies over another run
+const BELOW = 0.02; // m from one floor to the next system's, so that none flickers in another
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 
 export class Scene {
@@ -133,10 +134,11 @@ export class Scene {
    * What never moves of a system goes where it is drawn; what lies over another run is translucent.
    * @param {System} system
    */
-  fade({ items: [first, count], root, shown }) {
-    const still = nodeAt(this.viewer, root ?? "")?.children["<object>"]?.object;
+  fade(system) {
+    const { items: [first, count], world = "", shown } = system;
+    const still = nodeAt(this.viewer, world)?.children["<object>"]?.object;
     if (still) {
-      [still.position.x, still.position.y] = shown.offset;
+      still.position.set(...shown.offset, -BELOW * this.fleets.indexOf(system));
       still.visible = !shown.faint && !shown.off;
     }
     for (const object of this.objects.slice(first, first + count))

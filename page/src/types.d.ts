@@ -54,7 +54,7 @@ export interface System {
   joints: JointRow[][]; // of each robot
   tints: string[][]; // paths of what has each agent's colour
   items: [number, number]; // the first of its items, and how many they are
-  root?: string; // the path below which a fleet is drawn
+  world?: string; // the path of what never moves of a fleet
   run: number; // from 0, where several are compared
   shift: [number, number]; // m along x and y, by which it is drawn beside others of its run
   beside: [number, number]; // m more, where runs are drawn beside each other

@@ -6568,6 +6568,7 @@
 
   // src/scene.js
   var FAINT2 = 0.3;
+  var BELOW2 = 0.02;
   var AGAIN2 = 500;
   var Scene = class {
     /** @param {HTMLElement} pane */
@@ -6667,10 +6668,11 @@
      * What never moves of a system goes where it is drawn; what lies over another run is translucent.
      * @param {System} system
      */
-    fade({ items: [first, count], root, shown: shown2 }) {
-      const still2 = nodeAt(this.viewer, root ?? "")?.children["<object>"]?.object;
+    fade(system) {
+      const { items: [first, count], world = "", shown: shown2 } = system;
+      const still2 = nodeAt(this.viewer, world)?.children["<object>"]?.object;
       if (still2) {
-        [still2.position.x, still2.position.y] = shown2.offset;
+        still2.position.set(...shown2.offset, -BELOW2 * this.fleets.indexOf(system));
         still2.visible = !shown2.faint && !shown2.off;
       }
       for (const object of this.objects.slice(first, first + count))
