@@ -145,6 +145,8 @@ def mjcf_robots(
     spacing: float | None = None,
     poses: Sequence[Any] | None = None,
     terrain: str | Path | None = None,
+    keyframe: str | Sequence[str] | None = None,
+    settle: float | None = None,
     contacts: str = "all",
     input_limit: ArrayLike | None = None,
 ) -> AgentsTable:
@@ -164,6 +166,8 @@ def mjcf_robots(
         poses: of each agent's robot, in place of a spacing: x, y, z in m, or a table with
             ``position``, and ``yaw`` in rad or ``quaternion`` (w first).
         terrain: an MJCF file, or its text, of what they stand on, in place of their own floors.
+        keyframe: the name of their files' keyframe that they start in, or one each.
+        settle: in s, how long they come to rest before they start, under inputs of zero.
         contacts: "all" as files say, or but those with the "floor", of "agents", or "none".
         input_limit: in N or N m.
     """
@@ -182,6 +186,8 @@ def mjcf_robots(
         spacing=spacing,
         poses=poses,
         terrain=None if terrain is None else path_of(terrain),
+        keyframe=keyframe,
+        settle=settle,
         contacts=contacts,
         input_limit=input_limit,
     )

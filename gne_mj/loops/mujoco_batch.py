@@ -73,6 +73,8 @@ class MujocoBatch(BatchLoop):
                 monitors[run] = monitor
             return True
 
+        for case in cases:
+            self._fleets[0].plant.prepare(case.state)
         remember = self._remember if sizes.mode == CONTINUOUS and sizes.memory else None
         with (
             callbacks(control=self._control, passive=self._passive, activation=remember),

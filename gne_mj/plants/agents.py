@@ -23,6 +23,8 @@ class Agents:
         input_limit: (m,) greatest |u| that the actuators deliver, infinite for no limit.
         dimension: channels of each agent; all channels are numbered agent by agent.
         contacts: whether bodies of different agents collide, in MuJoCo.
+        standing: (m, states) where they start if nothing is said of it; None for at rest at the
+            game's own outputs.
     """
 
     kind: ModuleType
@@ -30,6 +32,7 @@ class Agents:
     input_limit: NDArray[np.float64]
     dimension: int = 1
     contacts: bool = False
+    standing: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         width = len(self.kind.PARAMETERS)
@@ -73,9 +76,19 @@ class Agents:
         return replace(
             self,
             contacts=False,
+            standing=None,
             parameters=np.tile(self.parameters, (copies, 1)),
             input_limit=np.tile(self.input_limit, copies),
         )
+
+    def stood(self, timestep: float, integrator: str) -> Self:
+        """The same, knowing where they start if a simulator has to find out.
+
+        Args:
+            timestep: of a run, in s.
+            integrator: of it.
+        """
+        return self
 
     def among(self, channels: NDArray[np.bool_]) -> Self:
         """The agents of these channels, (m,)."""

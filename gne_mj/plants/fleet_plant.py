@@ -103,6 +103,9 @@ class FleetPlant(Plant):
         """Let it be another time in s; what is told of the state stays."""
         self.data.time = time
 
+    def prepare(self, state: NDArray[np.float64]) -> None:
+        """Do what a reset to (m, states) needs that cannot be done while others are stepped."""
+
     @abstractmethod
     def refresh(self) -> None:
         """Bring up to date what is read and of the last step's start."""

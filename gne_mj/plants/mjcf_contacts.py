@@ -1,11 +1,12 @@
 """Who touches whom in a fleet of users' robots: each its own parts and what its file brings along.
 
-All files lie in one world. Planes that several of them bring are one floor; whatever else robots
-would touch each other by, they must not overlap at the start.
+All files lie in one world. Planes that several of them bring are one floor
+(:mod:`gne_mj.plants.mjcf_floors`); whatever else robots would touch each other by, they must not
+overlap at the start.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,32 +15,41 @@ from numpy.typing import NDArray
 from gne_mj.errors import InvalidInput
 from gne_mj.plants.mjcf_robot import RobotFile
 
-# What of a geom says how it is touched
-SURFACE = (
-    "contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp",
-    "margin", "gap",
-)  # fmt: skip
+
+class Part(NamedTuple):
+    """What of a fleet's model is one robot's, one behind the other."""
+
+    bodies: int
+    geoms: int  # of the world itself
+    actuators: int
 
 
-def sizes_of(spec: Any) -> tuple[int, int]:
-    """How many bodies a file has, and how many geoms of the world itself."""
-    return len(spec.bodies) - 1, sum(geom.parent == spec.worldbody for geom in spec.geoms)
+def part_of(spec: Any) -> Part:
+    """What a file adds."""
+    of_world = sum(geom.parent == spec.worldbody for geom in spec.geoms)
+    return Part(len(spec.bodies) - 1, of_world, len(spec.actuators))
 
 
-def owners_of(model: mujoco.MjModel, robots: Sequence[tuple[int, int]]) -> list[set[int]]:
+def owners_of(
+    model: mujoco.MjModel, robots: Sequence[Part], floors: Mapping[str, set[int]]
+) -> list[set[int]]:
     """The robots, from 0, that each geom belongs to; none for the lane's or the terrain's own.
 
     Args:
         model: of the fleet, its robots one behind the other, and behind the terrain.
-        robots: their :func:`sizes_of`.
+        robots: what is theirs.
+        floors: names of planes that several of them bring, and whose they are.
     """
-    bodies, geoms = np.array(robots).T
+    bodies, geoms, _ = np.array(robots).T
     of_body = np.full(model.nbody, -1)
     of_body[model.nbody - bodies.sum() :] = np.repeat(np.arange(len(robots)), bodies)
     of_geom = of_body[model.geom_bodyid]
     (world,) = np.nonzero(model.geom_bodyid == 0)
     of_geom[world[len(world) - geoms.sum() :]] = np.repeat(np.arange(len(robots)), geoms)
-    return [{owner} if owner >= 0 else set() for owner in of_geom.tolist()]
+    owners = [{owner} if owner >= 0 else set() for owner in of_geom.tolist()]
+    for name, robots_of in floors.items():
+        owners[model.geom(name).id] = robots_of
+    return owners
 
 
 def counted_owners(model: mujoco.MjModel, owners: Sequence[set[int]]) -> NDArray[np.int64]:
@@ -50,30 +60,6 @@ def counted_owners(model: mujoco.MjModel, owners: Sequence[set[int]]) -> NDArray
     moves = model.body_weldid[model.geom_bodyid] != 0
     found = [min(of) if of and moving else -1 for of, moving in zip(owners, moves, strict=True)]
     return np.array(found, dtype=np.int64)
-
-
-def share_floors(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:
-    """Let but one of planes that are the same touch anything, so that a robot stands on one floor.
-
-    Args:
-        model: of the fleet; the other planes' collision bits are cleared, their pairs' made its.
-        data: positions evaluated.
-        owners: of each geom; the one that stays is of all.
-    """
-    touches = (model.geom_contype | model.geom_conaffinity) != 0
-    plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    seen: dict[tuple[float, ...], int] = {}
-    for geom in np.flatnonzero(plane & touches & (model.geom_bodyid == 0)).tolist():
-        normal = data.geom_xmat[geom].reshape(3, 3)[:, 2]
-        place = (*normal, normal @ data.geom_xpos[geom])
-        surface = [np.atleast_1d(getattr(model, f"geom_{name}")[geom]) for name in SURFACE]
-        key = tuple(np.round(np.concatenate([place, *surface]), 9).tolist())
-        kept = seen.setdefault(key, geom)
-        if kept != geom:
-            model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-            for pairs in (model.pair_geom1, model.pair_geom2):
-                pairs[pairs == geom] = kept
-            owners[kept] |= owners[geom]
 
 
 def let_touch(model: mujoco.MjModel, owners: list[set[int]], which: str) -> None:

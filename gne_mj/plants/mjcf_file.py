@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from gne_mj.errors import InvalidInput
+from gne_mj.errors import InvalidInput, nearest
 from gne_mj.plants.c_layout import arrays
 from gne_mj.plants.callbacks import quiet
 from gne_mj.plants.mjcf_pose import Pose
@@ -26,8 +26,8 @@ WORDS = {
 }  # fmt: skip
 
 
-def read(path: Path) -> Any:
-    """The file's ``mujoco.MjSpec``, without keyframes and with MuJoCo's automatic reset off.
+def read(path: Path, *, keyframes: bool = False) -> Any:
+    """The file's ``mujoco.MjSpec``, with MuJoCo's automatic reset off; without keyframes, or with.
 
     Raises:
         InvalidInput: it cannot be read or compiled, has a number that is not finite, or a setting
@@ -47,7 +47,7 @@ def read(path: Path) -> Any:
         raise _refusal(path, "MuJoCo's state does not say who sleeps: leave the flag 'sleep' out")
     # a state that is not a number must be seen, not be reset
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    for key in list(spec.keys):
+    for key in () if keyframes else list(spec.keys):
         spec.delete(key)
     _name_actuators(spec)
     return spec
@@ -86,6 +86,30 @@ def alone(path: Path) -> mujoco.MjModel:
     for name in arrays("mjModel"):
         _check_finite(path, name, getattr(model, name))
     return model
+
+
+def with_keyframes(path: Path) -> mujoco.MjModel:
+    """The same with its keyframes."""
+    return compiled(read(path, keyframes=True), path)
+
+
+def keyframe(model: mujoco.MjModel, path: Path, name: str) -> Any:
+    """A keyframe of :func:`with_keyframes`, as mjModel has it.
+
+    Raises:
+        InvalidInput: the file has none of this name, or numbers that are not finite in it; names
+            ``agents.keyframe``.
+    """
+    names = [model.key(k).name for k in range(model.nkey)]
+    if not name or name not in names:
+        hint = nearest(name, names) if names else "it has none at all"
+        raise InvalidInput(
+            "agents.keyframe", name, f"{path.name} must have a keyframe of this name; {hint}"
+        )
+    key = model.key(name)
+    if not all(np.all(np.isfinite(part)) for part in (key.qpos, key.qvel, key.act, key.ctrl)):
+        raise InvalidInput("agents.keyframe", name, f"its numbers in {path.name} must be finite")
+    return key
 
 
 def compiled(spec: Any, path: Path | str) -> mujoco.MjModel:

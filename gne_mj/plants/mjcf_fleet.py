@@ -13,23 +13,21 @@ from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import raise_pending
-from gne_mj.plants import mjcf_file, mjcf_robot
+from gne_mj.plants import mjcf_file, mjcf_robot, mjcf_start
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model
 from gne_mj.plants.fleet_plant import FleetPlant
 from gne_mj.plants.low_level.table import Controller
 from gne_mj.plants.mjcf_contacts import (
-    check_apart,
+    Part,
     counted_owners,
     let_touch,
     owners_of,
-    share_floors,
-    sizes_of,
+    part_of,
 )
 from gne_mj.plants.mjcf_control import (
     add_memory,
-    begin,
     controllers_of,
     fleet_controls,
     limits_met,
@@ -37,6 +35,7 @@ from gne_mj.plants.mjcf_control import (
     read_all,
 )
 from gne_mj.plants.mjcf_drive import add_effort, driving
+from gne_mj.plants.mjcf_floors import Floors, leave_out
 from gne_mj.plants.mjcf_pose import check_leaves
 from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
@@ -77,14 +76,6 @@ __all__ = [
     "stored",
 ]
 
-NEWTON = 20  # steps to a start's positions
-# What to do where they do
-BESIDE = (
-    ", {:g} m beside it: give more spacing, make its file narrower, or its floor a plane, which all"
-    " share"
-)
-POSED = ": let their poses lie farther apart, or make its floor a plane, which all share"
-TOGETHER = ": let their positions begin farther apart, or make its floor a plane, which all share"
 AGENT = mjcf_robot
 
 
@@ -139,7 +130,7 @@ class MjcfPlant(FleetPlant):
         self.passive = passive_callback(offsets(), self.kernels) if lookahead else None
         with named(path="agents.path"):
             controllers = controllers_of(agents)
-            world, sizes_of_robots, memory_asked = _world(agents, controllers)
+            world, parts, floors, memory_asked = _world(agents, controllers)
         own = own_entries(controllers)
         with named(world="agents.path"):
             self.model = compile_model(
@@ -149,21 +140,22 @@ class MjcfPlant(FleetPlant):
         self.data = mujoco.MjData(self.model)
         with quiet():
             mujoco.mj_fwdPosition(self.model, self.data)
-        self._owners = owners_of(self.model, sizes_of_robots)
-        show_one_floor(self.model, self.data, self._owners)
-        share_floors(self.model, self.data, self._owners)
-        let_touch(self.model, self._owners, agents.touching)
+        self.owners = owners_of(self.model, parts, floors)
+        show_one_floor(self.model, self.data, self.owners)
+        let_touch(self.model, self.owners, agents.touching)
         self._terms: list[Term] = []  # of all outputs that are no joint's
         with named(input="agents.input", output="agents.output"):
             self._driving = driving(self.model, self.data, agents)
-            self._controls = fleet_controls(self.model, self.data, agents, controllers)
+            self.controls = fleet_controls(self.model, self.data, agents, controllers)
         flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
         self.places = by_name(flat, dtype_in(ChannelPlace))
         model = self.model
+        self.reference = mjcf_start.reference(model, agents, parts)
+        self.settled: dict[Any, NDArray[np.float64]] = {}
         self._twin = mujoco.MjData(model)  # where mode implicit predicts
-        self._geom_owners = counted_owners(model, self._owners)
+        self._geom_owners = counted_owners(model, self.owners)
         self.sizes = Sizes(
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER + own,
             model.na - memory, self._geom_owners.ctypes.data,
@@ -174,13 +166,13 @@ class MjcfPlant(FleetPlant):
 
     def _sizes(self, lookahead: int) -> NDArray[np.int64]:
         """What compiled code has in SIZES."""
-        terms = [*self._terms, *self._controls.terms]
-        controls = self._controls.behind(
+        terms = [*self._terms, *self.controls.terms]
+        controls = self.controls.behind(
             len(self._terms), lookahead + len(terms) + len(self._driving.factors)
         )
         functions = [
             step_address(name) if name else 0
-            for names in (self._refreshing, fresh_by(self._controls.terms))
+            for names in (self._refreshing, fresh_by(self.controls.terms))
             for name in (names or ("", "", ""))
         ]
         prediction = Prediction(
@@ -203,9 +195,9 @@ class MjcfPlant(FleetPlant):
     def _numbers(self, agents: Agents) -> NDArray[np.float64]:
         """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors, of
         readings and of drives, and the controllers' numbers."""
-        factors = [term.factor for term in (*self._terms, *self._controls.terms)]
+        factors = [term.factor for term in (*self._terms, *self.controls.terms)]
         return np.concatenate(
-            [np.ravel(agents.parameters), factors, self._driving.factors, self._controls.numbers]
+            [np.ravel(agents.parameters), factors, self._driving.factors, self.controls.numbers]
         )
 
     def model_fields(
@@ -222,7 +214,7 @@ class MjcfPlant(FleetPlant):
     @property
     def state_bits(self) -> int:
         """See the base class; controllers keep in userdata what they began with."""
-        return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self._controls.controllers)
+        return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self.controls.controllers)
 
     @property
     def lets_through(self) -> NDArray[np.float64]:
@@ -296,73 +288,27 @@ class MjcfPlant(FleetPlant):
         return found
 
     def reset(self, state: ArrayLike) -> None:
-        """See the base class; of all joint velocities with these outputs the smallest are taken."""
-        state = np.asarray(state, dtype=np.float64)
-        mujoco.mj_resetData(self.model, self.data)
-        for dof, at, position in zip(
-            self.places.output, self.places.position, state[:, 1], strict=True
-        ):
-            if at >= 0 and (self.passive is not None or not _floats(self.model, dof)):
-                self.data.qpos[at] = position
-        if self.passive is not None and self._terms:
-            self._move_to(state[:, 1])
-        still, slopes = self.state[:, 0], self._slopes()
-        self.data.qvel[:] = np.linalg.lstsq(slopes, state[:, 0] - still, rcond=None)[0]
-        with quiet():
-            mujoco.mj_forward(self.model, self.data)
-        advice = BESIDE.format(self.agents.spacing)
-        if self.agents.together or self.agents.poses:
-            advice = TOGETHER if self.agents.together else POSED
-        with named(robots="agents.path"):
-            check_apart(self.model, self.data, self._owners, self.agents.files, advice)
-        missed = np.abs(self.state[:, 0] - state[:, 0])
-        if np.max(missed) > 1e-9 * max(1.0, float(np.max(np.abs(state[:, 0])))):
-            raise InvalidInput(
-                "agents.output",
-                str(self.agents.robots[int(np.argmax(missed))].output),
-                "in the file's reference pose no joint velocities give it its initial value",
-            )
-        begin(self.data, self._controls, self._read)
+        """See the base class, and :mod:`gne_mj.plants.mjcf_start`."""
+        mjcf_start.reset(self, np.asarray(state, dtype=np.float64))
 
-    def _read(self, which: int, out: NDArray[np.float64]) -> None:
+    def prepare(self, state: NDArray[np.float64]) -> None:
+        """See the base class: a fleet that settles moves before it starts."""
+        if self.agents.settle:
+            mjcf_start.settled(self, state[:, 1])
+
+    @property
+    def standing(self) -> NDArray[np.float64]:
+        """(m, 2) where it starts if nothing is said of it; it is left there."""
+        return mjcf_start.standing(self)
+
+    def read(self, which: int, out: NDArray[np.float64]) -> None:
         """Fill out with what a controller reads, in a state that is evaluated."""
         _readings()(self.data._address, self._parameter_block.address, which, out)
 
     @property
     def limits_met(self) -> dict[int, dict[str, float]]:
         """See the base class."""
-        return limits_met(self.data, self._controls)
-
-    def _slopes(self) -> NDArray[np.float64]:
-        """(m, nv) how outputs change with joint velocities, all of which are zero at the end."""
-        slopes, still = np.empty((self.agents.channels, self.model.nv)), self.state[:, 0]
-        for column in range(self.model.nv):
-            self.data.qvel[:] = 0.0
-            self.data.qvel[column] = 1.0
-            slopes[:, column] = self.state[:, 0] - still
-        self.data.qvel[:] = 0.0
-        return slopes
-
-    def _move_to(self, positions: NDArray[np.float64]) -> None:
-        """Move to these positions (m,) by Newton's method, each step the smallest that does.
-
-        Raises:
-            InvalidInput: it does not find them.
-        """
-        tau, size = self.agents.parameters[:, :1], max(1.0, float(np.max(np.abs(positions))))
-        missed = positions - self.state[:, 1]
-        for _ in range(NEWTON):
-            if np.max(np.abs(missed)) <= 1e-12 * size:
-                return
-            move = np.linalg.lstsq(self._slopes() / tau, missed, rcond=None)[0]
-            mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
-            missed = positions - self.state[:, 1]
-        if np.max(np.abs(missed)) > 1e-9 * size:
-            raise InvalidInput(
-                "agents.output",
-                str(self.agents.robots[int(np.argmax(np.abs(missed)))].output),
-                "near the file's reference pose no joint positions give it its initial position",
-            )
+        return limits_met(self.data, self.controls)
 
     def controls(self, u: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Write into out (nu,) what inputs u (m,) make of the controls that follow from them."""
@@ -375,7 +321,7 @@ class MjcfPlant(FleetPlant):
         given = np.array(u, dtype=np.float64)
         self._driving.set(self.data.ctrl, given)
         with callbacks(passive=self.passive):
-            if self._controls.controllers:
+            if self.controls.controllers:
                 _driven_steps()(self.model._address, self.data._address, block, given, steps)
                 raise_pending()
             else:
@@ -388,13 +334,14 @@ PLANT = MjcfPlant
 
 def _world(
     agents: MjcfRobots, controllers: dict[int, Controller]
-) -> tuple[Any, list[tuple[int, int]], int]:
-    """A fleet's MjSpec, its robots' :func:`sizes_of`, and the memory that they ask for in bytes."""
+) -> tuple[Any, list[Part], dict[str, set[int]], int]:
+    """A fleet's MjSpec, what of it is each robot's, floors of several of them by their names, and
+    the memory that they ask for in bytes."""
     robots, places, terrain = agents.files, agents.places, agents.terrain
     world = ground(terrain, places)
-    for path in dict.fromkeys(robot.path for robot in robots):
-        mjcf_file.alone(path)  # which finds what is wrong with it
-    sizes, memory = [], 0
+    # which finds what is wrong with them
+    alone = {path: mjcf_file.alone(path) for path in dict.fromkeys(r.path for r in robots)}
+    parts, floors, memory = [], Floors(), 0
     for i, robot in enumerate(robots):
         spec = mjcf_file.read(robot.path)
         if i == 0:
@@ -408,15 +355,15 @@ def _world(
             add_effort(spec, agents.robots[channel].input, channel, robot.path)
         if i in controllers:
             add_memory(spec, controllers[i])
-        sizes.append(sizes_of(spec))
+        prefix, part = f"robot_{i + 1}/", part_of(spec)
+        doubles: dict[str, str] = {}
+        if terrain is None:
+            doubles = floors.doubles(spec, alone[robot.path], places[i], i, prefix)
+        parts.append(part._replace(geoms=part.geoms - len(doubles)))
         memory += max(spec.memory, 0)
-        mjcf_file.attach(world, spec, robot.path, prefix=f"robot_{i + 1}/", at=places[i])
-    return world, sizes, memory
-
-
-def _floats(model: mujoco.MjModel, dof: int) -> bool:
-    """Whether a degree of freedom is of a free joint, which stays where its file put it."""
-    return bool(model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_FREE)
+        mjcf_file.attach(world, spec, robot.path, prefix=prefix, at=places[i])
+        leave_out(world, doubles)
+    return world, parts, floors.owners, memory
 
 
 @cache

@@ -66,6 +66,8 @@ class MjcfRobots(Agents):
         spacing: in m from one to the next, then.
         terrain: a file that they stand on; None for the floors of their own files.
         touching: which contacts there are, see :func:`gne_mj.plants.mjcf_contacts.let_touch`.
+        keyframes: of each agent's file the one that it starts in; None for the file's pose.
+        settle: in s, how long they come to rest before they start; 0 for not at all.
     """
 
     robots: tuple[RobotFile, ...] = ()
@@ -74,11 +76,22 @@ class MjcfRobots(Agents):
     spacing: float = APART
     terrain: Path | None = None
     touching: str = "all"
+    keyframes: tuple[str | None, ...] = ()
+    settle: float = 0.0
 
     @property
     def world(self) -> tuple[object, ...]:
         """What tells their model from others of the same kind."""
-        return self.robots, self.places, self.terrain, self.touching
+        start = self.keyframes, self.settle, self.parameters.tobytes() if self.settle else b""
+        return self.robots, self.places, self.terrain, self.touching, *start
+
+    def stood(self, timestep: float, integrator: str) -> Self:
+        """See the base class: a keyframe says it, and settling."""
+        if not (any(self.keyframes) or self.settle):
+            return self
+        from gne_mj.plants.mjcf_fleet import MjcfPlant  # which knows this module
+
+        return replace(self, standing=MjcfPlant(self, timestep, integrator).standing)
 
     @property
     def places(self) -> tuple[Pose, ...]:
@@ -104,6 +117,7 @@ class MjcfRobots(Agents):
         poses = repeated(self.poses, copies) if self.poses else ()
         return replace(
             super().repeated(copies), robots=self.robots * copies, poses=poses,
+            keyframes=self.keyframes * copies,
             together=self.together and copies == 1,
         )  # fmt: skip
 
@@ -162,6 +176,12 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
     terrain: str | None = Field(
         None, description="MJCF file of what they stand on, in place of their own files' floors"
     )
+    keyframe: str | list[str] | None = Field(
+        None, description="of their files that they start in, one for all or one each"
+    )
+    settle: Annotated[float | None, Unit("s")] = Field(
+        None, gt=0, le=1000, description="how long they come to rest before, under inputs of zero"
+    )
     contacts: Literal["all", "floor", "agents", "none"] = Field(
         "all",
         description="of robots with the floor and each other, as files say; or but one of these",
@@ -199,9 +219,29 @@ class MjcfAgents(AgentsTable, LookaheadKeys):
             kind, numbers, self.limits(sizes), axes, robots=robots, together=self.positions,
             poses=() if self.poses is None else poses_of(self.poses, self.count),
             spacing=APART if self.spacing is None else self.spacing, touching=self.contacts,
-            terrain=self._terrain,
+            terrain=self._terrain, keyframes=self._keyframes, settle=self._settle(numbers),
             contacts=self.contacts in ("all", "agents"),
         )  # fmt: skip
+
+    @property
+    def _keyframes(self) -> tuple[str | None, ...]:
+        found: tuple[str | None, ...] = (
+            tuple(self.keyframe)
+            if isinstance(self.keyframe, list)
+            else (self.keyframe,) * self.count
+        )
+        if len(found) != self.count:
+            raise InvalidInput(
+                "keyframe", self.keyframe, f"it must be one name or a list of {self.count}"
+            )
+        return found
+
+    def _settle(self, numbers: NDArray[np.float64]) -> float:
+        if self.settle is not None and self.positions and np.any(numbers[:, 2]):
+            raise InvalidInput(
+                "settle", self.settle, "agents come to rest, and reference_velocity moves theirs"
+            )
+        return self.settle or 0.0
 
     @property
     def _terrain(self) -> Path | None:

@@ -24,7 +24,7 @@ from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops.base import Present
 from gne_mj.margins import Disturbance, with_margin
 from gne_mj.membership import Membership, MembershipTable
-from gne_mj.plants.agent_type import placed_state, start_keys, start_of
+from gne_mj.plants.agent_type import followed_position, placed_state, start_keys, start_of
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.table import AgentsTable
 from gne_mj.registry import AGENTS, FAULTS, GAMES, LAWS, MODES, load_plugins
@@ -92,12 +92,21 @@ class InitialTable(Table):
         description="with controller.observer: what is known to push the agents; 0 if left out",
     )
 
+    def leaves_open(self, agents: Agents) -> bool:
+        """Whether agents start where a keyframe or settling leaves them."""
+        return agents.standing is not None and all(getattr(self, key) is None for key in STARTS)
+
     def build(
         self, agents: Agents, sizes: Sizes, default: Callable[[], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
         """(m, states): at rest at y(0), but for what is given."""
+        if self.leaves_open(agents):
+            return np.array(agents.standing)
         y = default() if self.action is None else per_action("action", self.action, sizes)
         state = agents.equilibrium(y)
+        if agents.standing is not None and followed_position(agents.kind) < 0:
+            state = agents.standing.copy()
+            state[:, agents.kind.OUTPUT] = y
         names = [name for name, _ in agents.kind.STATES]
         placed = placed_state(agents.kind)
         if placed is not None:
@@ -278,7 +287,8 @@ class SystemTable(Table):
             game, _ = self._parts(simulation)
         try:
             built = self.build(name, simulation)
-            if given is None and self.game.default_start(self.agents.count) is None:
+            default = self.game.default_start(self.agents.count)
+            if given is None and default is None and not self.initial.leaves_open(built.agents):
                 return built, {"why": "no start is given", "action": built.start.tolist()}
             return built, None
         except InfeasibleStart as error:
@@ -314,7 +324,9 @@ class SystemTable(Table):
         """The game, with its margin, and the agents."""
         game = self._game()
         with part_of("agents"):
-            agents = self.agents.build(game.sizes)
+            built = self.agents.build(game.sizes)
+        integrator = self.plant.integrator or simulation.integrator
+        agents = built.stood(simulation.timestep, integrator)
         disturbance = self._disturbance(game)
         if disturbance is None:
             return game, agents
@@ -327,7 +339,6 @@ class SystemTable(Table):
         period = simulation.control_period or simulation.timestep
         with named(period="simulation.control_period", observer="controller.observer"):
             guarded = self.controller.between == GUARDED
-            integrator = self.plant.integrator or simulation.integrator
             steps = max(1, round(period / simulation.timestep))
             unforeseen = beyond_estimates(
                 agents, simulation.timestep, integrator, steps, disturbance,
@@ -372,6 +383,8 @@ class SystemTable(Table):
         sizes, initial = game.sizes, self.initial
         with part_of("initial"):
             state = initial.build(agents, sizes, lambda: self._default_start(game))
+            if initial.leaves_open(agents):
+                check_standing(game, state[:, agents.kind.OUTPUT])
             filtered = initial.filtered
             memory = law.initial_memory(
                 state[:, agents.kind.OUTPUT],
@@ -379,6 +392,21 @@ class SystemTable(Table):
                 None if filtered is None else per_action("filtered", filtered, sizes),
             )
         return state, memory
+
+
+def check_standing(game: Game, y: NDArray[np.float64]) -> None:
+    """Refuse agents of whose start nothing is given, and that stand outside.
+
+    Raises:
+        InvalidInput: names ``action``.
+    """
+    worst, value = game.tightest(y)
+    if not value < 0.0:
+        raise InvalidInput(
+            "action", None, f"in their keyframe, or settled, agents' outputs are"
+            f" {np.round(y[:6], 4).tolist()}, where constraint '{game.constraint_names[worst]}' has"
+            f" g = {value:.3g} and not less than 0: give one inside, or let them start elsewhere",
+        )  # fmt: skip
 
 
 def _by_agent(y: NDArray[np.float64], sizes: Sizes) -> Any:
