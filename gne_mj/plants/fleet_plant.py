@@ -74,11 +74,7 @@ class FleetPlant(Plant):
         joint = self.model.dof_jntid[dof]
         free = self.model.jnt_type[joint] == kinds.mjJNT_FREE
         turns = free and dof - self.model.jnt_dofadr[joint] >= 3
-<<<<<<< HEAD
         hinge = int(self.model.jnt_type[joint]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_BALL))
-=======
-        hinge = int(self.model.jnt_type[joint]) in (kinds.mjJNT_HINGE, kinds.mjJNT_BALL)
->>>>>>> 44e8654 (Hands on the page: robots dragged, joints, links lost by a click, V plotted)
         return "N m" if turns or hinge else "N"
 
     @property
