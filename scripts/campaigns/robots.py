@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from campaign import CRASHED, campaign, crash, parser
 
+from gne_mj.registry import GAMES
 from gne_mj.scenario import load_scenario
+from gne_mj.starts import random_starts
 
 ARRIVED = 0.02
 GOOD = ("converged", "completed")
@@ -41,11 +43,11 @@ class Fleet:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
-def speeds(rng: np.random.Generator, tables: Tables) -> Tables:
+def speeds(rng: np.random.Generator, tables: Tables, share: float = 0.95) -> Tables:
     """Speeds within the bounds on gaps, whose steps along the line are uniform."""
     game = tables["game"]
     bounds = np.broadcast_to(game["gap_bound"], tables["agents"]["count"])
-    gaps = rng.uniform(-0.95, 0.95, len(bounds)) * bounds
+    gaps = rng.uniform(-share, share, len(bounds)) * bounds
     return {"action": (game["reference_velocity"] + np.cumsum(gaps)).tolist()}
 
 
@@ -65,6 +67,29 @@ def places(rng: np.random.Generator, tables: Tables) -> Tables:
     return {"action": [point.tolist() for point in points]}
 
 
+def velocities(rng: np.random.Generator, tables: Tables) -> Tables:
+    """Velocities in space about the one to agree on, 50 to 99% of the way to the bounds."""
+    game = GAMES[tables["game"]["type"]].model_validate(tables["game"])
+    count = tables["agents"]["count"]
+    middle = np.tile(tables["game"]["reference_velocity"], count)
+    seed = int(rng.integers(2**31))
+    (found,) = random_starts(game.game(count), middle, [seed], float(rng.uniform(0.5, 0.99)))
+    return {"action": found.reshape(count, -1).tolist()}
+
+
+def in_the_air(rng: np.random.Generator, tables: Tables) -> Tables:
+    """Places in a ball above the floor, all 0.2 m more than the least distance apart."""
+    numbers, apart = tables["game"]["parameters"], tables["separation"]["distance"] + 0.2
+    middle, radius = np.array(numbers["middle"]), 0.95 * numbers["radius"]
+    points: list[np.ndarray] = []
+    while len(points) < tables["agents"]["count"]:
+        point = middle + rng.uniform(-radius, radius, 3)
+        inside = np.linalg.norm(point - middle) < radius and point[2] > numbers["lowest"] + 0.05
+        if inside and all(np.linalg.norm(point - other) > apart for other in points):
+            points.append(point)
+    return {"action": [point.tolist() for point in points]}
+
+
 FLEETS = {
     "cars": Fleet("cars", speeds, load=2.0),
     # mode implicit predicts from the true state, and so allows no noise; sampled observes no loads
@@ -76,6 +101,9 @@ FLEETS = {
     ),
     "cars-apart": Fleet("cars-apart", places, load=1.0),
     "boats": Fleet("boats", places, load=3.0),
+    "drones": Fleet("drones", velocities, load=0.3),
+    "drones-apart": Fleet("drones-apart", in_the_air, load=0.15),
+    "mixed": Fleet("mixed", partial(speeds, share=0.6), load=0.2),
 }
 
 
