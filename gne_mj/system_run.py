@@ -158,8 +158,9 @@ class SystemRun:
         for variable in self._shown:
             rows = instant if variable.instant else self._last
             if variable.name == "lyapunov":  # which the monitor knows of the last step's start
-                known = self.loop.monitor.started and self.system.known_equilibrium is not None
-                found[variable.name] = np.array([self.loop.monitor.storage if known else np.nan])
+                monitor = self.loop.monitor  # by item, as in run_metrics.worst_constraints
+                known = monitor["started"] and self.system.known_equilibrium is not None
+                found[variable.name] = np.array([monitor["storage"] if known else np.nan])
             elif rows is not None:
                 found[variable.name] = variable.source(rows)
         return found

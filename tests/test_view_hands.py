@@ -56,7 +56,7 @@ def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
             page.keyboard.press("f")
             camera = page.evaluate("window.gne.head('robots', 0)")
             drag(page, head(page, 1), (60.0, 0.0))
-            live_wait(lambda n=number: len(live.simulation.interventions) > n)
+            live_wait(lambda n=number: len(live.simulation.interventions) > n, 60.0)
             done = live.simulation.interventions[-1]
             assert (done["agent"], done["duration"]) == (2, 0.4)
             # 5 N are a drag of 50 px along x, which the view shows but for its perspective
@@ -82,7 +82,7 @@ def test_a_finger_pushes_and_a_finger_beside_turns_the_view(page, recorded):
 
         page.locator("#view").scroll_into_view_if_needed()
         stroke(head(page, 4), (-40.0, 0.0))
-        live_wait(lambda: live.simulation.interventions)
+        live_wait(lambda: live.simulation.interventions, 60.0)
         (done,) = live.simulation.interventions
         assert (done["agent"], done["force"]) == (5, pytest.approx(-4.0, rel=0.05))
         before = page.evaluate("window.gne.head('robots', 0)")
@@ -100,7 +100,7 @@ def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
         paused(page)
         here = head(page, 2)
         drag(page, here, (45.0, -30.0))
-        live_wait(lambda: len(live.simulation.interventions) == 2)
+        live_wait(lambda: len(live.simulation.interventions) == 2, 60.0)
         one, other = live.simulation.interventions
         assert (one["axis"], other["axis"], one["time"]) == ("x", "y", other["time"])
         force = 5.0 * np.hypot(45.0, 30.0) / 50.0
@@ -125,7 +125,7 @@ def test_joints_are_read_and_robots_pushed_by_keyboard(page, recorded):
         assert panel.locator("small").all_inner_texts() == [" m", " m/s", " m", " m/s", " N"]
         panel.get_by_label("push robot 3 against its axis").focus()
         page.keyboard.press("Enter")
-        live_wait(lambda: live.simulation.interventions)
+        live_wait(lambda: live.simulation.interventions, 60.0)
         assert live.simulation.interventions[0]["what"] == "robot 3 pushed by -5 N for 0.2 s"
         for width, height in WIDTHS:
             page.set_viewport_size({"width": width, "height": height})
@@ -171,7 +171,7 @@ def test_links_are_lost_by_a_click_and_kept_in_the_scenario(page, recorded):
             page.set_viewport_size({"width": width, "height": height})
             page.keyboard.press("f")
             page.mouse.click(*head(page, 1, 2))
-            live_wait(lambda n=number: len(live.simulation.interventions) > n)
+            live_wait(lambda n=number: len(live.simulation.interventions) > n, 60.0)
             lost = number % 2 == 0
             assert live.simulation.interventions[-1]["link"] == [2, 3]
             assert live.simulation.interventions[-1]["lost"] == lost
@@ -180,7 +180,7 @@ def test_links_are_lost_by_a_click_and_kept_in_the_scenario(page, recorded):
         button = page.locator("#chosen").get_by_label("link with robot 3")
         button.click()
         until(page, "window.gne.state().lost.includes('robots 3-4')")
-        live_wait(lambda: live.simulation.interventions[-1]["lost"])
+        live_wait(lambda: live.simulation.interventions[-1]["lost"], 60.0)
         text = as_done(live.simulation.source, live.simulation.interventions).toml()
         assert tomllib.loads(text)["interventions"][-1]["link"]["agents"] == [3, 4]
         quiet(recorded, *origins(live.server))

@@ -56,7 +56,7 @@ class MujocoLoop(ClosedLoop):
     @property
     def _step(self) -> int:
         """Steps taken; in userdata, so that a state that is set again brings its own time."""
-        return int(self._progress.step)
+        return int(self._progress["step"])  # by item, which costs a part of what attributes do
 
     @property
     def time(self) -> float:

@@ -8,8 +8,10 @@ messages never begin with a "G".
 """
 
 import json
+import math
 import zlib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,22 +57,38 @@ def unpack(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
 
 
 def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled: bool) -> bytes:
-    entries, pieces, offset = [], [], 0
-    for name, array in arrays.items():
-        code = f"{array.dtype.kind}{array.dtype.itemsize}"
+    kinds = tuple(
+        (name, f"{array.dtype.kind}{array.dtype.itemsize}", array.shape)
+        for name, array in arrays.items()
+    )
+    about, ends = _about(kinds, shuffled)
+    header = f'{{"meta": {_encoded(meta)}, "arrays": {about}}}'.encode()
+    head = MAGIC + len(header).to_bytes(4, "little") + header
+    parts = [head, bytes(_aligned(len(head)) - len(head))]
+    for (_, code, _), array, end in zip(kinds, arrays.values(), ends, strict=True):
         piece = array.astype(_DTYPES[code], copy=False).tobytes()
-        mixed = shuffled and array.dtype.itemsize > 1
-        if mixed:
+        if shuffled and array.dtype.itemsize > 1:
             of_entries = np.frombuffer(piece, dtype=np.uint8).reshape(-1, array.dtype.itemsize)
             piece = of_entries.T.tobytes()
+        parts += [piece, bytes(end)]
+    return b"".join(parts)
+
+
+@lru_cache(maxsize=64)
+def _about(
+    kinds: tuple[tuple[str, str, tuple[int, ...]], ...], shuffled: bool
+) -> tuple[str, list[int]]:
+    """What the header says of arrays, and how many zeros follow each; frames ask for the same."""
+    entries, padding, offset = [], [], 0
+    for name, code, shape in kinds:
+        size = int(code[1:]) * math.prod(shape)
+        mixed = shuffled and code[1:] != "1"
         entries.append(
-            {"name": name, "dtype": code, "shape": array.shape, "offset": offset, "shuffled": mixed}
+            {"name": name, "dtype": code, "shape": shape, "offset": offset, "shuffled": mixed}
         )
-        pieces.append(piece + bytes(_aligned(len(piece)) - len(piece)))
-        offset += len(pieces[-1])
-    header = _encoded({"meta": meta, "arrays": entries}).encode()
-    head = MAGIC + len(header).to_bytes(4, "little") + header
-    return b"".join([head, bytes(_aligned(len(head)) - len(head)), *pieces])
+        padding.append(_aligned(size) - size)
+        offset += _aligned(size)
+    return _encoded(entries), padding
 
 
 def _aligned(length: int) -> int:
