@@ -146,7 +146,7 @@ class MjcfPlant(FleetPlant):
         self._terms: list[Term] = []  # of all outputs that are no joint's
         with named(input="agents.input", output="agents.output"):
             self._driving = driving(self.model, self.data, agents)
-            self.controls = fleet_controls(self.model, self.data, agents, controllers)
+            self.low_level = fleet_controls(self.model, self.data, agents, controllers)
         flat = np.array(
             [self._place(i, robot) for i, robot in enumerate(agents.robots)], dtype=np.int64
         )
@@ -166,13 +166,13 @@ class MjcfPlant(FleetPlant):
 
     def _sizes(self, lookahead: int) -> NDArray[np.int64]:
         """What compiled code has in SIZES."""
-        terms = [*self._terms, *self.controls.terms]
-        controls = self.controls.behind(
+        terms = [*self._terms, *self.low_level.terms]
+        controls = self.low_level.behind(
             len(self._terms), lookahead + len(terms) + len(self._driving.factors)
         )
         functions = [
             step_address(name) if name else 0
-            for names in (self._refreshing, fresh_by(self.controls.terms))
+            for names in (self._refreshing, fresh_by(self.low_level.terms))
             for name in (names or ("", "", ""))
         ]
         prediction = Prediction(
@@ -195,9 +195,9 @@ class MjcfPlant(FleetPlant):
     def _numbers(self, agents: Agents) -> NDArray[np.float64]:
         """tau, d and v_0 of each channel, nothing where outputs are velocities; then factors, of
         readings and of drives, and the controllers' numbers."""
-        factors = [term.factor for term in (*self._terms, *self.controls.terms)]
+        factors = [term.factor for term in (*self._terms, *self.low_level.terms)]
         return np.concatenate(
-            [np.ravel(agents.parameters), factors, self._driving.factors, self.controls.numbers]
+            [np.ravel(agents.parameters), factors, self._driving.factors, self.low_level.numbers]
         )
 
     def model_fields(
@@ -214,7 +214,7 @@ class MjcfPlant(FleetPlant):
     @property
     def state_bits(self) -> int:
         """See the base class; controllers keep in userdata what they began with."""
-        return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self.controls.controllers)
+        return STATE | int(mujoco.mjtState.mjSTATE_USERDATA) * bool(self.low_level.controllers)
 
     @property
     def lets_through(self) -> NDArray[np.float64]:
@@ -308,7 +308,7 @@ class MjcfPlant(FleetPlant):
     @property
     def limits_met(self) -> dict[int, dict[str, float]]:
         """See the base class."""
-        return limits_met(self.data, self.controls)
+        return limits_met(self.data, self.low_level)
 
     def controls(self, u: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Write into out (nu,) what inputs u (m,) make of the controls that follow from them."""
@@ -321,7 +321,7 @@ class MjcfPlant(FleetPlant):
         given = np.array(u, dtype=np.float64)
         self._driving.set(self.data.ctrl, given)
         with callbacks(passive=self.passive):
-            if self.controls.controllers:
+            if self.low_level.controllers:
                 _driven_steps()(self.model._address, self.data._address, block, given, steps)
                 raise_pending()
             else:

@@ -240,7 +240,7 @@ def _check_apart(plant: MjcfPlant) -> None:
 def _begin(plant: MjcfPlant, moving: bool) -> None:
     """Let low-level controllers begin here, but for ``moving`` memories that have settled."""
     memory = plant.data.act.copy()
-    begin(plant.data, plant.controls, plant.read)
+    begin(plant.data, plant.low_level, plant.read)
     if moving:
         plant.data.act[:] = memory
 
