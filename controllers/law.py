@@ -192,7 +192,7 @@ class Law(ABC):
         numbers[settings.RHO] = rho
         numbers[settings.GAIN], numbers[settings.RATE] = self.gain, self.estimate_rate
         numbers[settings.LINKS] = 0.0
-        numbers[settings.OBSERVER] = 0.0
+        numbers[settings.OBSERVER] = numbers[settings.COMPENSATION] = 0.0
         numbers[settings.BESIDES] = self.sent_besides
         numbers[settings.GUARDED] = float(self.guarded)
         numbers[settings.OUTSIDE] = settings.ENDS if self.acts_outside else settings.NO_ACTION

@@ -14,7 +14,8 @@ FAST_WEIGHT = 8  # omega of W = V + omega V_fast, under the fully distributed la
 OBSERVER = 9  # gain of the observer of loads, mode implicit; 0: there is none
 OUTSIDE = 10  # what a law does outside the set, one of the following
 BESIDES = 11  # entries of each of two rows that agents send besides their estimates
-COUNT = 12
+COMPENSATION = 12  # 1: inputs begin at what keeps outputs where they are, mode implicit
+COUNT = 13
 
 # It has no action there; it has one, but the run ends; it has one, and the run goes on
 NO_ACTION, ENDS, GOES_ON = 0.0, 1.0, 2.0

@@ -51,6 +51,11 @@ class LawTable(Table):
         description="mode implicit: gain of each agent's observer of loads, the part of what was"
         " not predicted that it takes for one; 0: none",
     )
+    compensation: bool = Field(
+        False,
+        description="mode implicit, MJCF robots: add the input that holds the outputs against what"
+        " the files have of gravity, drag and friction, so that these do not shift the equilibrium",
+    )
 
     @abstractmethod
     def build(self, game: Game) -> Law:

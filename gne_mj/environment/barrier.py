@@ -59,8 +59,8 @@ def barrier_of(
     with part_of("system"):
         found = replace(
             system, law=Pulled(), mode="implicit", memory=np.zeros(system.game.actions),
-            schedule=None, feed_forward=False, observer=0.0, load=None, between=between,
-            decentralised=decentralised,
+            schedule=None, feed_forward=False, observer=0.0, compensation=False,
+            load=None, between=between, decentralised=decentralised,
         )  # fmt: skip
     setup = found.setup(clock)
     mode_of(found).try_plant(found, plant, clock)

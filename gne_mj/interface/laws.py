@@ -33,6 +33,7 @@ def full_information(
     between: str = "watched",
     feed_forward: bool = False,
     observer: float = 0.0,
+    compensation: bool = False,
 ) -> LawTable:
     """Every agent measures all actions [eq:nonlinFIfeedback].
 
@@ -42,6 +43,8 @@ def full_information(
         between: "guarded" cuts periods of held modes before they lead outside.
         feed_forward: of a game that moves: add the input under which agents stay at y*(t).
         observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
+        compensation: in mode implicit, of MJCF robots: take off what files have of gravity, drag
+            and friction (docs/robots.md).
     """
     return made(FullController, information="full", **locals())
 
@@ -59,6 +62,7 @@ def partial_information(
     between: str = "watched",
     feed_forward: bool = False,
     observer: float = 0.0,
+    compensation: bool = False,
 ) -> LawTable:
     """Costs at estimates that neighbours exchange, a measured barrier [eq:nonlinearPIFeedback].
 
@@ -75,6 +79,8 @@ def partial_information(
         between: "guarded" cuts periods of held modes before they lead outside.
         feed_forward: of a game that moves: add the input under which agents stay at y*(t).
         observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
+        compensation: in mode implicit, of MJCF robots: take off what files have of gravity, drag
+            and friction (docs/robots.md).
     """
     return made(PartialController, information="partial", **locals())
 

@@ -12,6 +12,7 @@ long as the plant does what its map says and the input that is delivered is the 
 import numpy as np
 
 from gne_mj import game_functions as games
+from gne_mj.controllers.settings import COMPENSATION
 from gne_mj.loops import functions
 from gne_mj.loops import monitor as watch
 from gne_mj.loops.feedback import usable
@@ -22,6 +23,8 @@ from gne_mj.native import copy, kernel
 # part of the distance to its bound
 MOST_MAPS = 12
 AGREES = 1e-7
+# Outputs are taken to stay if they move by less, relative to 1 and their size
+KEEPS = 1e-9
 # Where the map is affine in u, a prediction that moves farther than this is checked all the same:
 # the slope has rounding
 FAR = 1e-2
@@ -44,6 +47,8 @@ def act(faults, plant, context, parts, at, state, memory):
     # where the inputs so far lead to
     extrapolate(solver)
     solver.numbers.found += 1.0
+    if parts.problem.settings[COMPENSATION] > 0.0:
+        find_keeping(plant, context, parts.channels, parts.clock, known, solver)
     ended, agreed, least = solve(plant, context, parts, parts.clock, known, memory, solver)
     return settle(parts, at.time, memory, solver, ended, agreed, least)
 
@@ -84,13 +89,15 @@ def solve(plant, context, parts, clock, known, memory, solver):
     ended, agreed, least = OUTSIDE, False, np.inf
     for _ in range(MOST_MAPS):
         for r in range(m):
-            solver.base[r] = solver.reached[r] - solver.slope[r] * solver.u[r]
+            excess = solver.u[r] - solver.keeping[r]
+            solver.base[r] = solver.reached[r] - solver.slope[r] * excess
         ended = functions.solve(problem, memory, work)
         if ended == OUTSIDE:
             break
         farthest = 0.0
         for r in range(m):
-            solver.held[r] = (solver.y[r] - solver.base[r]) * solver.stiff[r]
+            law = (solver.y[r] - solver.base[r]) * solver.stiff[r]
+            solver.held[r] = law + solver.keeping[r]
             farthest = max(farthest, abs(solver.y[r] - solver.reached[r]))
         if farthest < FAR and plant.is_affine(clock):
             agreed = True
@@ -99,7 +106,7 @@ def solve(plant, context, parts, clock, known, memory, solver):
             solver.u[r], solver.held[r] = solver.held[r], solver.u[r]
             solver.prediction[r] = solver.reached[r]
         map_prediction(plant, context, channels, clock, known, solver)
-        least = correct_slopes(solver)
+        least = correct_slopes(solver, solver.held, solver.prediction)
         copy(solver.u, solver.held)
         agreed = agrees(problem, solver)
         if agreed:
@@ -160,15 +167,40 @@ def find_slopes(plant, context, channels, clock, known, solver):
 
 
 @kernel
-def correct_slopes(solver):
-    """Slopes by the secants from (held, ahead) to (u, reached); returns the least one seen.
+def find_keeping(plant, context, channels, clock, known, solver):
+    """Fill solver.keeping, and solver.u, with the input under which outputs stay over the period.
+
+    It begins with the input that was held last: where dry friction keeps outputs at rest, this one
+    does, and the law's part is added to it from period to period until they move.
+    """
+    copy(solver.before, solver.u)
+    map_prediction(plant, context, channels, clock, known, solver)
+    for _ in range(MOST_MAPS):
+        stays = True
+        for r in range(len(solver.u)):
+            solver.trial[r], solver.residual[r] = solver.u[r], solver.reached[r]
+            missing = solver.anchor[r] - solver.reached[r]
+            if abs(missing) > KEEPS * (1.0 + abs(solver.anchor[r])):
+                solver.u[r] += missing * solver.stiff[r]
+                stays = False
+        if stays:
+            break
+        map_prediction(plant, context, channels, clock, known, solver)
+        correct_slopes(solver, solver.trial, solver.residual)
+    copy(solver.u, solver.keeping)
+
+
+@kernel
+def correct_slopes(solver, tried, led):
+    """Slopes by the secants from inputs ``tried`` and the outputs that they ``led`` to to (u,
+    reached); returns the least one seen.
 
     A secant that is not positive is not taken: the equation would not be monotone.
     """
     least = np.inf
     for r in range(len(solver.u)):
-        change = solver.u[r] - solver.held[r]
-        moved = solver.reached[r] - solver.prediction[r]
+        change = solver.u[r] - tried[r]
+        moved = solver.reached[r] - led[r]
         # of a short way rounding is all that is seen
         if abs(moved) > 1e-9 * (1.0 + abs(solver.reached[r])) and change != 0.0:
             secant = moved / change

@@ -10,7 +10,7 @@ that is solved for is the load's and the agent's together, so that
 Estimates are behind the law's memory, one a channel.
 """
 
-from gne_mj.controllers.settings import OBSERVER
+from gne_mj.controllers.settings import COMPENSATION, OBSERVER
 from gne_mj.loops import implicit
 from gne_mj.loops import monitor as watch
 from gne_mj.native import copy, kernel
@@ -65,6 +65,8 @@ def act(faults, plant, context, parts, at, state, memory):
         observe(parts, at.time, loads, solver)
     implicit.extrapolate(solver)
     solver.numbers.found += 1.0
+    if parts.problem.settings[COMPENSATION] > 0.0:
+        implicit.find_keeping(plant, context, parts.channels, parts.clock, known, solver)
     ended, agreed, least = implicit.solve(plant, context, parts, parts.clock, known, memory, solver)
     good = implicit.settle(parts, at.time, memory, solver, ended, agreed, least)
     take_off(loads, work.commanded)

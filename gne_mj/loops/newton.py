@@ -65,6 +65,8 @@ class InputSolver(NamedTuple):
     held: Annotated[np.ndarray, "m"]
     before: Annotated[np.ndarray, "m"]
     earlier: Annotated[np.ndarray, "m"]
+    # the input under which outputs would stay, with compensation; else zero
+    keeping: Annotated[np.ndarray, "m"]
     base: Annotated[np.ndarray, "m"]
     reached: Annotated[np.ndarray, "m"]  # predicted outputs under an input
     u: Annotated[np.ndarray, "m"]  # that input

@@ -228,6 +228,7 @@ class SystemTable(Table):
             decentralised=self.controller.decentralised,
             between=self.controller.between,
             observer=self.controller.observer,
+            compensation=self.controller.compensation,
             load=self._load(game),
             membership=self._membership(game),
             feed_forward=self.controller.feed_forward,

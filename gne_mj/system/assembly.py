@@ -12,7 +12,7 @@ from gne_mj.barrier import unchanging
 from gne_mj.changing_graph import ChangingGraph
 from gne_mj.controllers import no_memory
 from gne_mj.controllers.propagation import Propagator
-from gne_mj.controllers.settings import GOES_ON, GUARDED, LINKS, OBSERVER, OUTSIDE
+from gne_mj.controllers.settings import COMPENSATION, GOES_ON, GUARDED, LINKS, OBSERVER, OUTSIDE
 from gne_mj.errors import InvalidInput, named
 from gne_mj.faults import for_native, sensor_delay, strikes_messages
 from gne_mj.feed_forward import FeedForward, feed_forward
@@ -211,6 +211,7 @@ class Assembly(SystemData):
         if strikes_messages(self.faults):
             settings[LINKS] = len(self.memory)
         settings[OBSERVER] = self.observer
+        settings[COMPENSATION] = float(self.compensation)
         if self.goes_on:
             settings[OUTSIDE] = GOES_ON
         if self.game.private:  # which others can push an agent out of

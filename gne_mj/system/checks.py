@@ -81,6 +81,7 @@ def check_parts(system: SystemData) -> None:
             f" {system.agents.kind.NAME}s have in MuJoCo only",
         )  # fmt: skip
     check_feed_forward(system)
+    check_compensation(system)
     mode = mode_of(system)
     mode.check_law(system)
     if system.decentralised and not mode.shares_slack(system):
@@ -110,6 +111,29 @@ def check_feed_forward(system: SystemData) -> None:
     if kind not in known:
         names = " and ".join(f"{each.NAME}s" for each in known)
         raise InvalidInput(key, True, f"in mode '{system.mode}' it is known of {names}")
+
+
+def check_compensation(system: SystemData) -> None:
+    """Refuse to take off what a robot has of drag and friction where it is not predicted.
+
+    Raises:
+        InvalidInput: names ``compensation``.
+    """
+    if not system.compensation:
+        return
+    key = "compensation"
+    if system.mode != "implicit":
+        raise InvalidInput(key, True, "it is what a prediction needs to stay: use mode 'implicit'")
+    if has_ode(system.agents.kind):
+        raise InvalidInput(
+            key, True,
+            "it is for MJCF robots, which files give drag and friction, and not"
+            f" {system.agents.kind.NAME}s",
+        )  # fmt: skip
+    if system.guarded:
+        raise InvalidInput(
+            key, True, "it is not known of periods that are cut: between = 'watched'"
+        )
 
 
 def check_lists(system: SystemData, problem: Problem) -> None:

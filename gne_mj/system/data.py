@@ -70,6 +70,7 @@ class SystemData:
     separation: Separation | None = None
     rtol: float = 1e-6
     observer: float = 0.0
+    compensation: bool = False
     load: NDArray[np.float64] | None = None
     on_exit: str = STOP
     membership: Membership | None = None

@@ -47,6 +47,8 @@ class System(Assembly):
             relative to its greatest magnitude so far.
         observer: mode implicit: gain of each agent's observer of loads (:mod:`gne_mj.loops.loads`),
             0 for none.
+        compensation: mode implicit, robots of a user's: whether the input that keeps outputs
+            where they are is added to the law's (:func:`gne_mj.loops.implicit.find_keeping`).
         membership: who leaves and joins during a run, if anybody does.
         load: (m,) the loads that are known at the start, in the input's unit; 0 if left out.
         on_exit: "stop", or "continue": under a law that acts outside the set (``acts_outside``)
