@@ -15,6 +15,7 @@ PERIODS = (0.02, 0.01, 0.005, 0.002)  # s, the first that fits
 STEPS = (0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
 RESERVE = 0.5  # of the longest stable step
 SPREAD = 2.0  # of dy+/du over states, for an observer (docs/held-inputs.md)
+SHIFTS = 1e-3  # N or N m that holding asks for: less shifts no equilibrium to speak of
 DEVELOPED = 1.5  # power of time with which a response that lags may still grow
 NEAR = 0.8  # of a limit
 SHIFTS = 0.01  # of the wished output: less is not told
@@ -149,6 +150,13 @@ def _controller(found: Found, slopes: Slopes, period: float) -> tuple[dict[str, 
         ]
     reasons = ["mode: implicit, which keeps all bounds at control instants."]
     table: dict[str, Any] = {"information": "full", "mode": "implicit"}
+    asked = float(np.max(np.abs(found.held.input)))
+    if found.held.held and asked > SHIFTS:
+        table["compensation"] = True
+        reasons.append(
+            f"compensation: what the file has of gravity, drag and friction asks for {asked:.3g} at"
+            " the wished output, which else shifts the equilibrium."
+        )
     spread = _spread(slopes, period)
     if spread < SPREAD:
         table["observer"] = 1.0
