@@ -210,5 +210,5 @@ def test_contacts_of_ones_own_robots_are_counted_where_they_can_touch(tmp_path):
 
 def test_a_shipped_robots_file_is_named_and_a_wrong_name_is_told(tmp_path):
     tables = crossing("gne_mj:carr.xml")
-    with pytest.raises(InvalidInput, match=r"file: got 'gne_mj:carr.xml'.*did you mean 'car.xml'"):
+    with pytest.raises(InvalidInput, match=r"file: got 'gne_mj:carr.xml'.*did you mean 'car'"):
         load_scenario(tables).system_objects()

@@ -346,5 +346,5 @@ def test_a_floor_that_all_files_bring_is_seen_once(tmp_path):
     model = plant_of(robot, robot, robot).model
     planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
     seen = [model.geom(geom).name for geom in planes if model.geom_group[geom] == 0]
-    assert len(planes) == 4
+    assert len(planes) == 2  # its own, which is hidden, and theirs
     assert seen == ["robot_1/floor"]

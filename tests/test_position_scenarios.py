@@ -321,7 +321,7 @@ def test_the_page_is_told_of_plans():
     }
     assert shown["velocity-sync"]["plan"] is None
     assert shown["platoon"]["plan"] == {"velocity": [3.0, 0.0], "region": [], "radius": [0.4] * 5}
-    (spacing, place, _) = shown["platoon"]["quantities"]
+    (spacing, place, *_) = shown["platoon"]["quantities"]
     assert spacing["between"] == [None, [1, 2], [2, 3], [3, 4], [4, 5]]
     assert place["between"] == []
     plan = shown["formation"]["plan"]

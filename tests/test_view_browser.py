@@ -134,8 +134,9 @@ def test_plots_have_the_bounds_and_all_lines(page, served):
     opened(page, served.url)
     plots = {(p["system"], p["name"]): p for p in page.evaluate("window.gne.plots")}
     assert set(plots) == {
-        ("robots", "action"), ("robots", "gap"), ("robots", "constraint"), ("channels", "action"),
-        ("channels", "total_power"), ("channels", "constraint"),
+        ("robots", "action"), ("robots", "gap"), ("robots", "constraint"), ("robots", "lyapunov"),
+        ("channels", "action"), ("channels", "total_power"), ("channels", "constraint"),
+        ("channels", "lyapunov"),
     }  # fmt: skip
     assert sorted(plots["robots", "gap"]["bounds"]) == [-3, 3]
     assert plots["channels", "total_power"]["bounds"] == [2.5]

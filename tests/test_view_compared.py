@@ -188,7 +188,7 @@ def test_only_what_runs_have_in_common_is_plotted_and_the_rest_is_told(browser, 
     first = ["action", "gap", "constraint"]
     cases = [
         ((runs["first"], fewer), first, "velocity of robot 4, 5 (count = 5)"),
-        ((runs["channels"], planar[1]), ["total_power", "action"], "no variable in common"),
+        ((runs["channels"], planar[1]), ["lyapunov"], "total power (run 1)"),
     ]
     for pair, names, told in cases:
         server = serve(list(pair))
