@@ -75,10 +75,13 @@ class SystemRun:
         plant = getattr(self.loop, "plant", None)
         if has_ode(self.system.agents.kind) or plant is None:
             return []
-        from gne_mj.examination.in_short import doubts  # late: it knows MuJoCo
+        from gne_mj.examination.in_short import doubts  # late: they know MuJoCo
+        from gne_mj.plants.mjcf_file import remarks
 
         steps = self.clock.steps(self.clock.control_period)
-        return doubts(plant, self.system.agents.input_limit, steps)
+        paths = dict.fromkeys(robot.path for robot in plant.agents.files)
+        said = [words for path in paths for words in remarks(path, self.clock.timestep)]
+        return said + doubts(plant, self.system.agents.input_limit, steps)
 
     def step(self) -> Snapshot:
         """One integration step; what is returned is its beginning."""

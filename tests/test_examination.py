@@ -222,6 +222,13 @@ def told(text, **options):
     return found
 
 
+def test_what_a_file_was_made_for_is_told_once_for_two_robots():
+    finer = CART.format(**SOUND).replace("<mujoco>", '<mujoco><option timestep="0.001"/>', 1)
+    (words,) = told(finer)
+    assert words.endswith("was made for steps of 1 ms, and these are 2 ms")
+    assert told(finer, timestep=0.001) == []
+
+
 def test_before_a_run_only_what_is_wrong_is_told():
     """One fault a file; a sound one and one that falls over by itself are nothing to tell."""
     assert told(CART.format(**SOUND)) == []

@@ -16,7 +16,7 @@ from gne_mj.cli.application import app
 from gne_mj.cli.arguments import INDEX, PORT, REPLACE, settings
 from gne_mj.cli.output import Results, tell
 from gne_mj.cli.signals import stopping
-from gne_mj.cli.simulating import is_batch, keep, simulate, source_of, stored
+from gne_mj.cli.simulating import is_batch, keep, simulate, source_of, stored, warn
 from gne_mj.progress import PREPARING, on_terminal, say, telling
 
 if TYPE_CHECKING:
@@ -132,6 +132,7 @@ def watch(
             scenario = load_scenario(source, settings(changes))
             session = Session(scenario, _title(title), speed=factor, port=port or 0, begin=begin)
         page.callback(session.server.close)
+        warn(session.simulation)
         page.enter_context(_announced(session.server.url))
         if begin != "now":
             say(

@@ -53,6 +53,31 @@ def read(path: Path, *, keyframes: bool = False) -> Any:
     return spec
 
 
+def remarks(path: Path, timestep: float) -> list[str]:
+    """What a file's user may want to know before a run, a sentence each.
+
+    Args:
+        path: of the file.
+        timestep: in s, of the run; the file's own, and its integrator, are not used.
+    """
+    heard: list[str] = []
+    with _refusing(path, "read"):
+        mujoco.set_mju_user_warning(heard.append)
+        spec = mujoco.MjSpec.from_file(str(path))
+    said = [
+        f"of {path.name} MuJoCo says: {' '.join(words.split())}"
+        for words in dict.fromkeys(heard)
+        if "settotalmass" not in words  # which is done
+    ]
+    own = spec.option.timestep
+    if timestep > own != mujoco.MjSpec().option.timestep:
+        said.append(
+            f"{path.name} was made for steps of {1e3 * own:g} ms, and these are"
+            f" {1e3 * timestep:g} ms"
+        )
+    return said
+
+
 def _scale_masses(spec: Any, path: Path) -> None:
     """Let a robot have the mass that it asks for (settotalmass), which MuJoCo takes for that of
     all that it compiles, of a whole fleet."""
