@@ -299,7 +299,7 @@ def secant_solver(u, held, reached, prediction):
 
 def test_slopes_become_the_secants_and_the_least_one_is_told():
     solver = secant_solver([1.0, 3.0, 2.0], [0.0, 1.0, 1.0], [4.0, 3.0, 1.0], [2.0, 2.5, 0.75])
-    assert implicit.correct_slopes(solver) == 0.25
+    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == 0.25
     assert solver.slope.tolist() == [2.0, 0.25, 0.25]
     assert solver.stiff.tolist() == [0.5, 4.0, 4.0]
 
@@ -307,7 +307,7 @@ def test_slopes_become_the_secants_and_the_least_one_is_told():
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_a_slope_that_is_not_positive_is_seen_and_not_taken(way):
     solver = secant_solver([1.0, way], [0.0, 0.0], [2.0, -way], [0.0, 0.0])
-    assert implicit.correct_slopes(solver) == -1.0
+    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == -1.0
     assert solver.slope.tolist() == [2.0, 0.5]
     assert solver.stiff.tolist() == [0.5, 2.0]
 
@@ -315,10 +315,10 @@ def test_a_slope_that_is_not_positive_is_seen_and_not_taken(way):
 def test_of_a_short_way_no_secant_is_taken():
     """Rounding is all that is seen, and nothing is known of an input that stayed."""
     solver = secant_solver([1.0, 1.0], [0.0, 1.0], [5.0 + 5e-9, 2.0], [5.0, 1.0])
-    assert implicit.correct_slopes(solver) == np.inf
+    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == np.inf
     assert solver.slope.tolist() == [0.5, 0.5]
     near = secant_solver([1.0], [0.0], [5.0 + 7e-9], [5.0])
-    assert implicit.correct_slopes(near) == pytest.approx(7e-9)
+    assert implicit.correct_slopes(near, near.held, near.prediction) == pytest.approx(7e-9)
 
 
 def test_first_slopes_are_what_a_unit_input_adds():

@@ -99,6 +99,7 @@ def fully_distributed(
     between: str = "watched",
     feed_forward: bool = False,
     observer: float = 0.0,
+    compensation: bool = False,
 ) -> LawTable:
     """Neighbours' messages and nothing else [eq:CenterFeedback].
 
@@ -116,6 +117,8 @@ def fully_distributed(
         between: only "watched": what agents take for the profile is not what a guard would look at.
         feed_forward: only False: nobody knows all of the game.
         observer: in mode implicit, gain of each agent's observer of loads; 0 for none.
+        compensation: in mode implicit, of MJCF robots: take off what files have of gravity, drag
+            and friction (docs/robots.md).
     """
     return made(DistributedController, information="distributed", **locals())
 
