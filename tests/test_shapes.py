@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from gne_mj.viewer.mirror import Mirror
-from gne_mj.viewer.shapes import DrawnPart, Group, capsule, coil, material
+from gne_mj.viewer.shapes import DrawnPart, Group, Sharing, capsule, coil, material
 
 
 def arrays_of(geometry):
@@ -175,3 +175,25 @@ def test_equal_parts_of_an_object_are_shared_and_equal_objects_equal():
     other = DrawnPart("b", capsule(0.1, 0.2), material([0, 0, 1, 1]), np.eye(4))
     scene = Group([parts[0], other]).lower()
     assert (len(scene["geometries"]), len(scene["materials"])) == (2, 2)
+
+
+def test_floors_that_copies_of_a_file_bring_are_drawn_as_one_for_all():
+    """Two robots' floors, 6 m apart along y, are 4 m wide each: together 10 m, in the middle."""
+    plane = '<geom name="{}/floor" type="plane" size="5 2 1" pos="0 {} 0"/>'
+    floors = plane.format("robot_1", 0) + plane.format("robot_2", 6)
+    body = '<body><freejoint/><geom size="0.1"/></body>'
+    mirror = Mirror(model_of(f"<mujoco><worldbody>{floors}{body}</worldbody></mujoco>"))
+    (floor,) = parts_of(mirror, "world").values()
+    assert (floor.geometry["width"], floor.geometry["height"]) == (10.0, 10.0)
+    np.testing.assert_allclose(floor.matrix[:3, 3], [0.0, 3.0, 0.0])
+
+
+def test_the_page_is_sent_a_meshs_numbers_once():
+    mirror, sent = Mirror(model_of(ZOO)), set()
+    whole = [geometry for _, group in mirror.objects for geometry in group.lower()["geometries"]]
+    for again in (False, True):
+        for _, group in mirror.objects:
+            for geometry in Sharing(group, sent).lower()["geometries"]:
+                if "data" in geometry and again:
+                    assert geometry["data"] == {"attributes": {}}
+    assert sent == {geometry["uuid"] for geometry in whole if "data" in geometry}

@@ -15,6 +15,7 @@ from gne_mj.plants.mjcf_fleet import MjcfPlant
 from gne_mj.plants.mujoco import MujocoPlant
 from gne_mj.system import Clock
 from gne_mj.system.data import SystemData
+from gne_mj.viewer.floors import of_the_lane
 from gne_mj.viewer.mirror import Mirror
 
 
@@ -37,6 +38,7 @@ class Fleet:
             prefix=tuple(part for part in name.split("/") if part),
             tinted=[geom for geoms in self._tinted for geom in geoms],
             coils=self._coils,
+            hidden=of_the_lane(plant.model) if isinstance(plant, MjcfPlant) else (),
         )
 
     def qpos(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, kernel
+from gne_mj.viewer.floors import joined
 from gne_mj.viewer.shapes import (
     DrawnPart,
     Group,
     Json,
     Matrix,
+    Sharing,
     coil,
     height_field,
     material,
@@ -58,6 +60,7 @@ class Mirror:
             ``.../tint``, which a viewer can colour.
         coils: names of tendons to draw as helical springs; None: those with a stiffness that run
             straight from one site to another.
+        hidden: names of geoms to leave out.
 
     Attributes:
         items: K paths of what moves: bodies, which have the path of their name, then segments of
@@ -76,6 +79,7 @@ class Mirror:
         prefix: tuple[str, ...] = (),
         tinted: Iterable[str | int] = (),
         coils: Iterable[str] | None = None,
+        hidden: Iterable[str] = (),
     ) -> None:
         self.model = model
         self._data = mujoco.MjData(model)
@@ -100,9 +104,14 @@ class Mirror:
         paths[self._bodies] = self.items[: len(self._bodies)]
         parts: dict[str, list[DrawnPart]] = {}
         tints = {model.geom(name).id for name in tinted}
-        for geom in _shown(model, "geom"):
+        left_out = {model.geom(name).id for name in hidden}
+        shown = [geom for geom in _shown(model, "geom") if geom not in left_out]
+        floors = joined(model, self._data, shown)
+        for geom in shown:
             path = paths[model.geom_bodyid[geom]] + ("/tint" if geom in tints else "")
-            parts.setdefault(path, []).extend(self._parts("geom", geom))
+            drawn = self._floor(geom, floors[geom]) if geom in floors else self._parts("geom", geom)
+            if drawn:
+                parts.setdefault(path, []).extend(drawn)
         for site in _shown(model, "site"):
             parts.setdefault(paths[model.site_bodyid[site]], []).extend(self._parts("site", site))
         coiled = self._springs() if coils is None else {model.tendon(name).id for name in coils}
@@ -152,10 +161,16 @@ class Mirror:
             _stretch(poses, rows, data.wrap_xpos.reshape(-1, 3), starts, starts + 1, 0.0)
         return poses
 
-    def draw(self, visualizer: Any) -> None:
-        """Draw everything, at the model's reference position, into a ``meshcat.Visualizer``."""
+    def draw(self, visualizer: Any, sent: set[str] | None = None) -> None:
+        """Draw everything, at the model's reference position, into a ``meshcat.Visualizer``.
+
+        Args:
+            visualizer: where.
+            sent: what the package's own page has already, see :class:`.shapes.Sharing`; None for
+                any other, which is sent all that is drawn.
+        """
         for path, content in self.objects:
-            visualizer[path].set_object(content)
+            visualizer[path].set_object(content if sent is None else Sharing(content, sent))
         self.set_poses(visualizer, self.poses(self.model.qpos0))
 
     def set_poses(self, visualizer: Any, poses: NDArray[np.float64]) -> None:
@@ -204,6 +219,29 @@ class Mirror:
             at[:3, :3], at[:3, 3] = place.xmat.reshape(3, 3), place.xpos
         return [DrawnPart(element.name or f"{what}_{number}", geometry, surface, at @ own)]
 
+    def _floor(self, geom: int, place: tuple[Any, Any] | None) -> list[DrawnPart]:
+        """A plane that never moves, at the middle and of the size that are given; none for None."""
+        if place is None:
+            return []
+        middle, size = place
+        element, at = self.model.geom(geom), np.eye(4)
+        at[:3, :3], at[:3, 3] = self._data.geom_xmat[geom].reshape(3, 3), middle
+        surface = self._plane_material(element, size)
+        return [DrawnPart(element.name or f"geom_{geom}", plane(size), surface, at)]
+
+    def _plane_material(self, element: Any, size: Any) -> Json:
+        """Of a plane that may be larger than its element; its texture's squares stay as large."""
+        model, matid = self.model, int(element.matid[0])
+        rgba, image = _colours(model, element.rgba[None], element.matid)[0], _image(model, matid)
+        if image < 0:
+            return material(rgba, **FLOOR)
+        repeat, uniform = model.mat_texrepeat[matid], bool(model.mat_texuniform[matid])
+        ends = (element.size[:2] > 0) & (size[:2] > 0)
+        if not uniform:
+            repeat = repeat * np.where(ends, size[:2] / np.where(ends, element.size[:2], 1.0), 1.0)
+        drawn = plane_texture(model, image, size, repeat=repeat, uniform=uniform)
+        return material(rgba, **FLOOR, map=drawn)
+
     def _shape(self, element: Any, number: int) -> tuple[Json, Matrix, Json] | None:
         """Geometry (of mesh or height field ``number``), its own matrix, and material."""
         model, kind, matid = self.model, int(element.type[0]), int(element.matid[0])
@@ -212,12 +250,8 @@ class Mirror:
         more: Json = {}
         match mujoco.mjtGeom(kind):
             case mujoco.mjtGeom.mjGEOM_PLANE:
-                if image >= 0:
-                    repeat, uniform = model.mat_texrepeat[matid], bool(model.mat_texuniform[matid])
-                    more["map"] = plane_texture(
-                        model, image, element.size, repeat=repeat, uniform=uniform
-                    )
-                return plane(element.size), np.eye(4), material(rgba, **FLOOR, **more)
+                surface = self._plane_material(element, element.size)
+                return plane(element.size), np.eye(4), surface
             case mujoco.mjtGeom.mjGEOM_MESH | mujoco.mjtGeom.mjGEOM_SDF:
                 if image >= 0 and model.mesh_texcoordadr[number] >= 0:
                     more["map"] = texture(model, image, model.mat_texrepeat[matid])

@@ -33,7 +33,8 @@ def replay_pack(shown: Shown, title: str | None = None) -> bytes:
 
     Args:
         shown: a trajectory, or :data:`gne_mj.viewer.comparison.MOST` of them at most, to compare.
-        title: of the page; the systems' or runs' names if left out.
+        title: of the page; if left out the scenario's description, or the systems' or runs'
+            names.
 
     Raises:
         InvalidInput: one holds no scenario, or the robots' own files are gone. Its game and law
@@ -47,7 +48,7 @@ def replay_pack(shown: Shown, title: str | None = None) -> bytes:
     recording = _recording(shown, list(scenario.systems))
     scene = Scene(
         shown_systems(shown, scenario),
-        title or ", ".join(scenario.systems),
+        title or scenario.description or ", ".join(scenario.systems),
         scenario.clock().duration,
         values=recording.values,
     )

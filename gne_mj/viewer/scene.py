@@ -66,9 +66,10 @@ class Scene:
 
     def draw(self, visualizer: Any) -> None:
         """Draw all fleets into a ``meshcat.Visualizer``."""
+        sent: set[str] = set()
         for shown_system in self.shown_systems:
             if shown_system.fleet is not None:
-                shown_system.fleet.mirror.draw(visualizer)
+                shown_system.fleet.mirror.draw(visualizer, sent)
 
     def poses(self, values: Mapping[str, Values]) -> NDArray[np.float64]:
         """(T, K, 8) of all items at samples, from the variables of each system by its name."""

@@ -102,6 +102,28 @@ class Group(Object):
         }
 
 
+class Sharing(Object):
+    """Groups whose geometries of many numbers are sent once: the page has them by their identifier.
+
+    Args:
+        group: what is drawn.
+        sent: identifiers of what the page has; what it gets here is added when it is lowered.
+    """
+
+    def __init__(self, group: Group, sent: set[str]) -> None:
+        self.group, self.sent = group, sent
+
+    def lower(self) -> Json:
+        """As of the group; what the page has is there without its numbers."""
+        found = self.group.lower()
+        for geometry in found["geometries"]:
+            if "data" in geometry:
+                if geometry["uuid"] in self.sent:
+                    geometry["data"] = {"attributes": {}}
+                self.sent.add(geometry["uuid"])
+        return found
+
+
 def _identifier(content: object) -> str:
     def of_array(array: Any) -> str:
         return hashlib.sha256(array.data).hexdigest()

@@ -6,15 +6,20 @@ import { THREE } from "./meshcat.js";
 const FEW = 150; // meshes, up to which they are drawn one by one
 const HIDDEN = new THREE.Matrix4().makeScale(0, 0, 0);
 
+const sums = new WeakMap(); // of geometries, which many meshes may share
+
 /**
  * A number that tells apart geometries without parameters.
  * @param {Three} geometry
  */
 const checksum = (geometry) => {
+  if (sums.has(geometry)) return sums.get(geometry);
   const values = geometry.attributes.position?.array || [];
   let sum = 0;
   for (let i = 0; i < values.length; i++) sum += values[i] * ((i % 7) + 1);
-  return `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
+  const found = `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
+  sums.set(geometry, found);
+  return found;
 };
 
 /** @param {Three} mesh */

@@ -174,7 +174,7 @@ export class Page {
     this.meta = meta;
     this.instant = null;
     document.title = `${meta.title} · gne_mj`;
-    byId("title").textContent = meta.title;
+    byId("title").textContent = byId("title").title = meta.title;
     byId("waiting").hidden = true;
     this.comparison.setMeta(meta);
     this.scene.setMeta(meta);

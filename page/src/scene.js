@@ -16,6 +16,7 @@ import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
 
 const FAINT = 0.3; // opacity of what lies over another run
 const BELOW = 0.02; // m from one floor to the next system's, so that none flickers in another
+const FADES = [2.5, 8]; // distances of the camera between which what is far fades
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 
 export class Scene {
@@ -60,6 +61,8 @@ export class Scene {
 
   restyle() {
     this.ground.uniforms.colour.value.set(colour("grid"));
+    // a floor without an end fades into the page and not into a grey line
+    this.viewer.scene.fog = new THREE.Fog(colour("sky-middle"), 1, 2);
     this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
     for (const each of [...this.bars, ...this.plans]) each.restyle();
     this.dimStatics();
@@ -293,6 +296,8 @@ export class Scene {
   render() {
     const { camera, layout } = this;
     const { x, y, z } = camera.controls.target;
+    const { fog } = this.viewer.scene;
+    [fog.near, fog.far] = FADES.map((times) => times * Math.max(camera.arm().distance, 5));
     this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
     camera.render();
   }

@@ -41,7 +41,9 @@ const folder = () => ({
 export const viewerIn = (pane, changed) => {
   const viewer = new Viewer(pane, false);
   const set = viewer.set_object.bind(viewer);
+  const share = sharing();
   viewer.set_object = (/** @type {string[]} */ path, /** @type {Three} */ object) => {
+    object.traverse?.(share);
     set(path, object);
     changed(); // one with a texture comes only when its image is loaded
   };
@@ -58,6 +60,25 @@ export const viewerIn = (pane, changed) => {
   viewer.hide_background(); // the page's own shines through
   light(viewer.scene);
   return viewer;
+};
+
+/** Meshes with many numbers are sent once, and again as their identifier alone. */
+const sharing = () => {
+  /** @type {Map<string, Three>} */
+  const known = new Map();
+  /** @type {Map<string, Three[]>} */
+  const waiting = new Map(); // meshes that came before what they have in common
+  return (/** @type {Three} */ mesh) => {
+    const { geometry } = mesh;
+    if (geometry?.type !== "BufferGeometry") return;
+    const { uuid } = geometry;
+    if (geometry.attributes.position) {
+      known.set(uuid, geometry);
+      for (const each of waiting.get(uuid) ?? []) each.geometry = geometry;
+      waiting.delete(uuid);
+    } else if (known.has(uuid)) mesh.geometry = known.get(uuid);
+    else waiting.set(uuid, [...(waiting.get(uuid) ?? []), mesh]);
+  };
 };
 
 /** @param {Three} scene */

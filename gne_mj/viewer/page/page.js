@@ -5667,11 +5667,15 @@
   // src/batches.js
   var FEW = 150;
   var HIDDEN = new THREE.Matrix4().makeScale(0, 0, 0);
+  var sums = /* @__PURE__ */ new WeakMap();
   var checksum = (geometry) => {
+    if (sums.has(geometry)) return sums.get(geometry);
     const values = geometry.attributes.position?.array || [];
     let sum = 0;
     for (let i = 0; i < values.length; i++) sum += values[i] * (i % 7 + 1);
-    return `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
+    const found = `${values.length} ${geometry.index?.count ?? 0} ${sum}`;
+    sums.set(geometry, found);
+    return found;
   };
   var signature = ({ geometry, material: m }) => {
     const shape = geometry.parameters ? JSON.stringify(geometry.parameters) : checksum(geometry);
@@ -5802,7 +5806,9 @@
   var viewerIn = (pane, changed) => {
     const viewer = new Viewer(pane, false);
     const set = viewer.set_object.bind(viewer);
+    const share = sharing();
     viewer.set_object = (path, object) => {
+      object.traverse?.(share);
       set(path, object);
       changed();
     };
@@ -5818,6 +5824,21 @@
     viewer.hide_background();
     light2(viewer.scene);
     return viewer;
+  };
+  var sharing = () => {
+    const known = /* @__PURE__ */ new Map();
+    const waiting = /* @__PURE__ */ new Map();
+    return (mesh2) => {
+      const { geometry } = mesh2;
+      if (geometry?.type !== "BufferGeometry") return;
+      const { uuid } = geometry;
+      if (geometry.attributes.position) {
+        known.set(uuid, geometry);
+        for (const each of waiting.get(uuid) ?? []) each.geometry = geometry;
+        waiting.delete(uuid);
+      } else if (known.has(uuid)) mesh2.geometry = known.get(uuid);
+      else waiting.set(uuid, [...waiting.get(uuid) ?? [], mesh2]);
+    };
   };
   var light2 = (scene) => {
     const sky = new THREE.HemisphereLight(16777215, 8949920, 0.72);
@@ -6569,6 +6590,7 @@
   // src/scene.js
   var FAINT2 = 0.3;
   var BELOW2 = 0.02;
+  var FADES = [2.5, 8];
   var AGAIN2 = 500;
   var Scene = class {
     /** @param {HTMLElement} pane */
@@ -6602,6 +6624,7 @@
     }
     restyle() {
       this.ground.uniforms.colour.value.set(colour("grid"));
+      this.viewer.scene.fog = new THREE.Fog(colour("sky-middle"), 1, 2);
       this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
       for (const each of [...this.bars, ...this.plans]) each.restyle();
       this.dimStatics();
@@ -6812,6 +6835,8 @@
     render() {
       const { camera, layout } = this;
       const { x, y, z } = camera.controls.target;
+      const { fog } = this.viewer.scene;
+      [fog.near, fog.far] = FADES.map((times) => times * Math.max(camera.arm().distance, 5));
       this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
       camera.render();
     }
@@ -7857,7 +7882,7 @@
       this.meta = meta;
       this.instant = null;
       document.title = `${meta.title} · gne_mj`;
-      byId("title").textContent = meta.title;
+      byId("title").textContent = byId("title").title = meta.title;
       byId("waiting").hidden = true;
       this.comparison.setMeta(meta);
       this.scene.setMeta(meta);
