@@ -43,6 +43,7 @@ def drag(page, at, by):
     page.mouse.up()
 
 
+@pytest.mark.slow  # a browser at several widths
 def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
     with session() as live:
         opened(page, live.server.url)
@@ -110,6 +111,7 @@ def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+@pytest.mark.slow  # a browser at several widths
 def test_joints_are_read_and_robots_pushed_by_keyboard(page, recorded):
     with session() as live:
         opened(page, live.server.url)
@@ -163,6 +165,7 @@ def test_joints_of_a_replay(page, recorded):
         server.close()
 
 
+@pytest.mark.slow  # a browser at several widths
 def test_links_are_lost_by_a_click_and_kept_in_the_scenario(page, recorded):
     with session(changes=PARTIAL) as live:
         opened(page, live.server.url)
@@ -202,6 +205,7 @@ def test_what_cannot_be_done_is_told_once(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+@pytest.mark.slow  # a browser at several widths
 def test_labels_make_way_and_the_selector_agrees_with_the_view(page, recorded):
     trajectory = gne_mj.run("paper", {"simulation.duration": 1.0})
     server = serve(trajectory)
