@@ -119,6 +119,23 @@ POWER = Variable(
 )
 
 
+PARTIAL = {"information": "partial", "graph": "line", "coupling": 5.0, "time_constant": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes"),
+    [
+        ("velocity-sync", {"plant.engine": "ode"}),
+        ("velocity-sync", {"plant.engine": "ode", "controller": PARTIAL}),
+    ],
+)
+def test_recorded_v_is_the_monitors(scenario, changes):
+    run = gne_mj.run(scenario, {**SHORT, **changes})
+    ((name, report),) = run.reports.items()
+    seen, recorded = report["lyapunov"], run[name]["lyapunov"].to_numpy()
+    assert recorded[[0, -1]] == pytest.approx([seen["start"], seen["final"]], rel=1e-9)
+
+
 @pytest.fixture
 def more(monkeypatch):
     monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, POWER))

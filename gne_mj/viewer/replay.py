@@ -272,9 +272,18 @@ def _lean(name: str, array: NDArray[Any]) -> NDArray[Any]:
     """What is looked at only, with the digits that can be seen; poses as they are."""
     if name.startswith("pose") or array.dtype.kind != "f" or name == "time":
         return array
-    return _rounded(
-        array.astype(np.float32), bits=9 if name.endswith(("/estimate", "/joints")) else 0
-    )
+    if name.endswith("/joints"):  # shown with three digits behind the point
+        return _to_multiples(array, 2.0**-10).astype(np.float32)
+    if name.endswith("/share"):
+        near = _to_multiples(array, 2.0**-11)
+        crossed = (near > 1.0) != (array > 1.0)  # what is outside stays so
+        return np.where(crossed, array, near).astype(np.float32)
+    return _rounded(array.astype(np.float32), bits=9 if name.endswith("/estimate") else 0)
+
+
+def _to_multiples(array: NDArray[np.floating[Any]], unit: float) -> NDArray[np.floating[Any]]:
+    """The nearest multiples of a power of two: few binary digits, which compress."""
+    return np.round(array / unit) * unit
 
 
 def _rounded(array: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
