@@ -13,11 +13,14 @@ from gne_mj import graph as graphs
 from gne_mj.controllers import PartialInformation
 from gne_mj.errors import EngineError, InfeasibleStart, InvalidInput
 from gne_mj.faults import Push
+from gne_mj.plants import mjcf_position
 from gne_mj.scenario import load_scenario, scenario_of, shipped
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock
 from gne_mj.toml_text import toml_text
 from gne_mj.trajectory import Trajectory
+from gne_mj.viewer.joints import Joints
+from gne_mj.viewer.shown_system import ShownSystem
 
 CLOCK = Clock(duration=4.0, timestep=0.01, control_period=0.01, sample_period=0.1)
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -283,6 +286,27 @@ def test_all_joints_of_own_robots_are_recorded():
     assert np.array_equal(
         data["configuration"].to_numpy()[:, at[known]], data["position"].to_numpy()[:, known]
     )
+
+
+def test_joints_on_a_page_have_the_units_of_what_they_do():
+    """Rotors push, though their drag turns."""
+    (drones,) = load_scenario("drones").system_objects()
+    rows = ShownSystem(drones, CLOCK).joints.meta()[0]
+    controls = {row["name"]: row["control"][1] for row in rows if "control" in row}
+    assert set(controls.values()) == {"N"}
+    assert len(controls) == 4
+
+
+def test_a_position_with_a_look_ahead_is_no_joints_velocity():
+    scenario = load_scenario(EXAMPLES / "robot" / "scenario.toml", {"simulation.duration": 0.1})
+    (known,) = scenario.system_objects()
+    values = {"action": np.full((1, 4), 7.0)}
+    fleet = ShownSystem(known, CLOCK).fleet
+    values["configuration"] = fleet.plant.data.qpos[None]
+    assert np.any(Joints(fleet).recorded(values) == 7.0)
+    plant = fleet.plant
+    plant.agents = replace(plant.agents, kind=mjcf_position, parameters=np.ones((4, 3)))
+    assert not np.any(Joints(fleet).recorded(values) == 7.0)
 
 
 PLANNED = [

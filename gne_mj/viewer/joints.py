@@ -50,7 +50,8 @@ class Joints:
         qpos = self._fleet.qpos(values)
         qvel, ctrl = np.full((len(qpos), model.nv), np.nan), np.full((len(qpos), model.nu), np.nan)
         at = plant.output_joints
-        qvel[:, at[at >= 0]] = values["action"].reshape(len(qpos), -1)[:, at >= 0]
+        if not isinstance(plant, MjcfPlant) or not plant.agents.parameters.size:  # no look-ahead
+            qvel[:, at[at >= 0]] = values["action"].reshape(len(qpos), -1)[:, at >= 0]
         inputs = values.get("input")
         if isinstance(plant, MujocoPlant):
             main, appendage = plant.joints[1]
@@ -111,4 +112,6 @@ def _control_unit(model: mujoco.MjModel, actuator: int) -> str:
     ):  # fmt: skip
         joint = model.actuator_trnid[actuator, 0]
         return "N" if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE else "N m"
-    return "N" if not np.any(model.actuator_gear[actuator, 3:]) else "N m"
+    # a rotor's thrust has its drag's torque besides
+    gear = model.actuator_gear[actuator]
+    return "N m" if np.any(gear[3:]) and not np.any(gear[:3]) else "N"
