@@ -12,6 +12,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from gne_mj.scenario import load_scenario, shipped
 
 STEPS = 3  # of each run
@@ -64,6 +66,11 @@ def _run(scenario: str, changes: dict[str, Any]) -> str:
     simulation = load_scenario(scenario, changes).simulation_object()
     simulation.advance(STEPS)
     simulation.trajectory()
+    simulation.doubts()
+    for run in simulation.runs.values():  # what gne_mj.not_reached asks of runs that do not settle
+        plant = getattr(run.loop, "plant", None)
+        if hasattr(plant, "twin"):
+            plant.twin().step(np.zeros(run.system.agents.channels))
     return scenario
 
 

@@ -150,7 +150,8 @@ def start_apart(
     for _ in range(TRIES):
         state = start(rng, place, agents, margins)
         q, y = state[:, position_robot.POSITION], state[:, position_robot.OUTPUT]
-        if rule.nearest(q, y)[2] > DISTANCE:
+        each = (-1, agents.dimension)
+        if rule.nearest(q.reshape(each), y.reshape(each))[2] > DISTANCE:
             found = state
             break
     return found
