@@ -68,7 +68,7 @@ def _run(scenario: str, changes: dict[str, Any]) -> str:
     simulation.trajectory()
     simulation.doubts()
     for run in simulation.runs.values():  # what gne_mj.not_reached asks of runs that do not settle
-        plant = getattr(run.loop, "plant", None)
+        plant: Any = getattr(run.loop, "plant", None)
         if hasattr(plant, "twin"):
             plant.twin().step(np.zeros(run.system.agents.channels))
     return scenario
