@@ -156,6 +156,7 @@ def test_the_transition_is_that_of_mujoco():
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_what_is_proposed_runs_and_reaches(tmp_path):
     """A file alone: output and input are found, and the recommended scenario settles."""
     file = tmp_path / "cart.xml"

@@ -129,6 +129,7 @@ def test_mode_sampled_holds_as_long_as_that_leads_inside_and_ends_before_it_leav
     assert report["exit"]["at_control_instant"]
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_pushes_within_a_margin_lead_outside_at_no_step():
     """Against an adversary, whichever way it pushes; and what is left out without noise is told."""
     rng, agents = np.random.default_rng(3), robots(UNEQUAL)

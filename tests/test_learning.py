@@ -276,6 +276,7 @@ def test_every_kind_is_kept_inside_by_the_same_input():
     assert isinstance(many, FleetVectorEnv)
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_long_periods_are_cut_before_they_lead_outside():
     """Springs throw robots out between instants of 0.8 s, unless that is foreseen."""
     changes = {

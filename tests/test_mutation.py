@@ -145,6 +145,7 @@ for module in (full_information, partial_information):
 """
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_a_mutant_changes_the_keys_of_what_it_can_be_in(operators, tmp_path):
     copies = importlib.import_module("copies")
     tree = copies.Tree(FOLDER.parent.parent, tmp_path)

@@ -95,6 +95,7 @@ def test_a_load_of_the_files_own_is_told_with_its_size(fault, kind, load):
     assert kind in found["load"]["text"]
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_a_push_is_told_where_nothing_of_the_file_holds():
     found, _ = why(cart(), faults=[gm.push(1.0, agents=[2])])
     assert list(found) == ["load"]

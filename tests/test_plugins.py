@@ -151,6 +151,7 @@ def installed(tmp_path_factory):
     return folder / "site"
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_the_plug_in_of_the_examples_runs(installed):
     done = command(installed, "run", PLUGIN / "scenario.toml", "--json", "--set", "barrier.rho=0.1")
     assert (done.returncode, done.stderr) == (0, "")

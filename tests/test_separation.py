@@ -218,6 +218,7 @@ def test_pairs_that_are_not_near_cannot_come_too_near_within_a_period(seed, axes
                 assert np.linalg.norm(way) >= 0.5 * (R + REACH)
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 @given(seed=seeds, axes=AXES)
 @settings(max_examples=20, deadline=None)
 def test_rows_of_the_equation_are_the_slopes_of_its_differences(balloon, seed, axes):
@@ -362,6 +363,7 @@ def test_continuous_time_is_the_one_of_plain_python():
         np.testing.assert_allclose(row.T, x, atol=1e-7)
 
 
+@pytest.mark.slow  # compiles, or starts programs, for seconds
 def test_in_space_mode_implicit_is_the_one_of_plain_python(balloon):
     """Rigid agents of 2 kg, moved by Euler's steps of MuJoCo's, on their way through the middle."""
     rng, h, M, d, tau = np.random.default_rng(1), 0.01, 2.0, 6.0, 0.5
