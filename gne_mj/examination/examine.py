@@ -44,7 +44,8 @@ class Subject:
     Args:
         file: as messages and scenarios name it.
         robot: one robot, with d channels.
-        output, input: as a scenario has them.
+        output: as a scenario has them.
+        input: likewise.
     """
 
     file: str
@@ -68,7 +69,8 @@ def examine(
     Args:
         path: of the MJCF file.
         file: as the recommended scenario is to name it.
-        output, input: as a scenario's table has them; both proposed if left out.
+        output: as a scenario's table has them; both proposed if left out.
+        input: likewise.
         wished: (d,) outputs that are to be held, 0.5 each if left out.
         passivity: whether to try that, which takes longest.
         progress: told what is looked at.
