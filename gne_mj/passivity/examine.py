@@ -205,7 +205,8 @@ def _level(subject: Subject, extent: Extent, reach: float, tell: Callable[[float
 
 def _words(extent: Extent, owner: NDArray[np.int64]) -> str:
     agents = len(set(owner.tolist()))
-    return f"{extent.trials} trials of {extent.duration:g} s for each of {agents} agents"
+    each = f" for each of {agents} agents" if agents > 1 else ""
+    return f"{extent.trials} trials of {extent.duration:g} s{each}"
 
 
 def _report(
