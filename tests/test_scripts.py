@@ -1,4 +1,4 @@
-"""The commands in scripts/: each makes the environment that it needs."""
+"""The commands in scripts/: each makes the environment that it needs, and campaigns are told."""
 
 import re
 from pathlib import Path
@@ -18,3 +18,10 @@ def test_what_it_installs_is_locked(script):
             names = line.split()[1:]
             assert names
             assert set(names) <= LOCKS, line
+
+
+def test_what_each_campaign_looks_for_is_told():
+    """On the page that CONTRIBUTING.md names."""
+    page = (ROOT / "docs" / "testing.md").read_text()
+    campaigns = {path.name for path in SCRIPTS if path.name.startswith("check-")} - {"check-docs"}
+    assert campaigns == set(re.findall(r"`(check-\w+)", page))
