@@ -27,7 +27,7 @@ def test_a_drone_hovers_on_equal_thrusts_and_each_rotor_turns_it_as_its_place_sa
         np.testing.assert_allclose(data.qacc, expected, atol=1e-9)
 
 
-def test_drones_agree_on_a_velocity_in_wind_and_the_prediction_is_the_run():
+def test_without_wind_drones_agree_on_a_velocity_and_the_prediction_is_the_run():
     still = {"simulation.duration": 4.0, "faults": []}
     report = gm.run("drones", still).reports["drones"]
     assert report["status"] == "converged"

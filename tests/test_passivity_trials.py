@@ -60,16 +60,20 @@ def test_the_ranges_are_those_that_were_tried():
     assert report.to_dict()["ranges"][2]["reach"] == 1e3
 
 
-def test_amplitudes_at_which_outputs_run_away_say_nothing():
+def fragile(most):
+    """Two integrators whose outputs beyond ``most`` are no numbers."""
+
     class Fragile(OdePlant):
         @property
         def output(self):
             y = super().output
-            return np.where(np.abs(y) > 10.0, np.nan, y)
+            return np.where(np.abs(y) > most, np.nan, y)
 
-    report = examine(
-        lambda copies, h: Fragile(integrators(2).repeated(copies), h), 0.02, trials=12, duration=4.0
-    )
+    return lambda copies, h: Fragile(integrators(2).repeated(copies), h)
+
+
+def test_amplitudes_at_which_outputs_run_away_say_nothing():
+    report = examine(fragile(10.0), 0.02, trials=12, duration=4.0)
     assert report.holds
     assert [r.reach for r in report.ranges] == [1.0]
     assert report.examined == 4.0
@@ -77,13 +81,7 @@ def test_amplitudes_at_which_outputs_run_away_say_nothing():
 
 
 def test_a_plant_that_is_no_longer_a_number_ends_its_trials():
-    class Fragile(OdePlant):
-        @property
-        def output(self):
-            y = super().output
-            return np.where(np.abs(y) > 5.0, np.nan, y)
-
-    report = examine(lambda copies, h: Fragile(integrators(2).repeated(copies), h), 0.02)
+    report = examine(fragile(5.0), 0.02)
     assert 0 < report.examined < 20
     assert "run away" in report.message
 

@@ -8,11 +8,13 @@ from law_cases import COUPLING, EPSILON, GAIN, RHO, TAU, act, act_partially, cas
 from gne_mj import graph as graphs
 from gne_mj.controllers import FullInformation, FullyDistributed, PartialInformation
 
-
-@pytest.mark.parametrize(
+DISTRIBUTED_NETWORKS = pytest.mark.parametrize(
     ("kind", "count", "graph"),
     [("velocity", 5, "line"), ("osnr", 10, "ring"), ("osnr", 10, "printed")],
 )
+
+
+@DISTRIBUTED_NETWORKS
 def test_a_distributed_action_depends_on_what_the_agent_has(kind, count, graph):
     """Its own action, filter and estimates: no one else's, no true profile, no true barrier."""
     now, law = case(kind, count), FullyDistributed(graphs.NAMED[graph](count), EPSILON, GAIN)
@@ -29,10 +31,7 @@ def test_a_distributed_action_depends_on_what_the_agent_has(kind, count, graph):
         assert not np.any(np.delete(other_u, i) == np.delete(u, i))
 
 
-@pytest.mark.parametrize(
-    ("kind", "count", "graph"),
-    [("velocity", 5, "line"), ("osnr", 10, "ring"), ("osnr", 10, "printed")],
-)
+@DISTRIBUTED_NETWORKS
 def test_distributed_rates_depend_on_neighbours_messages_only(kind, count, graph):
     """All that is not in a neighbour's message becomes NaN, and not a bit changes."""
     now, law = case(kind, count), FullyDistributed(graphs.NAMED[graph](count), EPSILON, GAIN)
