@@ -194,11 +194,11 @@ def crossing(file):
 
 
 def test_contacts_of_ones_own_robots_are_counted_where_they_can_touch(tmp_path):
+    """Of two balls in one line the distance of their centres tells."""
     file = tmp_path / "ball.xml"
     file.write_text(BALL)
     run = gm.run(crossing(file))
     data, told = run["balls"], run.reports["balls"]["contacts"]
-    # of two balls in one line the distance of their centres tells
     apart = np.abs(data["position"].values[:, 0] - data["position"].values[:, 1]) - 0.6
     assert told["count"] == told["steps"] == np.sum(apart < 0.0) > 10
     assert told["agents"] == [1, 2]

@@ -409,6 +409,7 @@ LINKED = {
 
 
 def test_links_that_were_lost_are_lost_again_by_a_file():
+    """The run of the file that a run by hand leaves has the same bits."""
     simulation = load_scenario("velocity-sync", LINKED).simulation_object()
     simulation.advance(100)
     simulation.link("robots", (1, 0))

@@ -15,8 +15,11 @@ from low_level_robots import (
     fleet,
     quadrotor_law,
 )  # fmt: skip
+from scipy.integrate import solve_ivp
 
 import gne_mj.user_files  # noqa: F401  registers controllers of the user's own
+import reference
+import reference_games
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.games import velocity_game
@@ -78,12 +81,39 @@ def test_a_quadrotor_hovers_and_comes_back_to_its_attitude(tmp_path):
         plant.step(np.zeros(3))
 
 
+def asked(y):
+    """What the law asks three or two agents for at y, by the paper's equations."""
+    game = reference_games.VelocityGame(1.0, np.full(len(y), 2.0))
+    return reference.full_information(game, 0.1, y)
+
+
+def stages(robots, place, heading, step):
+    """A step of Runge and Kutta's of bare robots under the plain law, asked at every stage."""
+    starts = [(data.qpos.copy(), data.qvel.copy()) for _, data in robots]
+    moved = [[(np.zeros(model.nv), np.zeros(model.nv))] for model, _ in robots]
+    for share in (0.0, 0.5, 0.5, 1.0):
+        for (model, data), (qpos, qvel), rates in zip(robots, starts, moved, strict=True):
+            data.qpos[:], data.qvel[:] = qpos, qvel + share * step * rates[-1][1]
+            mujoco.mj_integratePos(model, data.qpos, rates[-1][0], share * step)
+            mujoco.mj_forward(model, data)
+        u = asked(np.array([data.qvel[0] for _, data in robots]))
+        for (model, data), wish, rates in zip(robots, u, moved, strict=True):
+            wishes = np.array([wish, np.nan, np.nan])
+            data.ctrl[:] = quadrotor_law(model, data, wishes, place, heading)
+            mujoco.mj_forward(model, data)
+            rates.append((data.qvel.copy(), data.qacc.copy()))
+    for (model, data), (qpos, qvel), (_, *rates) in zip(robots, starts, moved, strict=True):
+        velocity, acceleration = np.average(rates, axis=0, weights=(1, 2, 2, 1))
+        data.qpos[:], data.qvel[:] = qpos, qvel + step * acceleration
+        mujoco.mj_integratePos(model, data.qpos, velocity, step)
+
+
 MODES = [("rk4", "continuous", 0.002), ("euler", "sampled", 0.02), ("rk4", "implicit", 0.1)]
 
 
 @pytest.mark.parametrize(("integrator", "mode", "period"), MODES)
 def test_quadrotors_in_the_native_loops(tmp_path, integrator, mode, period):
-    """The plain law under the recorded inputs; mode implicit predicts the run's own outputs."""
+    """The plain law, asked at all stages or under the recorded inputs; what implicit predicts."""
     path = tmp_path / "q.xml"
     path.write_text(QUADROTOR)
     agents = MjcfAgents(
@@ -98,6 +128,16 @@ def test_quadrotors_in_the_native_loops(tmp_path, integrator, mode, period):
     states, inputs, _, loop = run_loop(system, 0.002, 100, period)
     if mode == "implicit":
         assert loop.monitor.prediction < 1e-12
+    if mode == "continuous":
+        robots = [bare(path, 0.002) for _ in y]
+        data = robots[0][1]
+        place, heading = data.qpos[:3].copy(), data.xmat[1].reshape(3, 3)[:, 0].copy()
+        for (_, data), speed in zip(robots, y, strict=True):
+            data.qvel[0] = speed
+        for at in states[:, :, 0]:
+            # 16 steps were divided, the law being quick there: to rounding until the first of them
+            assert np.allclose([data.qvel[0] for _, data in robots], at, rtol=0, atol=5e-9)
+            stages(robots, place, heading, 0.002)
     if mode == "sampled":
         model, data = bare(path, 0.002)
         place, heading = data.qpos[:3].copy(), data.xmat[1].reshape(3, 3)[:, 0].copy()
@@ -292,7 +332,7 @@ def test_a_users_own_has_a_memory(tmp_path, text):
 
 @pytest.mark.parametrize(("integrator", "mode", "period"), MODES)
 def test_a_memory_in_the_native_loops(tmp_path, integrator, mode, period):
-    """Both forms give the same run, which mode implicit predicts."""
+    """Both forms give the same run: in continuous time SciPy's; which implicit predicts."""
     (tmp_path / "cart.xml").write_text(CART)
     found = []
     for text in (FRICTIONLESS, FRICTIONLESS_KERNELS):
@@ -309,6 +349,16 @@ def test_a_memory_in_the_native_loops(tmp_path, integrator, mode, period):
         assert mode != "implicit" or loop.monitor.prediction < 1e-12
         found.append(states[:, :, 0])
     assert np.allclose(found[1], found[0], rtol=0, atol=1e-12)
+    if mode == "continuous":
+
+        def rate(_, both):
+            v, memory = both.reshape(2, 2)
+            u = asked(v)
+            return np.ravel([(u + 2.0 * 20.0 * (memory - v) - 1.5 * v) / 2.0, u / 2.0])
+
+        times = 0.002 * np.arange(101)
+        exact = solve_ivp(rate, (0.0, 0.2), [0.3, 0.5] * 2, "DOP853", times, rtol=1e-12, atol=1e-12)
+        assert np.allclose(found[0], exact.y[:2].T, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize(

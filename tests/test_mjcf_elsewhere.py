@@ -50,6 +50,7 @@ def _constraints(y, p):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FLEETS)
 def test_ten_bodies_run_as_fleets_of_four_or_say_what_is_missing(name, capfd):
+    """Those of the table in docs/robots.md; MuJoCo says nothing meanwhile."""
     output, drives, end = FLEETS[name]
     game = gne_mj.game(4, _cost, _constraints, wanted=[0.2, 0.3, 0.4, 0.5], gap=1.0)
     refused = isinstance(end, str)

@@ -135,6 +135,7 @@ def test_a_run_that_is_too_short_says_when_it_would_settle():
 
 
 def test_outputs_that_are_kept_moving_are_told_with_what_moves_them():
+    """A push of 2 N that swings once a second."""
     found, _ = why(cart(), faults=[gm.push(2.0, profile="sine", period=1.0)])
     assert list(found) == ["moving"]
     assert "under push" in found["moving"]["text"]

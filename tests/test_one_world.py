@@ -105,6 +105,7 @@ def by_hand(path, poses, terrain=None):
 
 
 def test_robots_stand_where_their_poses_say(tmp_path):
+    """As in the same world composed by MuJoCo's own functions."""
     path = cart(tmp_path)
     plant = plant_of(path, poses=POSES, contacts="none")
     turned = [np.cos(0.35), 0.0, 0.0, np.sin(0.35)]
@@ -181,6 +182,7 @@ def test_poses_and_a_spacing_do_not_go_together(tmp_path):
 
 
 def test_a_terrain_is_attached_once_and_robots_leave_their_floors_out(tmp_path):
+    """400 steps beside those of the same world composed by MuJoCo's own functions."""
     path, ground = cart(tmp_path), hills(tmp_path)
     places = [[-1.0, -1.0, 0.3], [-1.0, 1.0, 0.3]]
     plant = plant_of(path, poses=places, terrain=str(ground))
@@ -311,6 +313,7 @@ def test_robots_start_in_keyframes_of_their_files(tmp_path):
 
 
 def test_other_velocities_are_those_nearest_to_a_keyframes(tmp_path):
+    """One entry of the keyframe's velocities is the output: all others stay."""
     path = cart(tmp_path, KEYS)
     plant = plant_of(path, count=1, contacts="none", keyframe="home")
     plant.reset([[0.8, 0.0]])
@@ -351,6 +354,7 @@ def test_robots_settle_before_they_start(tmp_path):
 
 
 def test_wheels_roll_where_a_settled_cart_starts_at_a_speed(tmp_path):
+    """They turn at v/r; then bearings brake them, and no tyre slides."""
     plant = plant_of(cart(tmp_path), spacing=1.0, settle=1.5)
     plant.reset([[0.3, 0.0], [-0.2, 0.0]])
     assert np.allclose(plant.state[:, 0], [0.3, -0.2], rtol=0, atol=1e-12)

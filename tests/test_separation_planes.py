@@ -85,6 +85,7 @@ def test_the_old_half_plane_stays_allowed_so_that_there_is_a_next_one(seed, axes
 
 
 def test_in_space_half_planes_turn_as_in_the_plane_that_lies_level_in_it():
+    """And nearly so where it is nearly level."""
     rng = np.random.default_rng(2)
     for _ in range(200):
         a, b = apart_by(rng, 2)

@@ -31,6 +31,7 @@ def test_what_counts_as_broken():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(robots.FLEETS))
 def test_random_runs_end_inside_without_a_contact_and_arrive(name):
+    """By the run's report, and y at its end beside the solver's y*."""
     for index in range(3):
         row = robots.one(name, 0, index)
         assert not robots.broken(row)

@@ -130,6 +130,7 @@ PARTIAL = {"information": "partial", "graph": "line", "coupling": 5.0, "time_con
     ],
 )
 def test_recorded_v_is_the_monitors(scenario, changes):
+    """At the run's two ends, of which the monitor's kernels tell V without any record."""
     run = gne_mj.run(scenario, {**SHORT, **changes})
     ((name, report),) = run.reports.items()
     seen, recorded = report["lyapunov"], run[name]["lyapunov"].to_numpy()

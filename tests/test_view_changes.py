@@ -101,6 +101,7 @@ def test_sliders_follow_what_the_scenario_does():
 
 
 def test_a_slider_resets_no_count_of_messages():
+    """Counts before and after, and their sum beside the report's."""
     event = {"information": "partial", "graph": "ring", "mode": "sampled",
              "communication": {"type": "event", "threshold": 0.05}}  # fmt: skip
     with watched(changes={**ODE, "controller": event}) as (session, page):

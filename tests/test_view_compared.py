@@ -53,6 +53,7 @@ def test_headings_are_what_differs_or_names():
 
 
 def test_runs_are_on_one_clock_and_keep_their_numbers(runs):
+    """At their own samples the numbers of each run's own dataset; after its end none."""
     meta, arrays = unpack(replay_pack(runs))
     time = arrays["time"]
     assert time[0] == 0.0
@@ -71,6 +72,7 @@ def test_runs_are_on_one_clock_and_keep_their_numbers(runs):
 
 
 def test_samples_of_several_clocks_are_merged():
+    """The union of both clocks' multiples, each once."""
     clocks = {"recording.period": 0.02, "simulation.duration": 0.4}
     other = {"recording.period": 0.05, "simulation.duration": 0.4}
     pair = [gne_mj.run("velocity-sync", each) for each in (clocks, other)]
@@ -144,6 +146,7 @@ def drawn(page):
 
 
 def test_two_runs_in_a_browser(page, recorded, runs):
+    """What three.js shows at a time is where the runs' datasets have the robots."""
     server = serve({name: runs[name] for name in ("first", "second")}, "both")
     try:
         opened(page, server.url)

@@ -45,6 +45,7 @@ def drag(page, at, by):
 
 @pytest.mark.slow  # a browser at several widths
 def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
+    """A drag of 60 px is 6 N, whatever the size of the window, and leaves the camera alone."""
     with session() as live:
         opened(page, live.server.url)
         paused(page)
@@ -113,6 +114,7 @@ def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
 
 @pytest.mark.slow  # a browser at several widths
 def test_joints_are_read_and_robots_pushed_by_keyboard(page, recorded):
+    """Cells show MuJoCo's own qpos, qvel and ctrl."""
     with session() as live:
         opened(page, live.server.url)
         paused(page)
@@ -145,6 +147,7 @@ def test_joints_are_read_and_robots_pushed_by_keyboard(page, recorded):
 
 
 def test_joints_of_a_replay(page, recorded):
+    """Cells show what the run's dataset has of that time."""
     trajectory = gne_mj.run("velocity-sync", {"simulation.duration": 1.0})
     data, server = trajectory["robots"], serve(trajectory)
     try:

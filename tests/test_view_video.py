@@ -48,6 +48,7 @@ def saved(page):
 
 
 def test_a_stretch_becomes_a_video(page, recorded, run):
+    """Its elements are read here by RFC 9559, and a browser's own player plays it."""
     server = serve(run, "a paper: two")
     try:
         page.set_viewport_size({"width": 720, "height": 450})
