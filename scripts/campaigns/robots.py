@@ -195,7 +195,7 @@ def report(rows: list[Row]) -> tuple[list[str], int]:
             sum(row["contacts"] for row in ran), sum(row["too_near"] > 0 for row in ran),
             sum(row["away"] <= ARRIVED for row in ran),
             f"{100.0 * max(row['away'] for row in ran):.3g}",
-            f"{min(least, default=np.nan):.5g}", f"{max(settled, default=np.nan):.4g}",
+            f"{min(least):.5g}" if least else "", f"{max(settled, default=np.nan):.4g}",
             f"{sum(row['accurate'] for row in ran)} of {sum(row['solutions'] for row in ran)}",
             sum(row["not_monotone"] for row in ran),
         )  # fmt: skip
