@@ -86,7 +86,7 @@ def test_samples_of_several_clocks_are_merged():
 def test_fleets_in_the_plane_are_beside_each_other_at_all_times(planar):
     meta, arrays = unpack(replay_pack(planar))
     poses = np.tile(arrays["pose_base"], (len(arrays["time"]), 1))
-    poses[:, arrays["pose_columns"]] = arrays["pose_values"].T
+    poses[:, arrays["pose_columns"]] = arrays["pose_values"]
     x = poses.reshape(len(poses), -1, 8)[..., 0]
     ends = []
     for system in meta["systems"]:

@@ -192,7 +192,7 @@ def poses_of(found):
     """(T, K, 8), as the page puts them together."""
     samples = len(found["time"])
     poses = np.tile(found["pose_base"], (samples, 1))
-    poses[:, found["pose_columns"]] = found["pose_values"].T
+    poses[:, found["pose_columns"]] = found["pose_values"]
     return poses.reshape(samples, -1, 8)
 
 

@@ -35,7 +35,7 @@ def comparison_pack(
     names, trajectories = list(named), list(named.values())
     scenarios = [scenario_within(trajectory) for trajectory in trajectories]
     tables = [json.loads(trajectory.source) for trajectory in trajectories]
-    heads = unique(headings(names, tables))
+    heads, abouts = unique(headings(names, tables)), differences(tables)
     alone = all(len(scenario.systems) == 1 for scenario in scenarios)
     systems: list[ShownSystem] = []
     whose: list[int] = []
@@ -52,7 +52,7 @@ def comparison_pack(
             {
                 "name": names[run],
                 "heading": heads[run],
-                "about": differences(tables)[run],
+                "about": abouts[run],
                 "end": max(float(trajectory[name]["time"][-1]) for name in called),
                 # what is compared with what: systems of one name, or the only ones
                 "systems": {new: "" if alone else name for name, new in called.items()},

@@ -2,15 +2,16 @@
 
 Bytes: ``GNE1``, the header's length (unsigned 32 bits, little-endian), the header, zeros up to a
 multiple of 8, the arrays' data. The header is ``{"meta": ..., "arrays": [...]}``; each array has a
-name, dtype, shape and offset into the data. A shuffled array has the first bytes of all its entries
-first, then all second ones and so on, which compresses to a fraction for smooth data. Meshcat's own
-messages never begin with a "G".
+name, dtype, shape and offset into the data. A shuffled array is column after column (over its first
+index), and of all its entries in this order the first bytes come first, then all second ones and so
+on, which compresses to a fraction for data that are smooth in time. Meshcat's own messages never
+begin with a "G".
 """
 
 import json
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -50,9 +51,10 @@ def unpack(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         count = int(np.prod(entry["shape"], dtype=np.int64))
         first = start + entry["offset"]
         raw = np.frombuffer(data, dtype=np.uint8, count=count * kind.itemsize, offset=first)
+        shape = entry["shape"]
         if entry["shuffled"]:
-            raw = np.ascontiguousarray(raw.reshape(kind.itemsize, count).T).reshape(-1)
-        arrays[entry["name"]] = raw.view(kind).reshape(entry["shape"])
+            raw = raw.reshape(kind.itemsize, _columns(shape), -1).T.reshape(-1)
+        arrays[entry["name"]] = raw.view(kind).reshape(shape)
     return header["meta"], arrays
 
 
@@ -68,8 +70,9 @@ def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled:
     for (_, code, _), array, end in zip(kinds, arrays.values(), ends, strict=True):
         piece = array.astype(_DTYPES[code], copy=False).tobytes()
         if shuffled and array.dtype.itemsize > 1:
-            of_entries = np.frombuffer(piece, dtype=np.uint8).reshape(-1, array.dtype.itemsize)
-            piece = of_entries.T.tobytes()
+            of_entries = np.frombuffer(piece, dtype=np.uint8)
+            columns = _columns(array.shape)
+            piece = of_entries.reshape(-1, columns, array.dtype.itemsize).T.tobytes()
         parts += [piece, bytes(end)]
     return b"".join(parts)
 
@@ -89,6 +92,11 @@ def _about(
         padding.append(_aligned(size) - size)
         offset += _aligned(size)
     return _encoded(entries), padding
+
+
+def _columns(shape: Sequence[int]) -> int:
+    """Entries of a row, or 1 where there are none."""
+    return max(math.prod(shape[1:]), 1)
 
 
 def _aligned(length: int) -> int:

@@ -149,7 +149,7 @@ class Recording:
         varies = np.flatnonzero(np.any(poses != poses[:1], axis=0))
         arrays["pose_base"] = poses[0]
         arrays["pose_columns"] = varies.astype(np.int32)
-        arrays["pose_values"] = np.ascontiguousarray(poses[:, varies].T)
+        arrays["pose_values"] = poses[:, varies]
         commands = _Commands()
         scene.draw(commands.visualizer)
         arrays["commands"] = np.frombuffer(b"".join(commands.sent), dtype=np.uint8)

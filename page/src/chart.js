@@ -109,7 +109,7 @@ const valuesOf = (plot, u, low, high) => {
   if (look.values) return look.values;
   if (!look.log) return rangeY(plot, u.height, low, high);
   if (low === null || high === null || !(low > 0)) return [1e-3, 1];
-  return [low / 1.5, high * 1.5];
+  return [Number((low / 1.5).toPrecision(2)), high * 1.5]; // axes write the first
 };
 
 /**

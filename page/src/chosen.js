@@ -3,10 +3,12 @@ import { arrows } from "./arrows.js";
 import { byId, element, press } from "./dom.js";
 import { fixed } from "./words.js";
 /** @import { Page } from "./page.js" */
-/** @import { Agent, Instant, JointRow, Numbers, Scene, System } from "./types.d.ts" */
+/** @import { Agent, Instant, JointRow, Scene, System } from "./types.d.ts" */
 
 const COLUMNS = /** @type {const} */ (["position", "velocity", "control"]);
 const DIGITS = 3; // behind the point
+
+/** @typedef {typeof COLUMNS[number]} Column */
 
 export class Chosen {
   /** @param {Page} page */
@@ -15,7 +17,9 @@ export class Chosen {
     this.panel = byId("chosen");
     /** @type {Agent | null} */
     this.which = null;
-    /** @type {{at: number, unit: string, place: HTMLElement}[]} */
+    this.table = element("div");
+    this.known = ""; // which of the robot's numbers the table has
+    /** @type {{at: number, place: HTMLElement}[]} */
     this.values = [];
     /** @type {{pair: [number, number], button: HTMLElement}[]} */
     this.links = [];
@@ -46,8 +50,8 @@ export class Chosen {
     this.which = which;
     const { system } = this;
     this.panel.hidden = !which || !system;
-    this.values = [];
     this.links = [];
+    this.tabulate([], () => false);
     if (!which || !system) return;
     if (system.joints.length && this.asked !== system.name) {
       this.page.live?.send({ do: "look", system: system.name });
@@ -57,7 +61,7 @@ export class Chosen {
     this.panel.replaceChildren(
       this.head(system, which),
       ...this.pushButtons(system, which),
-      ...this.table(system.joints[which.agent] ?? []),
+      this.table,
       ...this.linkButtons(system, which),
     );
     this.page.slowDue = 0;
@@ -90,37 +94,52 @@ export class Chosen {
    * @param {Agent} which
    */
   pushButtons(system, which) {
-    const { live, playback } = this.page;
-    const { pushing } = this.page.hands;
+    const { pushing, running } = this.page.hands;
     const push = pushing.pushes.get(system.name);
     const can = pushing.waysOf(system, which.agent).some((way) => way);
-    if (!live || playback || !push || !can) return [];
+    if (!running || !push || !can) return [];
     const buttons = arrows(pushing, system, () => which.agent, `${system.agent_name} ${which.agent + 1}`);
     return [element("div", { class: "push-one" }, element("span", { text: "Push" }), ...buttons)];
   }
 
-  /** @param {JointRow[]} rows of joints, then of actuators */
-  table(rows) {
-    const columns = COLUMNS.filter((column) => rows.some((row) => row[column]));
-    if (!columns.length) return [];
-    const cell = (/** @type {JointRow} */ row, /** @type {typeof COLUMNS[number]} */ column) => {
+  /**
+   * The table of what is known of joints and actuators: a replay has not all of their numbers.
+   * @param {JointRow[]} rows of joints, then of actuators
+   * @param {(at: number) => boolean} isKnown
+   */
+  tabulate(rows, isKnown) {
+    const all = rows.flatMap((row) => COLUMNS.flatMap((column) => row[column]?.[0] ?? []));
+    const known = `${all.filter(isKnown)} of ${all.length}`;
+    if (known === this.known) return;
+    this.known = known;
+    this.values = [];
+    const has = (/** @type {JointRow} */ row, /** @type {Column} */ column) =>
+      row[column] !== undefined && isKnown(row[column][0]);
+    const columns = COLUMNS.filter((column) => rows.some((row) => has(row, column)));
+    const cell = (/** @type {JointRow} */ row, /** @type {Column} */ column) => {
       const there = row[column];
-      if (!there) return element("td");
-      const place = element("span", { text: "–" });
-      this.values.push({ at: there[0], unit: there[1], place });
+      if (!there || !isKnown(there[0])) return element("td");
+      const place = element("span");
+      this.values.push({ at: there[0], place });
       return element("td", {}, place, element("small", { text: ` ${there[1]}` }));
     };
-    const body = rows.map((row) =>
-      element(
-        "tr",
-        {},
-        element("th", { scope: "row", text: row.name.replaceAll("_", " ") }),
-        ...columns.map((column) => cell(row, column)),
-      ),
-    );
+    const body = rows
+      .filter((row) => columns.some((column) => has(row, column)))
+      .map((row) =>
+        element(
+          "tr",
+          {},
+          element("th", { scope: "row", text: row.name.replaceAll("_", " ") }),
+          ...columns.map((column) => cell(row, column)),
+        ),
+      );
     const heads = columns.map((text) => element("th", { scope: "col", text }));
     const head = element("tr", {}, element("th", { scope: "col", text: "joint, actuator" }), ...heads);
-    return [element("table", {}, element("thead", {}, head), element("tbody", {}, ...body))];
+    const less = this.values.length < all.length;
+    this.table.replaceChildren(
+      ...(body.length ? [element("table", {}, element("thead", {}, head), element("tbody", {}, ...body))] : []),
+      ...(less ? [element("p", { class: "muted", text: "Its other numbers were not recorded." })] : []),
+    );
   }
 
   /**
@@ -128,10 +147,9 @@ export class Chosen {
    * @param {Agent} which
    */
   linkButtons(system, which) {
-    const { live, playback } = this.page;
-    const { switching } = this.page.hands;
+    const { running, switching } = this.page.hands;
     const own = system.edges.filter((edge) => edge.includes(which.agent + 1));
-    if (!live || playback || system.edges_are !== "messages" || !own.length) return [];
+    if (!running || system.edges_are !== "messages" || !own.length) return [];
     const buttons = own.map((pair) => {
       const other = pair[0] === which.agent + 1 ? pair[1] : pair[0];
       const button = element("button", {
@@ -156,10 +174,11 @@ export class Chosen {
   show(instant) {
     const { which, system } = this;
     if (!which || !system || !instant) return;
-    /** @type {Numbers | undefined} */
-    const numbers = instant.systems[system.name]?.joints;
+    const { joints } = instant.systems[system.name] ?? {};
+    const rows = joints ? (system.joints[which.agent] ?? []) : [];
+    this.tabulate(rows, (at) => Number.isFinite(joints?.[at]));
     for (const { at, place } of this.values) {
-      const text = fixed(numbers ? numbers[at] : NaN, DIGITS);
+      const text = fixed(joints?.[at] ?? NaN, DIGITS);
       if (place.textContent !== text) place.textContent = text;
     }
     for (const { pair, button } of this.links)

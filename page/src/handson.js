@@ -9,11 +9,17 @@ export class HandsOn {
   /** @param {Page} page */
   constructor(page) {
     const { overlay } = page;
+    this.page = page;
     this.pushing = new Pushing(page);
     this.switching = new Switching(page);
     this.chosen = new Chosen(page);
     overlay.hands = this.pushing;
     overlay.links.isLost = (system, pair) => this.switching.isLost(system, pair);
+  }
+
+  /** The simulation that hands act on; none while a replay is shown. */
+  get running() {
+    return this.page.playback ? null : this.page.live;
   }
 
   /** @param {Scene} meta */

@@ -7,7 +7,7 @@
  * @property {keyof typeof TYPES} dtype
  * @property {number[]} shape
  * @property {number} offset into the data
- * @property {boolean} shuffled first bytes of all entries first, then all second ones and so on
+ * @property {boolean} shuffled column after column; first bytes of all entries, then all second ones
  *
  * @typedef {{meta: any, arrays: Entry[]}} Header
  */
@@ -15,17 +15,19 @@
 const TYPES = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
 
 /**
+ * Bytes of an array in the order of its entries.
  * @param {Uint8Array} bytes
  * @param {number} size of an entry
+ * @param {number} columns
  */
-const unshuffled = (bytes, size) => {
-  if (size === 1) return bytes.slice();
-  const n = bytes.length / size;
+const unshuffled = (bytes, size, columns) => {
+  const rows = bytes.length / (size * columns);
   const out = new Uint8Array(bytes.length);
-  for (let byte = 0; byte < size; byte++) {
-    const group = byte * n;
-    for (let k = 0; k < n; k++) out[k * size + byte] = bytes[group + k];
-  }
+  let from = 0;
+  for (let byte = 0; byte < size; byte++)
+    for (let column = 0; column < columns; column++)
+      for (let row = 0; row < rows; row++)
+        out[(row * columns + column) * size + byte] = bytes[from++];
   return out;
 };
 
@@ -52,7 +54,8 @@ export const decodePack = (bytes) => {
     const from = start + entry.offset;
     const raw = bytes.subarray(from, from + count * Type.BYTES_PER_ELEMENT);
     // a copy, as a typed array must begin at a multiple of its item size
-    const own = entry.shuffled ? unshuffled(raw, Type.BYTES_PER_ELEMENT) : raw.slice();
+    const columns = entry.shape.slice(1).reduce((a, b) => a * b, 1);
+    const own = entry.shuffled ? unshuffled(raw, Type.BYTES_PER_ELEMENT, columns) : raw.slice();
     arrays[entry.name] = { data: new Type(own.buffer, 0, count), shape: entry.shape };
   }
   return { meta: header.meta, arrays };

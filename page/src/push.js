@@ -14,6 +14,13 @@ const FULL = 50; // px, a drag of which is the force that is set
 /** @param {Place} a */
 const sizeOf = ({ x, y }) => Math.hypot(x, y);
 
+/**
+ * @param {Place} from
+ * @param {Place} to
+ * @returns {Place}
+ */
+const between = (from, to) => ({ x: to.x - from.x, y: to.y - from.y });
+
 export class Pushing {
   /** @param {Page} page */
   constructor(page) {
@@ -58,7 +65,7 @@ export class Pushing {
     const system = this.page.meta?.systems.find(({ name }) => name === which?.system);
     if (!which || !system) return void (this.pressed = from);
     this.drag = { which, system, from, to: from, up: false };
-    if (!this.page.live || this.page.playback) return; // the camera is turned, or it is chosen
+    if (!this.page.hands.running) return; // the camera is turned, or it is chosen
     event.stopImmediatePropagation(); // else the camera would turn
     byId("pane").setPointerCapture(event.pointerId);
     byId("pane").focus({ preventScroll: true });
@@ -80,11 +87,11 @@ export class Pushing {
     const { drag, pressed } = this;
     const at = this.place(event);
     const from = drag?.from ?? pressed;
-    const still = from !== null && sizeOf({ x: at.x - from.x, y: at.y - from.y }) <= STILL;
+    const still = from !== null && sizeOf(between(from, at)) <= STILL;
     this.abandon();
     if (still && drag) return this.page.hands.chosen.choose(drag.which);
     if (still && from) return this.page.hands.switching.click(from.x, from.y, event.pointerType);
-    if (!drag || !this.page.live || this.page.playback) return;
+    if (!drag || !this.page.hands.running) return;
     event.stopImmediatePropagation();
     drag.to = at;
     const forces = this.forces(drag);
@@ -100,8 +107,7 @@ export class Pushing {
 
   /** Whether a robot is dragged that can be pushed. */
   get pushing() {
-    const { drag } = this;
-    return drag !== null && this.page.live !== null && !this.page.playback;
+    return this.drag !== null && this.page.hands.running !== null;
   }
 
   // ---- forces
@@ -157,7 +163,7 @@ export class Pushing {
     const ways = this.waysOf(system, which.agent);
     const there = [...ways.keys()].filter((k) => ways[k]);
     if (!push || !there.length) return null;
-    const by = { x: to.x - from.x, y: to.y - from.y };
+    const by = between(from, to);
     const force = push.force / FULL;
     const forces = ways.map(() => 0);
     const screen = (/** @type {number} */ k) =>
@@ -195,8 +201,7 @@ export class Pushing {
     const { drag } = this;
     if (!drag || !this.pushing) return;
     const forces = this.forces(drag);
-    const by = { x: drag.to.x - drag.from.x, y: drag.to.y - drag.from.y };
-    if (!forces || sizeOf(by) <= STILL) return;
+    if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
     const { which, system } = drag;
     const force = Math.hypot(...forces);
     const { duration } = /** @type {Push} */ (this.pushes.get(system.name));
@@ -227,7 +232,7 @@ export class Pushing {
       along.x += forces[k] * x;
       along.y += forces[k] * y;
     });
-    const far = Math.hypot(to.x - begun.x, to.y - begun.y) / (sizeOf(along) || 1);
+    const far = sizeOf(between(begun, to)) / (sizeOf(along) || 1);
     return { x: from.x + far * along.x, y: from.y + far * along.y };
   }
 }

@@ -68,8 +68,7 @@ export class Replay {
   fillPoses(i, out) {
     const columns = this.arrays.pose_columns?.data || [];
     const values = this.arrays.pose_values?.data;
-    const T = this.time.length;
-    for (let v = 0; v < columns.length; v++) out[columns[v]] = values[v * T + i];
+    for (let v = 0; v < columns.length; v++) out[columns[v]] = values[i * columns.length + v];
     return out;
   }
 

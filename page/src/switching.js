@@ -59,8 +59,8 @@ export class Switching {
    * @param {string} by mouse, pen or touch
    */
   click(x, y, by) {
-    const { overlay, meta, live, playback } = this.page;
-    if (!live || playback || !overlay.links.shown || !meta) return;
+    const { hands, overlay, meta } = this.page;
+    if (!hands.running || !overlay.links.shown || !meta) return;
     const near = by === "touch" ? NEAR_FINGER : NEAR;
     const found = overlay.links.nearest(meta.systems, x, y, near);
     if (found) this.toggle(found.system, found.edge);
@@ -71,13 +71,13 @@ export class Switching {
    * @param {[number, number]} agents from 1
    */
   toggle(system, agents) {
-    const { live, playback } = this.page;
-    if (!live || playback) return;
+    const { running } = this.page.hands;
+    if (!running) return;
     if (system.edges_are !== "messages") {
       const text = `${system.name}: dashed lines are measurements, so that there is no link to lose.`;
       return notify(text, "info", `link ${system.name}`);
     }
     const lost = !this.isLost(system, agents);
-    live.send({ do: "link", system: system.name, agents, lost });
+    running.send({ do: "link", system: system.name, agents, lost });
   }
 }

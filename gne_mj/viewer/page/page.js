@@ -795,6 +795,8 @@
       this.page = page2;
       this.panel = byId("chosen");
       this.which = null;
+      this.table = element("div");
+      this.known = "";
       this.values = [];
       this.links = [];
       this.asked = "";
@@ -820,8 +822,8 @@
       this.which = which;
       const { system } = this;
       this.panel.hidden = !which || !system;
-      this.values = [];
       this.links = [];
+      this.tabulate([], () => false);
       if (!which || !system) return;
       if (system.joints.length && this.asked !== system.name) {
         this.page.live?.send({ do: "look", system: system.name });
@@ -831,7 +833,7 @@
       this.panel.replaceChildren(
         this.head(system, which),
         ...this.pushButtons(system, which),
-        ...this.table(system.joints[which.agent] ?? []),
+        this.table,
         ...this.linkButtons(system, which)
       );
       this.page.slowDue = 0;
@@ -862,26 +864,34 @@
      * @param {Agent} which
      */
     pushButtons(system, which) {
-      const { live, playback } = this.page;
-      const { pushing } = this.page.hands;
+      const { pushing, running } = this.page.hands;
       const push = pushing.pushes.get(system.name);
       const can = pushing.waysOf(system, which.agent).some((way) => way);
-      if (!live || playback || !push || !can) return [];
+      if (!running || !push || !can) return [];
       const buttons = arrows(pushing, system, () => which.agent, `${system.agent_name} ${which.agent + 1}`);
       return [element("div", { class: "push-one" }, element("span", { text: "Push" }), ...buttons)];
     }
-    /** @param {JointRow[]} rows of joints, then of actuators */
-    table(rows) {
-      const columns = COLUMNS.filter((column) => rows.some((row) => row[column]));
-      if (!columns.length) return [];
+    /**
+     * The table of what is known of joints and actuators: a replay has not all of their numbers.
+     * @param {JointRow[]} rows of joints, then of actuators
+     * @param {(at: number) => boolean} isKnown
+     */
+    tabulate(rows, isKnown) {
+      const all = rows.flatMap((row) => COLUMNS.flatMap((column) => row[column]?.[0] ?? []));
+      const known = `${all.filter(isKnown)} of ${all.length}`;
+      if (known === this.known) return;
+      this.known = known;
+      this.values = [];
+      const has = (row, column) => row[column] !== void 0 && isKnown(row[column][0]);
+      const columns = COLUMNS.filter((column) => rows.some((row) => has(row, column)));
       const cell = (row, column) => {
         const there = row[column];
-        if (!there) return element("td");
-        const place = element("span", { text: "–" });
-        this.values.push({ at: there[0], unit: there[1], place });
+        if (!there || !isKnown(there[0])) return element("td");
+        const place = element("span");
+        this.values.push({ at: there[0], place });
         return element("td", {}, place, element("small", { text: ` ${there[1]}` }));
       };
-      const body = rows.map(
+      const body = rows.filter((row) => columns.some((column) => has(row, column))).map(
         (row) => element(
           "tr",
           {},
@@ -891,17 +901,20 @@
       );
       const heads = columns.map((text2) => element("th", { scope: "col", text: text2 }));
       const head = element("tr", {}, element("th", { scope: "col", text: "joint, actuator" }), ...heads);
-      return [element("table", {}, element("thead", {}, head), element("tbody", {}, ...body))];
+      const less = this.values.length < all.length;
+      this.table.replaceChildren(
+        ...body.length ? [element("table", {}, element("thead", {}, head), element("tbody", {}, ...body))] : [],
+        ...less ? [element("p", { class: "muted", text: "Its other numbers were not recorded." })] : []
+      );
     }
     /**
      * @param {System} system
      * @param {Agent} which
      */
     linkButtons(system, which) {
-      const { live, playback } = this.page;
-      const { switching } = this.page.hands;
+      const { running, switching } = this.page.hands;
       const own = system.edges.filter((edge) => edge.includes(which.agent + 1));
-      if (!live || playback || system.edges_are !== "messages" || !own.length) return [];
+      if (!running || system.edges_are !== "messages" || !own.length) return [];
       const buttons = own.map((pair) => {
         const other = pair[0] === which.agent + 1 ? pair[1] : pair[0];
         const button = element("button", {
@@ -925,9 +938,11 @@
     show(instant) {
       const { which, system } = this;
       if (!which || !system || !instant) return;
-      const numbers = instant.systems[system.name]?.joints;
+      const { joints } = instant.systems[system.name] ?? {};
+      const rows = joints ? system.joints[which.agent] ?? [] : [];
+      this.tabulate(rows, (at) => Number.isFinite(joints?.[at]));
       for (const { at, place } of this.values) {
-        const text2 = fixed(numbers ? numbers[at] : NaN, DIGITS2);
+        const text2 = fixed(joints?.[at] ?? NaN, DIGITS2);
         if (place.textContent !== text2) place.textContent = text2;
       }
       for (const { pair, button } of this.links)
@@ -971,6 +986,7 @@
   var STILL = 6;
   var FULL = 50;
   var sizeOf = ({ x, y }) => Math.hypot(x, y);
+  var between = (from, to2) => ({ x: to2.x - from.x, y: to2.y - from.y });
   var Pushing = class {
     /** @param {Page} page */
     constructor(page2) {
@@ -1008,7 +1024,7 @@
       const system = this.page.meta?.systems.find(({ name }) => name === which?.system);
       if (!which || !system) return void (this.pressed = from);
       this.drag = { which, system, from, to: from, up: false };
-      if (!this.page.live || this.page.playback) return;
+      if (!this.page.hands.running) return;
       event.stopImmediatePropagation();
       byId("pane").setPointerCapture(event.pointerId);
       byId("pane").focus({ preventScroll: true });
@@ -1028,11 +1044,11 @@
       const { drag, pressed } = this;
       const at = this.place(event);
       const from = drag?.from ?? pressed;
-      const still2 = from !== null && sizeOf({ x: at.x - from.x, y: at.y - from.y }) <= STILL;
+      const still2 = from !== null && sizeOf(between(from, at)) <= STILL;
       this.abandon();
       if (still2 && drag) return this.page.hands.chosen.choose(drag.which);
       if (still2 && from) return this.page.hands.switching.click(from.x, from.y, event.pointerType);
-      if (!drag || !this.page.live || this.page.playback) return;
+      if (!drag || !this.page.hands.running) return;
       event.stopImmediatePropagation();
       drag.to = at;
       const forces = this.forces(drag);
@@ -1046,8 +1062,7 @@
     }
     /** Whether a robot is dragged that can be pushed. */
     get pushing() {
-      const { drag } = this;
-      return drag !== null && this.page.live !== null && !this.page.playback;
+      return this.drag !== null && this.page.hands.running !== null;
     }
     // ---- forces
     /**
@@ -1098,7 +1113,7 @@
       const ways = this.waysOf(system, which.agent);
       const there = [...ways.keys()].filter((k2) => ways[k2]);
       if (!push || !there.length) return null;
-      const by = { x: to2.x - from.x, y: to2.y - from.y };
+      const by = between(from, to2);
       const force = push.force / FULL;
       const forces = ways.map(() => 0);
       const screen = (k2) => this.onScreen(
@@ -1140,8 +1155,7 @@
       const { drag } = this;
       if (!drag || !this.pushing) return;
       const forces = this.forces(drag);
-      const by = { x: drag.to.x - drag.from.x, y: drag.to.y - drag.from.y };
-      if (!forces || sizeOf(by) <= STILL) return;
+      if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
       const { which, system } = drag;
       const force = Math.hypot(...forces);
       const { duration } = (
@@ -1174,7 +1188,7 @@
         along2.x += forces[k] * x;
         along2.y += forces[k] * y;
       });
-      const far = Math.hypot(to2.x - begun.x, to2.y - begun.y) / (sizeOf(along2) || 1);
+      const far = sizeOf(between(begun, to2)) / (sizeOf(along2) || 1);
       return { x: from.x + far * along2.x, y: from.y + far * along2.y };
     }
   };
@@ -1239,8 +1253,8 @@
      * @param {string} by mouse, pen or touch
      */
     click(x, y, by) {
-      const { overlay, meta, live, playback } = this.page;
-      if (!live || playback || !overlay.links.shown || !meta) return;
+      const { hands, overlay, meta } = this.page;
+      if (!hands.running || !overlay.links.shown || !meta) return;
       const near = by === "touch" ? NEAR_FINGER : NEAR;
       const found = overlay.links.nearest(meta.systems, x, y, near);
       if (found) this.toggle(found.system, found.edge);
@@ -1250,14 +1264,14 @@
      * @param {[number, number]} agents from 1
      */
     toggle(system, agents) {
-      const { live, playback } = this.page;
-      if (!live || playback) return;
+      const { running } = this.page.hands;
+      if (!running) return;
       if (system.edges_are !== "messages") {
         const text2 = `${system.name}: dashed lines are measurements, so that there is no link to lose.`;
         return notify(text2, "info", `link ${system.name}`);
       }
       const lost = !this.isLost(system, agents);
-      live.send({ do: "link", system: system.name, agents, lost });
+      running.send({ do: "link", system: system.name, agents, lost });
     }
   };
 
@@ -1266,11 +1280,16 @@
     /** @param {Page} page */
     constructor(page2) {
       const { overlay } = page2;
+      this.page = page2;
       this.pushing = new Pushing(page2);
       this.switching = new Switching(page2);
       this.chosen = new Chosen(page2);
       overlay.hands = this.pushing;
       overlay.links.isLost = (system, pair) => this.switching.isLost(system, pair);
+    }
+    /** The simulation that hands act on; none while a replay is shown. */
+    get running() {
+      return this.page.playback ? null : this.page.live;
     }
     /** @param {Scene} meta */
     setMeta(meta) {
@@ -1538,14 +1557,14 @@
 
   // src/pack.js
   var TYPES = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
-  var unshuffled = (bytes, size) => {
-    if (size === 1) return bytes.slice();
-    const n = bytes.length / size;
+  var unshuffled = (bytes, size, columns) => {
+    const rows = bytes.length / (size * columns);
     const out = new Uint8Array(bytes.length);
-    for (let byte = 0; byte < size; byte++) {
-      const group = byte * n;
-      for (let k = 0; k < n; k++) out[k * size + byte] = bytes[group + k];
-    }
+    let from = 0;
+    for (let byte = 0; byte < size; byte++)
+      for (let column = 0; column < columns; column++)
+        for (let row = 0; row < rows; row++)
+          out[(row * columns + column) * size + byte] = bytes[from++];
     return out;
   };
   var isPack = (bytes) => bytes.length > 8 && String.fromCharCode(...bytes.subarray(0, 4)) === "GNE1";
@@ -1561,7 +1580,8 @@
       const count = entry.shape.reduce((a, b) => a * b, 1);
       const from = start + entry.offset;
       const raw = bytes.subarray(from, from + count * Type.BYTES_PER_ELEMENT);
-      const own = entry.shuffled ? unshuffled(raw, Type.BYTES_PER_ELEMENT) : raw.slice();
+      const columns = entry.shape.slice(1).reduce((a, b) => a * b, 1);
+      const own = entry.shuffled ? unshuffled(raw, Type.BYTES_PER_ELEMENT, columns) : raw.slice();
       arrays[entry.name] = { data: new Type(own.buffer, 0, count), shape: entry.shape };
     }
     return { meta: header.meta, arrays };
@@ -2253,8 +2273,7 @@
     fillPoses(i, out) {
       const columns = this.arrays.pose_columns?.data || [];
       const values = this.arrays.pose_values?.data;
-      const T = this.time.length;
-      for (let v = 0; v < columns.length; v++) out[columns[v]] = values[v * T + i];
+      for (let v = 0; v < columns.length; v++) out[columns[v]] = values[i * columns.length + v];
       return out;
     }
     /** @param {At} at */
@@ -4344,7 +4363,7 @@
     if (look.values) return look.values;
     if (!look.log) return rangeY(plot, u.height, low, high);
     if (low === null || high === null || !(low > 0)) return [1e-3, 1];
-    return [low / 1.5, high * 1.5];
+    return [Number((low / 1.5).toPrecision(2)), high * 1.5];
   };
   var rangeY = ({ spec, movingBounds }, height, low, high) => {
     const { bounds } = spec;
@@ -6910,7 +6929,7 @@
       if (linked.some((system) => system.triggered)) parts.push("sent by triggers: see the plot");
       const planned = this.systems.filter(({ plan }) => plan);
       if (planned.length) parts.push("rings: outputs, where robots head");
-      if (planned.some(({ quantities }) => quantities.some(({ between }) => between.length)))
+      if (planned.some(({ quantities }) => quantities.some(({ between: between2 }) => between2.length)))
         parts.push("strips: bounded distances");
       if (planned.some(({ plan }) => plan?.radius.some((radius) => radius !== null)))
         parts.push("circles: half of the least distance");
