@@ -178,14 +178,28 @@ def test_equal_parts_of_an_object_are_shared_and_equal_objects_equal():
 
 
 def test_floors_that_copies_of_a_file_bring_are_drawn_as_one_for_all():
-    """Two robots' floors, 6 m apart along y, are 4 m wide each: together 10 m, in the middle."""
-    plane = '<geom name="{}/floor" type="plane" size="5 2 1" pos="0 {} 0"/>'
-    floors = plane.format("robot_1", 0) + plane.format("robot_2", 6)
+    """Two robots' floors, 6 m apart along y, are 4 m wide each: together 10 m, in the middle. The
+    lowest has no end, and squares of its texture are as large as they were."""
+    assets = """<asset><texture name="t" type="2d" builtin="checker" width="8" height="8"/>
+        <material name="t" texture="t" texrepeat="10 6"/></asset>"""
+    plane = '<geom name="{}/{}" type="plane" size="5 2 1" pos="0 {} {}" material="t"/>'
+    robots = (("robot_1", 0), ("robot_2", 6))
+    floors = "".join(
+        plane.format(robot, name, y, z)
+        for robot, y in robots
+        for name, z in (("table", 1), ("floor", 0))
+    )
     body = '<body><freejoint/><geom size="0.1"/></body>'
-    mirror = Mirror(model_of(f"<mujoco><worldbody>{floors}{body}</worldbody></mujoco>"))
-    (floor,) = parts_of(mirror, "world").values()
-    assert (floor.geometry["width"], floor.geometry["height"]) == (10.0, 10.0)
-    np.testing.assert_allclose(floor.matrix[:3, 3], [0.0, 3.0, 0.0])
+    mirror = Mirror(model_of(f"<mujoco>{assets}<worldbody>{floors}{body}</worldbody></mujoco>"))
+    parts = parts_of(mirror, "world")
+    table, floor = parts["robot_1/table"], parts["robot_1/floor"]
+    assert len(parts) == 2
+    assert mirror.floor == 0.0
+    assert (table.geometry["width"], table.geometry["height"]) == (10.0, 10.0)
+    np.testing.assert_allclose(table.matrix[:3, 3], [0.0, 3.0, 1.0])
+    assert table.material["map"]["repeat"] == [10.0, 15.0]
+    assert (floor.geometry["width"], floor.geometry["height"]) == (1000.0, 1000.0)
+    assert floor.material["map"]["repeat"] == [1000.0, 1500.0]
 
 
 def test_the_page_is_sent_a_meshs_numbers_once():

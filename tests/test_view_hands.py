@@ -218,6 +218,17 @@ def test_labels_make_way_and_the_selector_agrees_with_the_view(page, recorded):
             page.set_viewport_size({"width": width, "height": height})
             page.keyboard.press("f")
             settled(page)
+            # the fleet is all in view, and fills it along one side
+            pane, bodies = (
+                page.locator("#pane").bounding_box(),
+                page.evaluate("window.gne.bodies()"),
+            )
+            for begin, size, whole in (("x", "w", pane["width"]), ("y", "h", pane["height"])):
+                low = min(each[begin] for each in bodies)
+                high = max(each[begin] + each[size] for each in bodies)
+                assert 0 <= low < high <= whole
+                bodies[0][f"part {begin}"] = (high - low) / whole
+            assert max(bodies[0]["part x"], bodies[0]["part y"]) > 0.6
             labels = page.evaluate("window.gne.labels()")
             assert sum(label["system"] == "robots" for label in labels) == 5
             for n, one in enumerate(labels):

@@ -5,15 +5,12 @@ from contextlib import contextmanager
 from typing import Any
 
 from gne_mj.extras import need
+from gne_mj.palette import PALETTE
 
 FORMATS = ("png", "pdf", "svg")
 
-# Readable in grey: lines differ in dash as well as in colour (Okabe and Ito's palette, then of
-# Tol's what differs from it; black is for bounds). As many as a legend has lines.
-COLOURS = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00",
-    "#332288", "#882255", "#999933", "#7F7F7F", "#44AA99", "#8C564B",
-)  # fmt: skip
+# Readable in grey: lines differ in dash as well as in colour; black is for bounds.
+COLOURS = PALETTE["light"]
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)), (0, (1, 1)))
 # Beyond this many lines a legend says less than it hides.
 LEGEND = 12

@@ -33,12 +33,14 @@ class Fleet:
 
     def __init__(self, plant: FleetPlant, name: str, agents: int) -> None:
         self.plant, self.agents = plant, agents
+        own = isinstance(plant, MjcfPlant)
         self.mirror = Mirror(
             plant.model,
             prefix=tuple(part for part in name.split("/") if part),
             tinted=[geom for geoms in self._tinted for geom in geoms],
             coils=self._coils,
-            hidden=of_the_lane(plant.model) if isinstance(plant, MjcfPlant) else (),
+            hidden=of_the_lane(plant.model) if own else (),
+            endless=own or self.lane is None,  # a lane is as wide as it is
         )
 
     def qpos(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -92,23 +94,43 @@ class Fleet:
     @property
     def places(self) -> dict[str, Any]:
         """Where the page finds each agent's body, see ``ShownSystem.meta``."""
-        model, mirror = self.plant.model, self.mirror
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        top = data.geom_xpos[:, 2] + model.geom_rbound
-        robots = model.body_rootid[model.geom_bodyid]
-        heights = [
-            np.max(top[robots == model.body_rootid[body]], initial=0.0) - data.xpos[body, 2]
-            for body in self._bodies
-        ]
+        mirror = self.mirror
         anchors = [mirror.item_of(body) for body in self._bodies]
         drawn = {path for path, _ in mirror.objects}
         tints = [f"{mirror.items[item]}/tint" for item in anchors]
         return {
             "anchors": anchors,
-            "height": float(max(heights)),
+            "rooms": self._rooms,
+            "floor": mirror.floor,
             "tints": [[path] if path in drawn else [] for path in tints],
         }
+
+    @property
+    def _rooms(self) -> list[list[float]]:
+        """Of each agent the upright cylinder around its body's place that its robot is in, as its
+        file says: radius, lower and upper end, in m relative to that place."""
+        model = self.plant.model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        turn = data.geom_xmat.reshape(-1, 3, 3)
+        middle = data.geom_xpos + np.einsum("gij,gj->gi", turn, model.geom_aabb[:, :3])
+        half = np.einsum("gij,gj->gi", np.abs(turn), model.geom_aabb[:, 3:])
+        solid = ~np.isin(
+            model.geom_type, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD]
+        )
+        found = []
+        for agent, body in enumerate(self._bodies, 1):
+            own = [
+                geom
+                for geom in np.flatnonzero(solid)
+                if model.body(model.geom_bodyid[geom]).name.startswith(f"robot_{agent}/")
+            ]
+            away = middle[own] - data.xpos[body]
+            reach = np.hypot(*(np.abs(away) + half[own])[:, :2].T)
+            low, high = (away - half[own])[:, 2], (away + half[own])[:, 2]
+            room = np.max(reach, initial=0.0), np.min(low, initial=0.0), np.max(high, initial=0.0)
+            found.append([float(each) for each in room])
+        return found
 
     @cached_property
     def _bodies(self) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gne_mj.native import compiled, kernel
-from gne_mj.viewer.floors import joined
+from gne_mj.viewer.floors import ground, joined
 from gne_mj.viewer.shapes import (
     DrawnPart,
     Group,
@@ -61,12 +61,14 @@ class Mirror:
         coils: names of tendons to draw as helical springs; None: those with a stiffness that run
             straight from one site to another.
         hidden: names of geoms to leave out.
+        endless: whether the lowest floor is drawn without an end, as robots can stand on it.
 
     Attributes:
         items: K paths of what moves: bodies, which have the path of their name, then segments of
             tendons.
         world: the path of what never moves.
         objects: path and object of all that is drawn, to be set once.
+        floor: the height in m of a ground without an end, if one is among it.
 
     Raises:
         KeyError: a name that the model does not have.
@@ -80,6 +82,7 @@ class Mirror:
         tinted: Iterable[str | int] = (),
         coils: Iterable[str] | None = None,
         hidden: Iterable[str] = (),
+        endless: bool = True,
     ) -> None:
         self.model = model
         self._data = mujoco.MjData(model)
@@ -106,7 +109,9 @@ class Mirror:
         tints = {model.geom(name).id for name in tinted}
         left_out = {model.geom(name).id for name in hidden}
         shown = [geom for geom in _shown(model, "geom") if geom not in left_out]
-        floors = joined(model, self._data, shown)
+        lowest = ground(model, self._data, shown) if endless else set()
+        floors = joined(model, self._data, shown, lowest)
+        self.floor = float(self._data.geom_xpos[min(lowest), 2]) if lowest else None
         for geom in shown:
             path = paths[model.geom_bodyid[geom]] + ("/tint" if geom in tints else "")
             drawn = self._floor(geom, floors[geom]) if geom in floors else self._parts("geom", geom)
@@ -230,15 +235,15 @@ class Mirror:
         return [DrawnPart(element.name or f"geom_{geom}", plane(size), surface, at)]
 
     def _plane_material(self, element: Any, size: Any) -> Json:
-        """Of a plane that may be larger than its element; its texture's squares stay as large."""
+        """Of a plane that may be larger than its element; its texture's squares stay the same."""
         model, matid = self.model, int(element.matid[0])
         rgba, image = _colours(model, element.rgba[None], element.matid)[0], _image(model, matid)
         if image < 0:
             return material(rgba, **FLOOR)
         repeat, uniform = model.mat_texrepeat[matid], bool(model.mat_texuniform[matid])
-        ends = (element.size[:2] > 0) & (size[:2] > 0)
-        if not uniform:
-            repeat = repeat * np.where(ends, size[:2] / np.where(ends, element.size[:2], 1.0), 1.0)
+        if not uniform:  # repetitions over the plane, or over 2 m of what has no end
+            half, own = (np.where(each > 0, each, 1.0) for each in (size[:2], element.size[:2]))
+            repeat = repeat * half / own
         drawn = plane_texture(model, image, size, repeat=repeat, uniform=uniform)
         return material(rgba, **FLOOR, map=drawn)
 

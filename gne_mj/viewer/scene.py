@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gne_mj.palette import PALETTE
 from gne_mj.viewer.beside import shifts_of
 from gne_mj.viewer.mirror import POSITION, QUATERNION
 from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
@@ -58,6 +59,7 @@ class Scene:
         clock = self.shown_systems[0].clock
         return {
             "title": self.title,
+            "palette": PALETTE,
             "duration": self.duration,
             "sample_period": clock.sample_period,
             "items": items,

@@ -74,7 +74,8 @@ class ShownSystem:
             "estimates": bool(self._shown("estimates")),
             "kept": self._kept,
             "anchors": [],
-            "height": 0.0,
+            "rooms": [],
+            "floor": None,
             "tints": [],
             "joints": [],
         }

@@ -1,8 +1,11 @@
 // The camera: what it follows, from how far, and where points are on the screen.
 import { THREE } from "./meshcat.js";
 import { DEGREE, toView } from "./viewer.js";
-/** @import { Layout } from "./layout.js" */
-/** @import { Follow, Three } from "./types.d.ts" */
+/** @import { Layout, Room } from "./layout.js" */
+/** @import { Box } from "./overlay.js" */
+/** @import { Follow, System, Three } from "./types.d.ts" */
+
+const AROUND = 3; // distances at which one robot fits, from which it is followed
 
 export class Camera {
   /**
@@ -19,7 +22,7 @@ export class Camera {
     this.controls = viewer.controls;
     Object.assign(this.controls, {
       maxPolarAngle: 89 * DEGREE,
-      minDistance: 0.8,
+      minDistance: 0.2,
       maxDistance: 1500,
     });
     this.controls.addEventListener("change", () => {
@@ -44,11 +47,12 @@ export class Camera {
   }
 
   /**
-   * Distance from the target at which all points are in view from a direction.
+   * Distance from the target at which all is in view from a direction.
    * @param {Three} direction
    * @param {Three} target
+   * @param {Room[]} rooms what all is
    */
-  fitDistance(direction, target) {
+  fitDistance(direction, target, rooms = this.layout.seen()) {
     const view = new THREE.Matrix4().lookAt(
       direction,
       new THREE.Vector3(),
@@ -59,25 +63,31 @@ export class Camera {
     );
     const tangent = Math.tan((this.lens.fov / 2) * DEGREE);
     const wide = tangent * (this.pane.clientWidth / Math.max(this.pane.clientHeight, 1));
-    let distance = 2.5;
-    for (const point of this.layout.points()) {
-      const p = point.sub(target);
-      const nearer = p.dot(back);
+    let distance = this.controls.minDistance;
+    for (const { point, radius, half } of rooms) {
+      const p = point.clone().sub(target);
+      /** How far an upright cylinder goes along an axis. */
+      const out = (/** @type {Three} */ axis) =>
+        radius * Math.hypot(axis.x, axis.z) + half * Math.abs(axis.y);
+      const nearer = p.dot(back) + out(back);
       distance = Math.max(
         distance,
-        Math.abs(p.dot(right)) / (0.88 * wide) + nearer,
-        Math.abs(p.dot(up)) / (0.76 * tangent) + nearer,
+        (Math.abs(p.dot(right)) + out(right)) / (0.88 * wide) + nearer,
+        (Math.abs(p.dot(up)) + out(up)) / (0.76 * tangent) + nearer,
       );
     }
     return distance;
   }
 
-  /** From the side, and for a long lane nearly along it, so that the near ones stay large. */
+  /**
+   * From the side, and for a long lane nearly along it, so that the near ones stay large; fleets
+   * that are wider than they are long from behind.
+   */
   defaultDirection() {
     const { box, bars, planar } = this.layout;
-    const length = box ? box.high[0] - box.low[0] : 0;
+    const [length, width] = box ? [0, 1].map((axis) => box.high[axis] - box.low[axis]) : [0, 0];
     const long = Math.min(Math.max((length - 40) / 60, 0), 1);
-    const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
+    const azimuth = (width > length && planar ? -174 : -84 + 75 * long) * DEGREE;
     const rows = bars.reduce((sum, each) => sum + each.rows, 0);
     const ofBars = rows > 1 ? 32 : 12;
     const ofFleet = planar ? 36 : 20 - 13 * long;
@@ -90,11 +100,22 @@ export class Camera {
     if (!this.layout.known) return;
     const target = this.followed();
     const direction = this.defaultDirection();
-    const near = this.follow.kind === "agent" ? 6 : this.fitDistance(direction, target);
-    this.look(target, direction, near);
+    this.look(target, direction, this.distanceFrom(direction, target));
     this.zoom = 1;
     this.followPoint = target;
     this.placed = true;
+  }
+
+  /**
+   * From how far what is followed is looked at first.
+   * @param {Three} direction
+   * @param {Three} target
+   */
+  distanceFrom(direction, target) {
+    const { kind, system, agent = 0 } = this.follow;
+    const fleet = this.layout.fleets.find((each) => each.name === system);
+    if (kind !== "agent" || !fleet) return this.fitDistance(direction, target);
+    return AROUND * this.fitDistance(direction, target, [this.layout.roomOf(fleet, agent)]);
   }
 
   /**
@@ -174,5 +195,24 @@ export class Camera {
       x: ((p.x + 1) / 2) * this.pane.clientWidth,
       y: ((1 - p.y) / 2) * this.pane.clientHeight,
     };
+  }
+
+  /**
+   * What an agent of a fleet covers of the pane, in CSS pixels; null behind the camera.
+   * @param {System} system
+   * @param {number} agent
+   * @returns {Box | null}
+   */
+  boxOf(system, agent) {
+    const [foot, head] = this.layout.endsOf(system, agent).map((end) => this.project(end));
+    if (!foot || !head) return null;
+    const { point, radius } = this.layout.roomOf(system, agent);
+    const { direction } = this.arm();
+    const depth = this.lens.position.clone().sub(point).dot(direction);
+    const tangent = Math.tan((this.lens.fov / 2) * DEGREE);
+    const wide = (radius * this.pane.clientHeight) / (2 * tangent * Math.max(depth, this.lens.near));
+    const deep = wide * Math.abs(direction.y); // of a level disc, as it is seen from above
+    const top = Math.min(foot.y, head.y) - deep;
+    return { x: head.x - wide, y: top, w: 2 * wide, h: Math.max(foot.y, head.y) + deep - top };
   }
 }

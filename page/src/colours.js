@@ -1,5 +1,6 @@
 // Colours and dashes that stand for numbers.
 import { theme } from "./theme.js";
+/** @import { Palette } from "./types.d.ts" */
 
 // Blue, light blue, yellow, orange, red: told apart by hue with any colour blindness, and the
 // yellow in the middle is much the lightest.
@@ -34,12 +35,16 @@ export const css = (rgb) => `rgb(${rgb.map((v) => Math.round(255 * v)).join(", "
 export const rampGradient = () =>
   `linear-gradient(to right, ${RAMP.map(([s, c]) => `${css(c)} ${100 * s}%`).join(", ")})`;
 
-// Okabe and Ito's colours, each readable on the theme's ground.
-const LINES = {
-  dark: ["#56b4e9", "#e69f00", "#2fc18c", "#f0e442", "#e87c3a", "#d98cbb", "#f2f2f2", "#5a9bff"],
-  light: ["#0072b2", "#c07c00", "#00805c", "#8c7a00", "#d55e00", "#a8518a", "#111111", "#2f62c9"],
-};
+/** @type {Palette} */
+let palette = { dark: [], light: [] };
+const HUES = 8; // of a palette; those that come again have another dash too
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
+
+/**
+ * The colours of lines, which figures have too.
+ * @param {Palette} given
+ */
+export const setPalette = (given) => (palette = given);
 
 /**
  * Dash of the lines of one of several runs.
@@ -52,9 +57,9 @@ export const dashOf = (run) => DASHES[run];
  * @param {number} k
  */
 export const line = (k) => {
-  const colours = LINES[theme()];
+  const colours = palette[theme()];
   return {
     colour: colours[k % colours.length],
-    dash: DASHES[Math.floor(k / colours.length) % DASHES.length],
+    dash: DASHES[Math.floor(k / HUES) % DASHES.length],
   };
 };

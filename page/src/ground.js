@@ -51,6 +51,9 @@ export class Ground {
       fragmentShader: FRAGMENT,
       transparent: true,
       depthWrite: false,
+      polygonOffset: true, // behind a lane's floor, also where that is seen at a grazing angle
+      polygonOffsetFactor: 4,
+      polygonOffsetUnits: 4,
       side: THREE.DoubleSide,
       extensions: { derivatives: true },
     });

@@ -33,6 +33,8 @@ export const handleOf = (page) => ({
   /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
   head: (/** @type {string} */ system, /** @type {number} */ a, /** @type {number} */ b = a) =>
     headOf(page, system, a, b),
+  /** What robots cover of the pane, px. */
+  bodies: () => page.overlay.bodies,
   /** The labels of robots, px. */
   labels: () => page.overlay.labels.drawn,
   /** What is plotted. */

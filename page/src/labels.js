@@ -1,5 +1,5 @@
-// Labels of robots, which make way for each other: one that finds no room at its robot's head stands
-// beside or above, with a line that leads to it.
+// Labels of robots, which make way for each other and for robots: one that finds no room above its
+// robot stands beside, below or further above, with a line that leads to it.
 import { line } from "./colours.js";
 import { isThere } from "./instant.js";
 import { colour } from "./theme.js";
@@ -11,10 +11,14 @@ import { colour } from "./theme.js";
 const HIGH = 20; // px of a label
 const STEP = HIGH + 4; // px from one place to the next
 
-// Places beside a head, in widths and in steps, in the order in which they are tried
+// Places in the order in which they are tried: from right above a robot in a label's widths and in
+// steps, and then in the robot's own half widths and in its heights
 const PLACES = [
-  [0, 0], [0, -1], [0.65, -0.5], [-0.65, -0.5], [0, -2], [0.8, -1.5], [-0.8, -1.5], [0, -3],
-  [0.9, 0.4], [-0.9, 0.4], [0, -4],
+  [0, 0, 0, 0], [0, -1, 0, 0], [0.65, -0.5, 0, 0], [-0.65, -0.5, 0, 0],
+  [0.55, 0.5, 1, 0.5], [-0.55, 0.5, -1, 0.5], [0, 1, 0, 1], [0, -2, 0, 0],
+  [0.8, -1.5, 0, 0], [-0.8, -1.5, 0, 0], [0.6, 1, 0, 1], [-0.6, 1, 0, 1], [0, 2, 0, 1],
+  [0, -3, 0, 0], [0.9, 0.4, 0, 0], [-0.9, 0.4, 0, 0], [1.2, 0.5, 1, 0.5], [-1.2, 0.5, -1, 0.5],
+  [0, -4, 0, 0],
 ]; // prettier-ignore
 
 /**
@@ -25,6 +29,30 @@ const labelOrder = (n) => {
   const zeros = (/** @type {number} */ k) => (k === 0 ? 32 : Math.log2(k & -k));
   return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
 };
+
+/**
+ * A label at one of the places.
+ * @param {number[]} place
+ * @param {Pill} pill right above
+ * @param {Box} body of the robot
+ * @returns {Pill}
+ */
+const placed = ([right, down, side, below], pill, body) => ({
+  ...pill,
+  x: pill.x + right * pill.w + (side * body.w) / 2,
+  y: pill.y + down * STEP + below * body.h,
+});
+
+/**
+ * The point of a box that is nearest to another one.
+ * @param {Box} box
+ * @param {number} x
+ * @param {number} y
+ */
+const nearest = (box, x, y) => ({
+  x: Math.min(Math.max(x, box.x), box.x + box.w),
+  y: Math.min(Math.max(y, box.y), box.y + box.h),
+});
 
 export class Labels {
   /** @param {Overlay} overlay */
@@ -68,9 +96,9 @@ export class Labels {
    */
   label(system, agent, share) {
     const { overlay } = this;
-    const [x, y, z] = overlay.scene.layout.agentAt(system, agent);
-    const p = overlay.scene.camera.project([x, y, z + system.height]);
-    if (!p) return;
+    const body = overlay.scene.camera.boxOf(system, agent);
+    if (!body) return;
+    const p = { x: body.x + body.w / 2, y: body.y };
     overlay.marks.push({ x: p.x, y: p.y, system: system.name, agent });
     const name = String(agent + 1);
     const out = share > 1;
@@ -78,32 +106,33 @@ export class Labels {
     const used = out ? "outside" : "";
     const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
     for (const text of percent ? [percent, ""] : [""]) {
-      const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text}` : text));
+      const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text}` : text), body);
       if (!pill) continue;
       overlay.taken.push(pill);
       this.drawn.push({ ...pill, system: system.name });
       overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH / 2, system: system.name, agent });
-      return this.pill(pill, p, { name, system, agent, out });
+      return this.pill(pill, body, { name, system, agent, out });
     }
     this.places.delete(`${system.name} ${agent}`);
   }
 
   /**
-   * A label where there is room for it, first where it was; null where there is none.
+   * A label where there is room for it, first where it was, over robots only if there is no other;
+   * null where there is none.
    * @param {System} system
    * @param {number} agent
-   * @param {Pill} pill at its head
+   * @param {Pill} pill right above
+   * @param {Box} body of the robot
    */
-  room(system, agent, pill) {
+  room(system, agent, pill, body) {
     const { overlay } = this;
     const key = `${system.name} ${agent}`;
     const before = this.places.get(key) ?? 0;
-    const wide = overlay.canvas.clientWidth;
-    for (const k of [before, ...PLACES.keys()]) {
-      const [right, down] = PLACES[k];
-      const box = { ...pill, x: pill.x + right * pill.w, y: pill.y + down * STEP };
-      const seen = k === 0 || (box.x >= 0 && box.x + box.w <= wide && box.y >= 0);
-      if (!seen || !overlay.free(box)) continue;
+    const places = [before, ...PLACES.keys()].map((k) => ({ k, box: placed(PLACES[k], pill, body) }));
+    const free = places.filter(({ k, box }) => (k === 0 || this.inside(box)) && overlay.free(box));
+    const found = free.find(({ box }) => this.inside(box) && overlay.clear(box)) ?? free[0];
+    if (found) {
+      const { k, box } = found;
       // back to the head only when there is plenty of room, or labels would flicker
       this.places.set(key, k === before && before > 0 && this.lonely(pill) ? 0 : k);
       return box;
@@ -112,8 +141,15 @@ export class Labels {
   }
 
   /** @param {Box} box */
+  inside({ x, y, w, h }) {
+    const { clientWidth: wide, clientHeight: high } = this.overlay.canvas;
+    return x >= 0 && x + w <= wide && y >= 0 && y + h <= high;
+  }
+
+  /** @param {Box} box */
   lonely({ x, y, w, h }) {
-    return this.overlay.free({ x: x - 8, y: y - 8, w: w + 16, h: h + 16 });
+    const around = { x: x - 8, y: y - 8, w: w + 16, h: h + 16 };
+    return this.overlay.free(around) && this.inside(around) && this.overlay.clear({ x, y, w, h });
   }
 
   /**
@@ -134,13 +170,13 @@ export class Labels {
 
   /**
    * @param {Pill} box
-   * @param {{x: number, y: number}} p the head
+   * @param {Box} body of the robot
    * @param {{name: string, system: System, agent: number, out: boolean}} about
    */
-  pill(box, p, { name, system, agent, out }) {
+  pill(box, body, { name, system, agent, out }) {
     const { context } = this.overlay;
     const chosen = this.overlay.isHighlighted(system, agent);
-    this.lead(box, p);
+    this.lead(box, body);
     context.beginPath();
     context.roundRect(box.x, box.y, box.w, box.h, 5);
     context.fillStyle = out ? colour("bad-fill") : colour("pill");
@@ -160,13 +196,13 @@ export class Labels {
   }
 
   /**
-   * A line to the head, where the label is not at it.
+   * A line to the robot, where the label is not at it.
    * @param {Box} box
-   * @param {{x: number, y: number}} p
+   * @param {Box} body
    */
-  lead(box, p) {
-    const x = Math.min(Math.max(p.x, box.x + 4), box.x + box.w - 4);
-    const y = Math.min(Math.max(p.y, box.y), box.y + box.h);
+  lead(box, body) {
+    const p = nearest(body, box.x + box.w / 2, box.y + box.h / 2);
+    const { x, y } = nearest(box, p.x, p.y);
     if (Math.hypot(p.x - x, p.y - y) < 8) return;
     const { context } = this.overlay;
     context.strokeStyle = colour("muted");

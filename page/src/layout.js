@@ -3,7 +3,9 @@ import { THREE } from "./meshcat.js";
 import { toView } from "./viewer.js";
 /** @import { Bars } from "./bars.js" */
 /** @import { Plan } from "./plan.js" */
-/** @import { Instant, Numbers, Point, System } from "./types.d.ts" */
+/** @import { Instant, Numbers, Point, System, Three } from "./types.d.ts" */
+
+/** @typedef {{point: Three, radius: number, half: number}} Room an upright cylinder around a point */
 
 export class Layout {
   constructor() {
@@ -66,8 +68,42 @@ export class Layout {
    */
   headOf(system, agent) {
     if (system.drawn_as === "bars") return this.barsOf(system).topOfAgent(agent);
+    const [foot, head] = this.endsOf(system, agent);
+    return [head[0], head[1], foot[2] + 0.8 * (head[2] - foot[2])];
+  }
+
+  /**
+   * The lowest and the highest point over and under the place of an agent of a fleet.
+   * @param {System} system
+   * @param {number} agent
+   * @returns {[Point, Point]}
+   */
+  endsOf(system, agent) {
     const [x, y, z] = this.agentAt(system, agent);
-    return [x, y, z + 0.8 * system.height];
+    const [, low, high] = system.rooms[agent];
+    return [
+      [x, y, z + low],
+      [x, y, z + high],
+    ];
+  }
+
+  /**
+   * The room that an agent of a fleet takes, as three.js sees it.
+   * @param {System} system
+   * @param {number} agent
+   * @returns {Room}
+   */
+  roomOf(system, agent) {
+    const [foot, head] = this.endsOf(system, agent);
+    const point = toView([foot[0], foot[1], (foot[2] + head[2]) / 2]);
+    return { point, radius: system.rooms[agent][0], half: (head[2] - foot[2]) / 2 };
+  }
+
+  /** The rooms of all agents of fleets, as three.js sees them. */
+  rooms() {
+    return this.fleets.flatMap((system) =>
+      system.anchors.map((_, agent) => this.roomOf(system, agent)),
+    );
   }
 
   /**
@@ -100,9 +136,10 @@ export class Layout {
     if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
     this.spillTime = time;
     const { poses } = this;
+    const reach = Math.max(...this.fleets.flatMap(({ rooms }) => rooms.map(([radius]) => radius)));
     for (let p = 0; p < poses.length; p += 8)
       for (const axis of [0, 1]) {
-        const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]);
+        const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]) - reach;
         if (poses[p + 7] !== 0 && out > this.spill) this.spill = out;
       }
   }
@@ -121,35 +158,26 @@ export class Layout {
     return this.lane === null ? 1 : 0;
   }
 
-  /** The points that should be in view, as three.js sees them. */
-  points() {
-    /** @type {Point[]} */
-    const points = [];
-    for (const system of this.fleets)
-      for (let agent = 0; agent < system.agents; agent++) {
-        const [x, y, z] = this.agentAt(system, agent);
-        points.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
-      }
-    if (this.box) {
-      const { low, high } = this.box;
-      for (const x of [low[0] - this.spill, high[0] + this.spill])
-        for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
-          points.push([x, y, this.floor]);
-    }
-    for (const plan of this.plans) points.push(...plan.corners(this.time, this.floor));
-    for (const bars of this.bars) points.push(...bars.corners());
-    return points.length ? points.map(toView) : [new THREE.Vector3()];
+  /**
+   * What should be in view, as three.js sees it.
+   * @returns {Room[]}
+   */
+  seen() {
+    const rooms = this.rooms();
+    // what swings out does so from all of them
+    for (const room of rooms) room.radius += this.spill;
+    const points = [
+      ...this.plans.flatMap((plan) => plan.corners(this.time, this.floor)),
+      ...this.bars.flatMap((bars) => bars.corners()),
+    ];
+    return [...rooms, ...points.map((point) => ({ point: toView(point), radius: 0, half: 0 }))];
   }
 
   /** The middle of the agents, without what swings about them, as three.js sees it. */
   middle() {
     const box = new THREE.Box3();
-    for (const system of this.fleets)
-      for (let agent = 0; agent < system.agents; agent++) {
-        const [x, y, z] = this.agentAt(system, agent);
-        box.expandByPoint(toView([x, y, this.floor]));
-        box.expandByPoint(toView([x, y, z + system.height]));
-      }
+    for (const { point, half } of this.rooms())
+      for (const y of [point.y - half, point.y + half]) box.expandByPoint(point.clone().setY(y));
     for (const bars of this.bars)
       for (const corner of bars.corners()) box.expandByPoint(toView(corner));
     return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());

@@ -1,4 +1,5 @@
 // Drawn flat over the 3-D pane: labels, links, messages on their way, distances on the ground.
+import { setPalette } from "./colours.js";
 import { headingTexts, isSolid } from "./compare.js";
 import { Labels } from "./labels.js";
 import { Links } from "./links.js";
@@ -11,6 +12,15 @@ import { decimals, fixed, number } from "./words.js";
 /** @param {Partial<Text>} kind */
 const colourOf = ({ bad, limit, chosen, title }) =>
   bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+
+const MANY = 60; // robots, of which labels make way for each other alone
+
+/**
+ * Whether two boxes have something in common.
+ * @param {Box} a
+ * @param {Box} b
+ */
+const meet = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
 const BODY = 24; // px from a robot's middle line, within which it is touched
 
@@ -48,6 +58,8 @@ export class Overlay {
     this.runs = []; // if several are compared
     /** @type {Box[]} */
     this.taken = []; // where texts are
+    /** @type {Box[]} */
+    this.bodies = []; // where robots are, unless they are many
     /** @type {(Agent & {x: number, y: number})[]} */
     this.marks = []; // where labels are, for the mouse
     /** @type {Agent | null} */
@@ -55,7 +67,8 @@ export class Overlay {
   }
 
   /** @param {Meta} meta */
-  setMeta({ systems, runs = [] }) {
+  setMeta({ systems, runs = [], palette }) {
+    setPalette(palette);
     this.systems = systems;
     this.runs = runs;
     this.labels.begin(systems);
@@ -87,6 +100,7 @@ export class Overlay {
     this.marks = [];
     this.labels.drawn = [];
     const solid = this.systems.filter(isSolid);
+    this.bodies = this.bodiesOf(solid.filter(({ drawn_as: as }) => as === "fleet"));
     this.links.draw(solid, instant, now);
     if (this.runs.length && solid.length === this.systems.length)
       for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
@@ -125,11 +139,28 @@ export class Overlay {
 
   // ---- labels
 
-  /** @param {Box} box */
+  /** @param {System[]} fleets */
+  bodiesOf(fleets) {
+    if (fleets.reduce((sum, { agents }) => sum + agents, 0) > MANY) return [];
+    return fleets
+      .flatMap((system) => system.anchors.map((_, k) => this.scene.camera.boxOf(system, k)))
+      .filter((box) => box !== null);
+  }
+
+  /**
+   * Whether no text is there.
+   * @param {Box} box
+   */
   free(box) {
-    return !this.taken.some(
-      (t) => box.x < t.x + t.w && t.x < box.x + box.w && box.y < t.y + t.h && t.y < box.y + box.h,
-    );
+    return !this.taken.some((taken) => meet(box, taken));
+  }
+
+  /**
+   * Whether no robot is there.
+   * @param {Box} box
+   */
+  clear(box) {
+    return !this.bodies.some((body) => meet(box, body));
   }
 
   /**

@@ -108,6 +108,7 @@ export class Scene {
     this.instant = null;
     this.ghosts.show(null);
     this.layout.begin(this.fleets, this.bars, this.plans);
+    this.ground.mesh.visible = this.fleets.every(({ floor }) => floor === null);
     this.camera.placed = false;
     this.floorKnown = false;
     this.stale = true;
@@ -246,14 +247,14 @@ export class Scene {
     this.hidden.colour();
   }
 
-  /** Found once: robots of a lane may float around z = 0. */
+  /** Found once: a model's own, or under robots of a lane, which may float around z = 0. */
   findFloor() {
     if (this.floorKnown || !this.complete || this.objects.length === 0) return;
     this.viewer.scene.updateMatrixWorld(true);
     const box = new THREE.Box3();
-    for (const system of this.fleets)
-      for (const anchor of system.anchors) box.expandByObject(this.objects[anchor]);
-    if (Number.isFinite(box.min.y)) this.layout.floor = Math.min(0, box.min.y);
+    for (const anchor of this.fleets.flatMap(({ anchors }) => anchors))
+      box.expandByObject(this.objects[anchor]);
+    [this.layout.floor = Math.min(0, box.min.y)] = this.fleets.flatMap(({ floor }) => floor ?? []);
     this.floorKnown = true;
   }
 

@@ -23,6 +23,9 @@ export interface Quantity {
   between: ([number, number] | null)[]; // agents, from 1, of each entry that is a distance
 }
 
+/** Colours of lines on each theme's ground. */
+export type Palette = Record<"dark" | "light", string[]>;
+
 /** What lies on the ground under robots whose positions are decided. */
 export interface Plan {
   velocity: number[]; // m/s, of what positions are relative to
@@ -49,7 +52,8 @@ export interface System {
   estimates: boolean;
   kept: { by: number[]; action: number[] } | null; // whose estimates, from 1; null: all are kept
   anchors: number[]; // the item at which each robot is
-  height: number; // m
+  rooms: [number, number, number][]; // cylinders around anchors: radius, lower, upper end, m
+  floor: number | null; // m, the height of its model's, if that has one
   plan: Plan | null;
   joints: JointRow[][]; // of each robot
   tints: string[][]; // paths of what has each agent's colour
@@ -132,6 +136,7 @@ export interface Intervention {
 
 export interface Scene {
   title: string;
+  palette: Palette;
   duration: number; // s
   items: string[]; // paths of what has a pose, in the order of poses
   systems: System[];

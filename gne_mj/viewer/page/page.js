@@ -73,17 +73,16 @@
   };
   var css = (rgb) => `rgb(${rgb.map((v) => Math.round(255 * v)).join(", ")})`;
   var rampGradient = () => `linear-gradient(to right, ${RAMP.map(([s, c]) => `${css(c)} ${100 * s}%`).join(", ")})`;
-  var LINES = {
-    dark: ["#56b4e9", "#e69f00", "#2fc18c", "#f0e442", "#e87c3a", "#d98cbb", "#f2f2f2", "#5a9bff"],
-    light: ["#0072b2", "#c07c00", "#00805c", "#8c7a00", "#d55e00", "#a8518a", "#111111", "#2f62c9"]
-  };
+  var palette = { dark: [], light: [] };
+  var HUES = 8;
   var DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [12, 5]];
+  var setPalette = (given) => palette = given;
   var dashOf = (run) => DASHES[run];
   var line = (k) => {
-    const colours2 = LINES[theme()];
+    const colours2 = palette[theme()];
     return {
       colour: colours2[k % colours2.length],
-      dash: DASHES[Math.floor(k / colours2.length) % DASHES.length]
+      dash: DASHES[Math.floor(k / HUES) % DASHES.length]
     };
   };
 
@@ -395,6 +394,8 @@
     compared: () => comparedOf(page2),
     /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
     head: (system, a, b = a) => headOf(page2, system, a, b),
+    /** What robots cover of the pane, px. */
+    bodies: () => page2.overlay.bodies,
     /** The labels of robots, px. */
     labels: () => page2.overlay.labels.drawn,
     /** What is plotted. */
@@ -1830,22 +1831,39 @@
   var HIGH = 20;
   var STEP = HIGH + 4;
   var PLACES = [
-    [0, 0],
-    [0, -1],
-    [0.65, -0.5],
-    [-0.65, -0.5],
-    [0, -2],
-    [0.8, -1.5],
-    [-0.8, -1.5],
-    [0, -3],
-    [0.9, 0.4],
-    [-0.9, 0.4],
-    [0, -4]
+    [0, 0, 0, 0],
+    [0, -1, 0, 0],
+    [0.65, -0.5, 0, 0],
+    [-0.65, -0.5, 0, 0],
+    [0.55, 0.5, 1, 0.5],
+    [-0.55, 0.5, -1, 0.5],
+    [0, 1, 0, 1],
+    [0, -2, 0, 0],
+    [0.8, -1.5, 0, 0],
+    [-0.8, -1.5, 0, 0],
+    [0.6, 1, 0, 1],
+    [-0.6, 1, 0, 1],
+    [0, 2, 0, 1],
+    [0, -3, 0, 0],
+    [0.9, 0.4, 0, 0],
+    [-0.9, 0.4, 0, 0],
+    [1.2, 0.5, 1, 0.5],
+    [-1.2, 0.5, -1, 0.5],
+    [0, -4, 0, 0]
   ];
   var labelOrder = (n) => {
     const zeros = (k) => k === 0 ? 32 : Math.log2(k & -k);
     return [...Array(n).keys()].sort((a, b) => zeros(b) - zeros(a) || a - b);
   };
+  var placed = ([right, down, side, below], pill, body) => ({
+    ...pill,
+    x: pill.x + right * pill.w + side * body.w / 2,
+    y: pill.y + down * STEP + below * body.h
+  });
+  var nearest = (box, x, y) => ({
+    x: Math.min(Math.max(x, box.x), box.x + box.w),
+    y: Math.min(Math.max(y, box.y), box.y + box.h)
+  });
   var Labels = class {
     /** @param {Overlay} overlay */
     constructor(overlay) {
@@ -1882,9 +1900,9 @@
      */
     label(system, agent, share) {
       const { overlay } = this;
-      const [x, y, z] = overlay.scene.layout.agentAt(system, agent);
-      const p = overlay.scene.camera.project([x, y, z + system.height]);
-      if (!p) return;
+      const body = overlay.scene.camera.boxOf(system, agent);
+      if (!body) return;
+      const p = { x: body.x + body.w / 2, y: body.y };
       overlay.marks.push({ x: p.x, y: p.y, system: system.name, agent });
       const name = String(agent + 1);
       const out = share > 1;
@@ -1892,39 +1910,46 @@
       const used2 = out ? "outside" : "";
       const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
       for (const text2 of percent ? [percent, ""] : [""]) {
-        const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text2}` : text2));
+        const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text2}` : text2), body);
         if (!pill) continue;
         overlay.taken.push(pill);
         this.drawn.push({ ...pill, system: system.name });
         overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH / 2, system: system.name, agent });
-        return this.pill(pill, p, { name, system, agent, out });
+        return this.pill(pill, body, { name, system, agent, out });
       }
       this.places.delete(`${system.name} ${agent}`);
     }
     /**
-     * A label where there is room for it, first where it was; null where there is none.
+     * A label where there is room for it, first where it was, over robots only if there is no other;
+     * null where there is none.
      * @param {System} system
      * @param {number} agent
-     * @param {Pill} pill at its head
+     * @param {Pill} pill right above
+     * @param {Box} body of the robot
      */
-    room(system, agent, pill) {
+    room(system, agent, pill, body) {
       const { overlay } = this;
       const key = `${system.name} ${agent}`;
       const before = this.places.get(key) ?? 0;
-      const wide = overlay.canvas.clientWidth;
-      for (const k of [before, ...PLACES.keys()]) {
-        const [right, down] = PLACES[k];
-        const box = { ...pill, x: pill.x + right * pill.w, y: pill.y + down * STEP };
-        const seen = k === 0 || box.x >= 0 && box.x + box.w <= wide && box.y >= 0;
-        if (!seen || !overlay.free(box)) continue;
+      const places = [before, ...PLACES.keys()].map((k) => ({ k, box: placed(PLACES[k], pill, body) }));
+      const free = places.filter(({ k, box }) => (k === 0 || this.inside(box)) && overlay.free(box));
+      const found = free.find(({ box }) => this.inside(box) && overlay.clear(box)) ?? free[0];
+      if (found) {
+        const { k, box } = found;
         this.places.set(key, k === before && before > 0 && this.lonely(pill) ? 0 : k);
         return box;
       }
       return overlay.isHighlighted(system, agent) ? pill : null;
     }
     /** @param {Box} box */
+    inside({ x, y, w, h }) {
+      const { clientWidth: wide, clientHeight: high } = this.overlay.canvas;
+      return x >= 0 && x + w <= wide && y >= 0 && y + h <= high;
+    }
+    /** @param {Box} box */
     lonely({ x, y, w, h }) {
-      return this.overlay.free({ x: x - 8, y: y - 8, w: w + 16, h: h + 16 });
+      const around = { x: x - 8, y: y - 8, w: w + 16, h: h + 16 };
+      return this.overlay.free(around) && this.inside(around) && this.overlay.clear({ x, y, w, h });
     }
     /**
      * @param {{x: number, y: number}} p
@@ -1943,13 +1968,13 @@
     }
     /**
      * @param {Pill} box
-     * @param {{x: number, y: number}} p the head
+     * @param {Box} body of the robot
      * @param {{name: string, system: System, agent: number, out: boolean}} about
      */
-    pill(box, p, { name, system, agent, out }) {
+    pill(box, body, { name, system, agent, out }) {
       const { context } = this.overlay;
       const chosen = this.overlay.isHighlighted(system, agent);
-      this.lead(box, p);
+      this.lead(box, body);
       context.beginPath();
       context.roundRect(box.x, box.y, box.w, box.h, 5);
       context.fillStyle = out ? colour("bad-fill") : colour("pill");
@@ -1968,13 +1993,13 @@
       if (system.agents <= 14 && !out) this.swatch(box, agent);
     }
     /**
-     * A line to the head, where the label is not at it.
+     * A line to the robot, where the label is not at it.
      * @param {Box} box
-     * @param {{x: number, y: number}} p
+     * @param {Box} body
      */
-    lead(box, p) {
-      const x = Math.min(Math.max(p.x, box.x + 4), box.x + box.w - 4);
-      const y = Math.min(Math.max(p.y, box.y), box.y + box.h);
+    lead(box, body) {
+      const p = nearest(body, box.x + box.w / 2, box.y + box.h / 2);
+      const { x, y } = nearest(box, p.x, p.y);
       if (Math.hypot(p.x - x, p.y - y) < 8) return;
       const { context } = this.overlay;
       context.strokeStyle = colour("muted");
@@ -2005,6 +2030,8 @@
 
   // src/overlay.js
   var colourOf = ({ bad, limit, chosen, title }) => bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+  var MANY2 = 60;
+  var meet = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
   var BODY = 24;
   var awayFrom = (a, b, x, y) => {
     const [dx, dy] = [b.x - a.x, b.y - a.y];
@@ -2029,11 +2056,13 @@
       this.systems = [];
       this.runs = [];
       this.taken = [];
+      this.bodies = [];
       this.marks = [];
       this.highlighted = null;
     }
     /** @param {Meta} meta */
-    setMeta({ systems, runs = [] }) {
+    setMeta({ systems, runs = [], palette: palette2 }) {
+      setPalette(palette2);
       this.systems = systems;
       this.runs = runs;
       this.labels.begin(systems);
@@ -2062,6 +2091,7 @@
       this.marks = [];
       this.labels.drawn = [];
       const solid = this.systems.filter(isSolid);
+      this.bodies = this.bodiesOf(solid.filter(({ drawn_as: as2 }) => as2 === "fleet"));
       this.links.draw(solid, instant, now);
       if (this.runs.length && solid.length === this.systems.length)
         for (const text2 of headingTexts(solid, this.runs, this.scene.layout)) this.text(text2);
@@ -2093,11 +2123,24 @@
       }
     }
     // ---- labels
-    /** @param {Box} box */
+    /** @param {System[]} fleets */
+    bodiesOf(fleets) {
+      if (fleets.reduce((sum, { agents }) => sum + agents, 0) > MANY2) return [];
+      return fleets.flatMap((system) => system.anchors.map((_, k) => this.scene.camera.boxOf(system, k))).filter((box) => box !== null);
+    }
+    /**
+     * Whether no text is there.
+     * @param {Box} box
+     */
     free(box) {
-      return !this.taken.some(
-        (t) => box.x < t.x + t.w && t.x < box.x + box.w && box.y < t.y + t.h && t.y < box.y + box.h
-      );
+      return !this.taken.some((taken) => meet(box, taken));
+    }
+    /**
+     * Whether no robot is there.
+     * @param {Box} box
+     */
+    clear(box) {
+      return !this.bodies.some((body) => meet(box, body));
     }
     /**
      * @param {System} system
@@ -2171,14 +2214,14 @@
       if (near) return near;
       const { camera, layout } = this.scene;
       let best = null;
-      let nearest = BODY;
+      let nearest2 = BODY;
       for (const system of this.scene.fleets)
         for (let agent = 0; agent < system.agents; agent++) {
           const foot = camera.project(layout.agentAt(system, agent));
           const head = camera.project(layout.headOf(system, agent));
           if (!foot || !head) continue;
           const away = awayFrom(foot, head, x, y);
-          if (away < nearest) [best, nearest] = [{ system: system.name, agent }, away];
+          if (away < nearest2) [best, nearest2] = [{ system: system.name, agent }, away];
         }
       return best;
     }
@@ -2189,10 +2232,10 @@
      */
     agentNear(x, y) {
       let best = null;
-      let nearest = 26;
+      let nearest2 = 26;
       for (const mark of this.marks) {
         const away = Math.hypot(mark.x - x, mark.y - y + 4);
-        if (away < nearest) [best, nearest] = [{ system: mark.system, agent: mark.agent }, away];
+        if (away < nearest2) [best, nearest2] = [{ system: mark.system, agent: mark.agent }, away];
       }
       return best;
     }
@@ -5895,6 +5938,7 @@
   };
 
   // src/camera.js
+  var AROUND2 = 3;
   var Camera = class {
     /**
      * @param {Three} viewer meshcat's
@@ -5910,7 +5954,7 @@
       this.controls = viewer.controls;
       Object.assign(this.controls, {
         maxPolarAngle: 89 * DEGREE,
-        minDistance: 0.8,
+        minDistance: 0.2,
         maxDistance: 1500
       });
       this.controls.addEventListener("change", () => {
@@ -5932,11 +5976,12 @@
       return this.layout.middle();
     }
     /**
-     * Distance from the target at which all points are in view from a direction.
+     * Distance from the target at which all is in view from a direction.
      * @param {Three} direction
      * @param {Three} target
+     * @param {Room[]} rooms what all is
      */
-    fitDistance(direction, target) {
+    fitDistance(direction, target, rooms = this.layout.seen()) {
       const view = new THREE.Matrix4().lookAt(
         direction,
         new THREE.Vector3(),
@@ -5947,24 +5992,28 @@
       );
       const tangent = Math.tan(this.lens.fov / 2 * DEGREE);
       const wide = tangent * (this.pane.clientWidth / Math.max(this.pane.clientHeight, 1));
-      let distance = 2.5;
-      for (const point of this.layout.points()) {
-        const p = point.sub(target);
-        const nearer = p.dot(back);
+      let distance = this.controls.minDistance;
+      for (const { point, radius, half } of rooms) {
+        const p = point.clone().sub(target);
+        const out = (axis) => radius * Math.hypot(axis.x, axis.z) + half * Math.abs(axis.y);
+        const nearer = p.dot(back) + out(back);
         distance = Math.max(
           distance,
-          Math.abs(p.dot(right)) / (0.88 * wide) + nearer,
-          Math.abs(p.dot(up)) / (0.76 * tangent) + nearer
+          (Math.abs(p.dot(right)) + out(right)) / (0.88 * wide) + nearer,
+          (Math.abs(p.dot(up)) + out(up)) / (0.76 * tangent) + nearer
         );
       }
       return distance;
     }
-    /** From the side, and for a long lane nearly along it, so that the near ones stay large. */
+    /**
+     * From the side, and for a long lane nearly along it, so that the near ones stay large; fleets
+     * that are wider than they are long from behind.
+     */
     defaultDirection() {
       const { box, bars, planar } = this.layout;
-      const length = box ? box.high[0] - box.low[0] : 0;
+      const [length, width] = box ? [0, 1].map((axis) => box.high[axis] - box.low[axis]) : [0, 0];
       const long = Math.min(Math.max((length - 40) / 60, 0), 1);
-      const azimuth = (box ? -84 + 75 * long : -84) * DEGREE;
+      const azimuth = (width > length && planar ? -174 : -84 + 75 * long) * DEGREE;
       const rows = bars.reduce((sum, each) => sum + each.rows, 0);
       const ofBars = rows > 1 ? 32 : 12;
       const ofFleet = planar ? 36 : 20 - 13 * long;
@@ -5976,11 +6025,21 @@
       if (!this.layout.known) return;
       const target = this.followed();
       const direction = this.defaultDirection();
-      const near = this.follow.kind === "agent" ? 6 : this.fitDistance(direction, target);
-      this.look(target, direction, near);
+      this.look(target, direction, this.distanceFrom(direction, target));
       this.zoom = 1;
       this.followPoint = target;
       this.placed = true;
+    }
+    /**
+     * From how far what is followed is looked at first.
+     * @param {Three} direction
+     * @param {Three} target
+     */
+    distanceFrom(direction, target) {
+      const { kind, system, agent = 0 } = this.follow;
+      const fleet = this.layout.fleets.find((each) => each.name === system);
+      if (kind !== "agent" || !fleet) return this.fitDistance(direction, target);
+      return AROUND2 * this.fitDistance(direction, target, [this.layout.roomOf(fleet, agent)]);
     }
     /**
      * @param {Three} target
@@ -6052,6 +6111,24 @@
         x: (p.x + 1) / 2 * this.pane.clientWidth,
         y: (1 - p.y) / 2 * this.pane.clientHeight
       };
+    }
+    /**
+     * What an agent of a fleet covers of the pane, in CSS pixels; null behind the camera.
+     * @param {System} system
+     * @param {number} agent
+     * @returns {Box | null}
+     */
+    boxOf(system, agent) {
+      const [foot, head] = this.layout.endsOf(system, agent).map((end) => this.project(end));
+      if (!foot || !head) return null;
+      const { point, radius } = this.layout.roomOf(system, agent);
+      const { direction } = this.arm();
+      const depth = this.lens.position.clone().sub(point).dot(direction);
+      const tangent = Math.tan(this.lens.fov / 2 * DEGREE);
+      const wide = radius * this.pane.clientHeight / (2 * tangent * Math.max(depth, this.lens.near));
+      const deep = wide * Math.abs(direction.y);
+      const top = Math.min(foot.y, head.y) - deep;
+      return { x: head.x - wide, y: top, w: 2 * wide, h: Math.max(foot.y, head.y) + deep - top };
     }
   };
 
@@ -6229,6 +6306,10 @@
         fragmentShader: FRAGMENT,
         transparent: true,
         depthWrite: false,
+        polygonOffset: true,
+        // behind a lane's floor, also where that is seen at a grazing angle
+        polygonOffsetFactor: 4,
+        polygonOffsetUnits: 4,
         side: THREE.DoubleSide,
         extensions: { derivatives: true }
       });
@@ -6265,7 +6346,7 @@
   };
 
   // src/hidden.js
-  var MANY2 = 60;
+  var MANY3 = 60;
   var SHARP = 35;
   var Hidden = class {
     constructor() {
@@ -6283,7 +6364,7 @@
       }
       this.all = [];
       const meshes = [...systems].flat().flat();
-      if (meshes.length > MANY2) return;
+      if (meshes.length > MANY3) return;
       for (const mesh2 of meshes) {
         const material = new THREE.LineBasicMaterial({
           depthFunc: THREE.GreaterDepth,
@@ -6356,8 +6437,39 @@
      */
     headOf(system, agent) {
       if (system.drawn_as === "bars") return this.barsOf(system).topOfAgent(agent);
+      const [foot, head] = this.endsOf(system, agent);
+      return [head[0], head[1], foot[2] + 0.8 * (head[2] - foot[2])];
+    }
+    /**
+     * The lowest and the highest point over and under the place of an agent of a fleet.
+     * @param {System} system
+     * @param {number} agent
+     * @returns {[Point, Point]}
+     */
+    endsOf(system, agent) {
       const [x, y, z] = this.agentAt(system, agent);
-      return [x, y, z + 0.8 * system.height];
+      const [, low, high] = system.rooms[agent];
+      return [
+        [x, y, z + low],
+        [x, y, z + high]
+      ];
+    }
+    /**
+     * The room that an agent of a fleet takes, as three.js sees it.
+     * @param {System} system
+     * @param {number} agent
+     * @returns {Room}
+     */
+    roomOf(system, agent) {
+      const [foot, head] = this.endsOf(system, agent);
+      const point = toView([foot[0], foot[1], (foot[2] + head[2]) / 2]);
+      return { point, radius: system.rooms[agent][0], half: (head[2] - foot[2]) / 2 };
+    }
+    /** The rooms of all agents of fleets, as three.js sees them. */
+    rooms() {
+      return this.fleets.flatMap(
+        (system) => system.anchors.map((_, agent) => this.roomOf(system, agent))
+      );
     }
     /**
      * The bars of a system that is drawn as such.
@@ -6390,9 +6502,10 @@
       if (time > this.spillTime) this.spill *= Math.exp((this.spillTime - time) / 3);
       this.spillTime = time;
       const { poses } = this;
+      const reach = Math.max(...this.fleets.flatMap(({ rooms }) => rooms.map(([radius]) => radius)));
       for (let p = 0; p < poses.length; p += 8)
         for (const axis of [0, 1]) {
-          const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]);
+          const out = Math.max(poses[p + axis] - high[axis], low[axis] - poses[p + axis]) - reach;
           if (poses[p + 7] !== 0 && out > this.spill) this.spill = out;
         }
     }
@@ -6408,33 +6521,24 @@
     get planar() {
       return this.lane === null ? 1 : 0;
     }
-    /** The points that should be in view, as three.js sees them. */
-    points() {
-      const points = [];
-      for (const system of this.fleets)
-        for (let agent = 0; agent < system.agents; agent++) {
-          const [x, y, z] = this.agentAt(system, agent);
-          points.push([x - 0.5, y, this.floor], [x + 0.5, y, z + system.height + 0.25]);
-        }
-      if (this.box) {
-        const { low, high } = this.box;
-        for (const x of [low[0] - this.spill, high[0] + this.spill])
-          for (const y of [low[1] - this.spill * this.planar, high[1] + this.spill * this.planar])
-            points.push([x, y, this.floor]);
-      }
-      for (const plan of this.plans) points.push(...plan.corners(this.time, this.floor));
-      for (const bars of this.bars) points.push(...bars.corners());
-      return points.length ? points.map(toView) : [new THREE.Vector3()];
+    /**
+     * What should be in view, as three.js sees it.
+     * @returns {Room[]}
+     */
+    seen() {
+      const rooms = this.rooms();
+      for (const room of rooms) room.radius += this.spill;
+      const points = [
+        ...this.plans.flatMap((plan) => plan.corners(this.time, this.floor)),
+        ...this.bars.flatMap((bars) => bars.corners())
+      ];
+      return [...rooms, ...points.map((point) => ({ point: toView(point), radius: 0, half: 0 }))];
     }
     /** The middle of the agents, without what swings about them, as three.js sees it. */
     middle() {
       const box = new THREE.Box3();
-      for (const system of this.fleets)
-        for (let agent = 0; agent < system.agents; agent++) {
-          const [x, y, z] = this.agentAt(system, agent);
-          box.expandByPoint(toView([x, y, this.floor]));
-          box.expandByPoint(toView([x, y, z + system.height]));
-        }
+      for (const { point, half } of this.rooms())
+        for (const y of [point.y - half, point.y + half]) box.expandByPoint(point.clone().setY(y));
       for (const bars of this.bars)
         for (const corner of bars.corners()) box.expandByPoint(toView(corner));
       return box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
@@ -6443,8 +6547,8 @@
 
   // src/plan.js
   var STRIP = new THREE.PlaneGeometry(1, 1);
-  var AROUND2 = 48;
-  var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND2);
+  var AROUND3 = 48;
+  var MARK = new THREE.RingGeometry(0.06, 0.1, AROUND3);
   var WIDTH2 = 0.05;
   var LEAD = 0.02;
   var RIM = 0.025;
@@ -6509,7 +6613,7 @@
     }
     /** @param {number} radius */
     addDisc(radius) {
-      return this.add(new THREE.RingGeometry(Math.max(radius - RIM, 0), radius, AROUND2), 0.8);
+      return this.add(new THREE.RingGeometry(Math.max(radius - RIM, 0), radius, AROUND3), 0.8);
     }
     restyle() {
       this.region?.fill.material.color.set(colour("limit"));
@@ -6683,6 +6787,7 @@
       this.instant = null;
       this.ghosts.show(null);
       this.layout.begin(this.fleets, this.bars, this.plans);
+      this.ground.mesh.visible = this.fleets.every(({ floor }) => floor === null);
       this.camera.placed = false;
       this.floorKnown = false;
       this.stale = true;
@@ -6808,14 +6913,14 @@
       }
       this.hidden.colour();
     }
-    /** Found once: robots of a lane may float around z = 0. */
+    /** Found once: a model's own, or under robots of a lane, which may float around z = 0. */
     findFloor() {
       if (this.floorKnown || !this.complete || this.objects.length === 0) return;
       this.viewer.scene.updateMatrixWorld(true);
       const box = new THREE.Box3();
-      for (const system of this.fleets)
-        for (const anchor of system.anchors) box.expandByObject(this.objects[anchor]);
-      if (Number.isFinite(box.min.y)) this.layout.floor = Math.min(0, box.min.y);
+      for (const anchor of this.fleets.flatMap(({ anchors }) => anchors))
+        box.expandByObject(this.objects[anchor]);
+      [this.layout.floor = Math.min(0, box.min.y)] = this.fleets.flatMap(({ floor }) => floor ?? []);
       this.floorKnown = true;
     }
     /**
