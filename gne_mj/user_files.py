@@ -294,6 +294,7 @@ class CustomController(NetworkTable):
         return load_law(self.file, game, self.network(game.agents), self.parameters)
 
 
+MOST_KEPT = 1000  # entries of a low-level controller's memory
 # What the plain functions of a controller take besides the scenario's parameters, and its kernels
 _LOW_LEVEL = {
     "control": ("readings", "memory", "u"), "rate": ("readings", "memory", "u"),
@@ -321,11 +322,17 @@ class CustomLowLevel(ControllerTable):
 
     def bind(self, robot: "Robot", axes: int) -> Controller:
         """See the base class."""
-        module, name = load_module(self.file), Path(self.file).name
+        with named(path="input.file"):
+            module, name = load_module(self.file), Path(self.file).name
         functions = {each: getattr(module, each) for each in _LOW_LEVEL if hasattr(module, each)}
         if "control" not in functions:
             raise InvalidInput("input.file", name, "it must define control(readings, memory, u)")
         memory = getattr(module, "MEMORY", 0)
+        if type(memory) is not int or not 0 <= memory <= MOST_KEPT:
+            raise InvalidInput(
+                "input.file", name,
+                f"its MEMORY must be a whole number from 0 to {MOST_KEPT}, and is {memory!r}",
+            )  # fmt: skip
         seen = [(Seen(each),) if isinstance(each, str) else each.seen() for each in self.readings]
         parts = tuple(self.actuators), tuple(one for each in seen for one in each), axes
         native = {is_kernel(function) for function in functions.values()}

@@ -192,6 +192,39 @@ def test_what_cannot_be_examined_is_refused_by_name():
             gm.examine(text, **given)
 
 
+def test_tables_that_are_no_outputs_or_inputs_are_told_in_one_sentence():
+    with pytest.raises(InvalidInput, match=r"^input\.body: got 3"):
+        gm.examine(CART.format(**SOUND), output="x", input={"body": 3})
+    with pytest.raises(InvalidInput, match=r"^at: got \[1\.0, 2\.0\], but it must be 1 finite"):
+        gm.examine(CART.format(**SOUND), at=[1.0, 2.0], passivity=False)
+
+
+def test_why_what_a_file_has_cannot_be_used_is_told():
+    """A motor there is: that nothing is driven would be wrong."""
+    ball = PLAIN.format(joint="").replace('type="slide" axis="1 0 0"', 'type="ball"')
+    seen = gm.examine(ball)
+    assert not seen.usable
+    assert "No actuator" not in str(seen)
+    assert "Output 'x' with input 'drive': " in str(seen)
+
+
+def test_what_compensation_takes_off_is_no_caution():
+    seen = look(damping=3)
+    law = seen.recommendation.tables["systems"]["robots"]["controller"]
+    assert law["compensation"]
+    assert not any("rest where costs" in each for each in seen.recommendation.cautions)
+
+
+def test_what_is_a_scenarios_alone_is_refused_of_a_robots_file():
+    from gne_mj.interface.examining import of_source
+
+    given = {"passivity": False, "scenario": None}
+    with pytest.raises(InvalidInput, match=r"^changes: got 'a.b'"):
+        of_source("x.xml", None, None, None, changes={"a.b": 1}, system=None, **given)
+    with pytest.raises(InvalidInput, match=r"^system: got 'robots'"):
+        of_source("x.xml", None, None, None, changes={}, system="robots", **given)
+
+
 def test_robots_of_a_scenario_are_examined_at_their_equilibrium():
     seen = gm.examine("examples/robot/scenario.toml", agent=2, passivity=False)
     assert seen.file.endswith("cart.xml")

@@ -365,12 +365,16 @@ def test_a_memory_in_the_native_loops(tmp_path, integrator, mode, period):
     ("text", "more", "words"),
     [
         ("x = 1", {}, "it must define control"),
+        ("def control(:", {}, "input.file: got '.*own.py', but Python must run it"),
         ("def control(readings, u): return [0]", {"parameters": {}}, "must define control"),
         (FRICTIONLESS, {"readings": ["y"]}, "input.readings: got 'y'"),
         (FRICTIONLESS, {"actuators": ["pull"]}, "did you mean 'push'"),
         (FRICTIONLESS_KERNELS, {"parameters": {"mass": 1.0}}, "own.py has mass, gain"),
         (FRICTIONLESS.replace("return [readings[0]]", "return [1, 2]"), {}, "a list of 1 numbers"),
         (FRICTIONLESS.replace("u[0] / mass", "undefined"), {}, "own.py, line 10"),
+        (FRICTIONLESS.replace("u[0] / mass", "float('nan')"), {}, "must return finite numbers"),
+        (FRICTIONLESS.replace("MEMORY = 1", "MEMORY = -3"), {}, "from 0 to 1000, and is -3"),
+        (FRICTIONLESS.replace("MEMORY = 1", "MEMORY = 1.0"), {}, "from 0 to 1000, and is 1.0"),
     ],
 )
 def test_what_is_wrong_with_a_users_own_is_told(tmp_path, text, more, words):

@@ -312,10 +312,11 @@ def examine_(
     periods and states; relative degree, limits, the longest stable step, passivity; and an agents'
     table with what goes with it. Exit status 1 if no output is reached by an input.
     """
+    from gne_mj.errors import named
     from gne_mj.interface import examining
 
     wished = None if at is None else _numbers("at", at)
-    with telling(PREPARING, quiet=as_json) as tell:
+    with telling(PREPARING, quiet=as_json) as tell, named(changes="set_"):
         found = examining.of_source(
             source, output, input, wished, changes=settings(set_), system=system,
             passivity=passive, scenario=scenario, progress=tell,

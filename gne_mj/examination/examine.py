@@ -84,17 +84,17 @@ def examine(
     if (output is None) != (input is None):
         missing = "input" if input is None else "output"
         raise InvalidInput(missing, None, "output and input are to be given together, or neither")
-    pair = (output, input) if output is not None else propose(path, model, offered)
+    pair, vain = ((output, input), []) if output is not None else propose(path, model, offered)
     if pair is None:
+        nothing = _NOTHING + _NAMELESS * any(not each.name for each in offered)
         nothing_there = Recommendation(
-            False, ["There is nothing to recommend."], {},
-            [_NOTHING + _NAMELESS * any(not each.name for each in offered)],
-        )  # fmt: skip
+            False, ["There is nothing to recommend."], {}, vain or [nothing]
+        )
         return Examination(
             file, "", "", ("", ""), offered, TIMESTEP, [], None, None, None, [], None, None,
             "not tried", nothing_there,
         )  # fmt: skip
-    dimension = entries(pair[0]) if wished is None else len(wished)
+    dimension = entries(pair[0]) if output is None or wished is None else len(wished)
     robot = agents_of(path, *pair, dimension)
     found = examine_robot(
         Subject(file, robot, *pair), wished, passivity=passivity, progress=progress

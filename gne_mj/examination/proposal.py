@@ -38,25 +38,31 @@ def entries(output: Any) -> int:
     return len(output["axes"]) if isinstance(output, dict) and "axes" in output else 1
 
 
-def propose(path: Path, model: mujoco.MjModel, offers: list[Offer]) -> tuple[Any, Any] | None:
+def propose(
+    path: Path, model: mujoco.MjModel, offers: list[Offer]
+) -> tuple[tuple[Any, Any] | None, list[str]]:
     """An output and an input, as a scenario has them; None if nothing of the file can be used.
+
+    Beside them a sentence for each pair that was tried in vain.
 
     Of a body that floats by a low-level controller, if its actuators are rotors or two wheels. Of
     actuators that give a force at a joint or tendon the first that moves it at once and without
     end. Else a force at a body that floats, which is for first studies.
     """
-    best, rank = None, 3
+    best, rank, vain = None, 3, []
     for output, input_, free in [*_driven(model, offers), *_pairs(model, offers)]:
-        found = _rank(path, output, input_, free)
+        found, why = _rank(path, output, input_, free)
+        if why:
+            vain.append(f"Output {output!r} with input {input_!r}: {why}.")
         if found < rank:
             best, rank = (output, input_), found
         if rank == 0:
             break
     floating = [each.name for each in offers if each.kind == "body" and each.usable]
     if best is not None or not floating:
-        return best
+        return best, vain
     about = {"body": floating[0], "axes": ["x"]}
-    return about, dict(about)
+    return (about, dict(about)), vain
 
 
 def _driven(model: mujoco.MjModel, offers: list[Offer]) -> Iterator[tuple[Any, Any, bool]]:
@@ -94,16 +100,19 @@ def _pairs(model: mujoco.MjModel, offers: list[Offer]) -> Iterator[tuple[Any, An
             count += 1
 
 
-def _rank(path: Path, output: Any, input_: Any, free: bool) -> int:
-    """0: it moves its output at once and without end; 1: at once; 2: later; 3: it is refused."""
+def _rank(path: Path, output: Any, input_: Any, free: bool) -> tuple[int, str]:
+    """0: it moves its output at once and without end; 1: at once; 2: later; 3: it is refused.
+
+    Of a pair that is refused also why.
+    """
     try:
         d = entries(output)
         tried = bench(agents_of(path, output, input_, d), 0.001, "rk4")
         degrees = relative_degrees(tried, tried.start, np.zeros(d), np.ones(d))
-    except InvalidInput:
-        return 3
+    except InvalidInput as refused:
+        return 3, refused.about
     if isinstance(input_, dict) and "controller" in input_:
-        return 0  # a tilt, or a rolling wheel, lies between: later than at once, but meant so
+        return 0, ""  # a tilt, or a rolling wheel, lies between: later than at once, but meant so
     if None in degrees:
-        return 3
-    return 2 if degrees != [1] * d else 0 if free else 1
+        return 3, "the input does not move the output"
+    return (2 if degrees != [1] * d else 0 if free else 1), ""

@@ -15,10 +15,9 @@ PERIODS = (0.02, 0.01, 0.005, 0.002)  # s, the first that fits
 STEPS = (0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
 RESERVE = 0.5  # of the longest stable step
 SPREAD = 2.0  # of dy+/du over states, for an observer (docs/held-inputs.md)
-SHIFTS = 1e-3  # N or N m that holding asks for: less shifts no equilibrium to speak of
 DEVELOPED = 1.5  # power of time with which a response that lags may still grow
 NEAR = 0.8  # of a limit
-SHIFTS = 0.01  # of the wished output: less is not told
+SHIFTS = 0.01  # of the wished output: an equilibrium that is shifted by less is not told
 SLOWER = 3.0  # a step of rk4 costs more than so many of euler
 COUNT, DURATION = 3, 10.0  # robots, and s, of the scenario
 
@@ -67,7 +66,8 @@ def recommend(found: Found) -> Recommendation:
     slopes = _turned(found.slopes) if turned else found.slopes
     input_ = _opposite(found.input) if turned else found.input
     clock, reasons = _clock(found, slopes)
-    controller, more = _controller(found, slopes, clock["control_period"])
+    shift = _shift(found, slopes)
+    controller, more = _controller(found, slopes, clock["control_period"], shift)
     limited = bool(np.all(np.isfinite(found.limits)))
     if limited:
         more.append("input_limit: what the file's actuators let through.")
@@ -92,7 +92,8 @@ def recommend(found: Found) -> Recommendation:
         "initial": {"action": 0.0 if d == 1 else [[0.0] * d] * COUNT},
     }  # fmt: skip
     tables = {"simulation": clock, "systems": {"robots": system}}
-    return Recommendation(True, [*reasons, *more], tables, _cautions(found, slopes, turned))
+    cautions = _cautions(found, slopes, turned, "" if "compensation" in controller else shift)
+    return Recommendation(True, [*reasons, *more], tables, cautions)
 
 
 def _clock(found: Found, slopes: Slopes) -> tuple[dict[str, Any], list[str]]:
@@ -141,8 +142,10 @@ def _developed(slopes: Slopes) -> list[float]:
     ]
 
 
-def _controller(found: Found, slopes: Slopes, period: float) -> tuple[dict[str, Any], list[str]]:
-    """The scenario's law, and why."""
+def _controller(
+    found: Found, slopes: Slopes, period: float, shift: str
+) -> tuple[dict[str, Any], list[str]]:
+    """The scenario's law, and why; ``shift`` is what :func:`_shift` tells."""
     if not (slopes.longest > 0.0 and found.fresh):
         return {"information": "full", "mode": "sampled"}, [
             "mode: sampled, which promises nothing; implicit needs an output that is fresh and"
@@ -150,12 +153,11 @@ def _controller(found: Found, slopes: Slopes, period: float) -> tuple[dict[str, 
         ]
     reasons = ["mode: implicit, which keeps all bounds at control instants."]
     table: dict[str, Any] = {"information": "full", "mode": "implicit"}
-    asked = float(np.max(np.abs(found.held.input)))
-    if found.held.held and asked > SHIFTS:
+    if shift:
         table["compensation"] = True
         reasons.append(
-            f"compensation: what the file has of gravity, drag and friction asks for {asked:.3g} at"
-            " the wished output, which else shifts the equilibrium."
+            "compensation: what the file has of gravity, drag and friction is taken off. Without:"
+            f" {shift}"
         )
     spread = _spread(slopes, period)
     if spread < SPREAD:
@@ -167,8 +169,20 @@ def _controller(found: Found, slopes: Slopes, period: float) -> tuple[dict[str, 
     return table, reasons
 
 
-def _cautions(found: Found, slopes: Slopes, turned: bool) -> list[str]:
-    """What is wrong, or must be known."""
+def _shift(found: Found, slopes: Slopes) -> str:
+    """How far what the wished output asks for shifts the equilibrium; empty if not far."""
+    load, weight = float(np.max(np.abs(found.held.input))), _weight(slopes)
+    size = float(np.max(np.abs(found.wished)))
+    if not found.held.held or load <= SHIFTS * weight * size:
+        return ""
+    return (
+        f"at the wished output the input holds {load:.3g}, and robots rest where costs rise by as"
+        f" much as the input there, here up to {min(load / weight, size):.2g} away from y*."
+    )
+
+
+def _cautions(found: Found, slopes: Slopes, turned: bool, shift: str) -> list[str]:
+    """What is wrong, or must be known; ``shift`` is what :func:`_shift` tells."""
     said = []
     if turned:
         said.append("The output falls where its input rises: the input is to be turned round.")
@@ -196,13 +210,8 @@ def _cautions(found: Found, slopes: Slopes, turned: bool) -> list[str]:
             said.append(f"It could not be held {name}: {seen.why}{stop}.")
         elif load > NEAR:
             said.append(f"Held {name} it needs {load:.0%} of its limit.")
-    load, weight = float(np.max(np.abs(found.held.input))), _weight(slopes)
-    size = float(np.max(np.abs(found.wished)))
-    if found.held.held and load > SHIFTS * weight * size:
-        said.append(
-            f"At the wished output the input holds {load:.3g}: robots rest where costs rise by as"
-            f" much as the input there, here up to {min(load / weight, size):.2g} away from y*."
-        )
+    if shift:
+        said.append(shift[0].upper() + shift[1:])
     if found.steps.growth > 0.1:
         said.append(
             f"By itself it leaves its state at up to {found.steps.growth:.3g} 1/s:"

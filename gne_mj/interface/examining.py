@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from gne_mj.arguments import answering
 from gne_mj.errors import InvalidInput, named
 from gne_mj.interface.agents import path_of
+from gne_mj.interface.tables import in_one_sentence
 from gne_mj.plants.mjcf_robot import MjcfAgents, MjcfRobots
 from gne_mj.plants.mjcf_source import is_named, located
 from gne_mj.progress import Tell, if_asked, nothing
@@ -61,10 +62,11 @@ def examine(
     with named(wished="at", path="source", file="source"), if_asked(progress) as tell:
         if is_robot(source):
             path = path_of(source)  # type: ignore[arg-type]
-            return examine_file(
-                located(path), path, output, input, _array(wished),
-                passivity=passivity, progress=tell,
-            )  # fmt: skip
+            with in_one_sentence():
+                return examine_file(
+                    located(path), path, output, input, _array(wished),
+                    passivity=passivity, progress=tell,
+                )  # fmt: skip
         _unused(output, input)
         scenario = load_scenario(source)
         name = scenario.name_of(system)
@@ -96,19 +98,25 @@ def of_source(
         source: a file or a scenario.
         output, input: TOML values, or plain names.
         wished, system, passivity: as :func:`examine` has them.
-        changes: of a scenario.
+        changes: of a scenario; a robot's file has none.
         scenario: where the recommended one is to be written.
     """
     from gne_mj.examination import examine as examine_file
 
     with named(wished="at", path="source", file="source"):
         if is_robot(source):
+            for key, value in (("changes", next(iter(changes), None)), ("system", system)):
+                if value is not None:
+                    raise InvalidInput(
+                        key, value, "it is for a scenario, and this is a robot's file"
+                    )
             y, u = (None if each is None else parse_value(each) for each in (output, input))
             path = located(source)
-            found = examine_file(
-                path, _beside(source, path, scenario), y, u, _array(wished),
-                passivity=passivity, progress=progress,
-            )  # fmt: skip
+            with in_one_sentence():
+                found = examine_file(
+                    path, _beside(source, path, scenario), y, u, _array(wished),
+                    passivity=passivity, progress=progress,
+                )  # fmt: skip
             return {source: found}
         _unused(output, input)
         if scenario is not None:

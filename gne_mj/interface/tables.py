@@ -1,5 +1,7 @@
 """How objects are made: what a function is called with becomes a scenario's table."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -21,7 +23,18 @@ def made(table: type[T], /, **given: Any) -> T:
         InvalidInput: names the key, the value and what would be right.
     """
     values = {name: plain(value) for name, value in given.items() if value is not None}
-    try:
+    with in_one_sentence():
         return table.model_validate(values)
+
+
+@contextmanager
+def in_one_sentence() -> Iterator[None]:
+    """Tell what is wrong with a table as all else is told.
+
+    Raises:
+        InvalidInput: names the key, the value and what would be right.
+    """
+    try:
+        yield
     except ValidationError as error:
         raise complaint(error) from None

@@ -206,8 +206,9 @@ def complaint(error: ValidationError) -> InvalidInput:
     where = [
         str(part)
         for depth, part in enumerate(detail["loc"])
-        # at this depth stands a system's name, which may be that of a tag
-        if depth == 1 or (str(part).split("[")[0] not in tags and not _is_table(part))
+        # below this key stands a system's name, which may be that of a tag
+        if detail["loc"][:depth] == ("systems",)
+        or (str(part).split("[")[0] not in tags and not _is_table(part))
     ]
     value = detail["input"]
     context = detail.get("ctx", {})

@@ -98,4 +98,6 @@ def _fill(function: Callable[..., Any], out: Array, *given: Array) -> None:
         raise UserCodeError(
             function, f"it must return a list of {len(out)} numbers, and returned {value!r}"
         )
+    if not np.all(np.isfinite(value)):
+        raise UserCodeError(function, f"it must return finite numbers, and returned {value!r}")
     out[:] = value
