@@ -61,26 +61,6 @@ def test_dry_friction_does_not_hold_robots_from_their_equilibrium():
         assert np.all(result.data["action"].values[:, 0] < 0.6)
 
 
-@pytest.mark.parametrize("observer", [0.0, 0.5])
-def test_what_a_stop_holds_does_not_grow_beyond_the_limit(observer):
-    """A cart that is led against its stop goes back at once when it is wished to."""
-    stopped = CART.format(dry=0).replace('name="x"', 'name="x" limited="true" range="-9 0.05"')
-    game = gm.game(
-        1, lambda i, y, p: 0.5 * (y[i] - p.wanted) ** 2, constraints, wanted=0.5, limit=0.6
-    )
-    simulation = gm.setup(
-        game, agents=gm.mjcf_robots(1, stopped, output="x", input="push", input_limit=5.0),
-        law=gm.full_information(mode="implicit", compensation=True, observer=observer), rho=0.05,
-        start=np.zeros(1), duration=2.0, timestep=H, control_period=PERIOD, integrator="euler",
-    ).simulation_object()  # fmt: skip
-    simulation.advance(750)
-    simulation.change({"game.parameters.wanted": -0.5})
-    simulation.advance(150)
-    (data,) = (simulation.trajectory()[name] for name in simulation.runs)
-    assert data["input"].sel(time=1.45, method="nearest").item() == pytest.approx(5.0)
-    assert data["action"].sel(time=1.8, method="nearest").item() < -0.05
-
-
 @pytest.mark.parametrize(
     ("law", "agents", "words"),
     [

@@ -105,7 +105,7 @@ def set_out(plant, context, parts, known, solver, of_agents):
     limit = parts.problem.limit
     for r in range(len(limit)):
         load = of_agents[r] if len(of_agents) > 0 else 0.0
-        solver.u[r] = implicit.within(solver.held[r], load, limit[r])
+        solver.u[r] = min(max(solver.held[r] - load, -limit[r]), limit[r]) + load
     plant.set_out(context, parts.channels, known, solver.u, solver.rolled)
 
 

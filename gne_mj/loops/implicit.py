@@ -48,8 +48,6 @@ def act(faults, plant, context, parts, at, state, memory):
     extrapolate(solver)
     solver.numbers.found += 1.0
     if parts.problem.settings[COMPENSATION] > 0.0:
-        for r in range(len(solver.before)):
-            solver.u[r] = within(solver.before[r], 0.0, parts.problem.limit[r])
         find_keeping(plant, context, parts.channels, parts.clock, known, solver)
     ended, agreed, least = solve(plant, context, parts, parts.clock, known, memory, solver)
     return settle(parts, at.time, memory, solver, ended, agreed, least)
@@ -172,10 +170,10 @@ def find_slopes(plant, context, channels, clock, known, solver):
 def find_keeping(plant, context, channels, clock, known, solver):
     """Fill solver.keeping, and solver.u, with the input under which outputs stay over the period.
 
-    It begins with solver.u, what could be given of the input that was held last: where dry friction
-    keeps outputs at rest, this one does, and the law's part is added to it from period to period
-    until they move, or the input is at its limit.
+    It begins with the input that was held last: where dry friction keeps outputs at rest, this one
+    does, and the law's part is added to it from period to period until they move.
     """
+    copy(solver.before, solver.u)
     map_prediction(plant, context, channels, clock, known, solver)
     for _ in range(MOST_MAPS):
         stays = True
@@ -190,12 +188,6 @@ def find_keeping(plant, context, channels, clock, known, solver):
         map_prediction(plant, context, channels, clock, known, solver)
         correct_slopes(solver, solver.trial, solver.residual)
     copy(solver.u, solver.keeping)
-
-
-@kernel
-def within(total, load, limit):
-    """As much of an input and a load in total as there is with the input within its limit."""
-    return min(max(total - load, -limit), limit) + load
 
 
 @kernel

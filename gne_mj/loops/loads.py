@@ -66,8 +66,6 @@ def act(faults, plant, context, parts, at, state, memory):
     implicit.extrapolate(solver)
     solver.numbers.found += 1.0
     if parts.problem.settings[COMPENSATION] > 0.0:
-        for r in range(len(loads)):
-            solver.u[r] = implicit.within(solver.before[r], loads[r], parts.problem.limit[r])
         implicit.find_keeping(plant, context, parts.channels, parts.clock, known, solver)
     ended, agreed, least = implicit.solve(plant, context, parts, parts.clock, known, memory, solver)
     good = implicit.settle(parts, at.time, memory, solver, ended, agreed, least)
