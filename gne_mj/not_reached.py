@@ -31,7 +31,6 @@ FULL = 1.0 - 1e-9  # of a limit: it is met
 MANY = 0.2  # of the run: limits met so long are told even if none is at the end
 LOOKS = 20  # steps beyond the end at which contacts are looked at
 SLIPS = 0.01  # m/s at which a contact slides, where friction has nothing left
-_STOPS = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
 
 
 @dataclass(frozen=True)
@@ -242,18 +241,15 @@ def _stops(run: Ended) -> Iterator[Reason]:
     fleet = run.fleet
     if fleet is None:
         return
-    model, data = fleet.model, fleet.data
-    held = np.flatnonzero((data.efc_type == _STOPS) & (data.efc_force > 0.0))
-    joints = [int(j) for j in data.efc_id[held]] if data.nefc else []
-    if not joints:
+    names = acting_forces.joints_at_stops(fleet)
+    if not names:
         return
-    names = [model.joint(j).name for j in joints]
     agents = sorted({_owner(name) for name in names} - {0})
     shown = ", ".join(f"'{name.partition('/')[2] or name}'" for name in names[:4])
     yield Reason(
         "stop", agents,
-        f"of {_whose(agents)} joint{'s' * (len(joints) > 1)} {shown}{', ...' * (len(names) > 4)}"
-        f" {'are' if len(joints) > 1 else 'is'} at {'their' if len(joints) > 1 else 'its'} stop",
+        f"of {_whose(agents)} joint{'s' * (len(names) > 1)} {shown}{', ...' * (len(names) > 4)}"
+        f" {'are' if len(names) > 1 else 'is'} at {'their' if len(names) > 1 else 'its'} stop",
         {"joints": names},
     )  # fmt: skip
 

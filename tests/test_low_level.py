@@ -23,6 +23,7 @@ import reference_games
 from gne_mj.controllers import FullInformation
 from gne_mj.errors import InvalidInput, UserCodeError
 from gne_mj.games import velocity_game
+from gne_mj.plants import acting_forces
 from gne_mj.plants.mjcf_robot import MjcfAgents
 from gne_mj.system import System
 
@@ -235,7 +236,7 @@ def test_a_boats_screws_give_the_power_that_is_asked_for(tmp_path):
 def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
     """Joint torques against mj_jacSite and mj_jacSubtreeCom; at no force the arm stays."""
     given = HAND
-    plant = fleet(tmp_path / "arm.xml", ARM, given, {"site": "hand"}, 3)
+    plant = fleet(tmp_path / "arm.xml", ARM, given, {"site": "hand"}, 3, contacts="none")
     model, data, rng = plant.model, plant.data, np.random.default_rng(1)
     plant.reset(np.zeros((3, 2)))
     plant.step(np.zeros(3), 500)
@@ -251,6 +252,39 @@ def test_an_arms_hand_is_pulled_by_the_jacobians_transpose(tmp_path):
         assert u @ y == pytest.approx(u @ jacobian @ data.qvel, rel=1e-12)
         plant.step(u)
         assert np.allclose(data.qfrc_actuator, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("tau", [None, 0.7])
+def test_what_acts_behind_a_controller_is_its_drag_and_not_the_weight_it_holds(tmp_path, tau):
+    """In air, tilted and under way: the fluid's force on all of it, whatever the thrust does."""
+    text = QUADROTOR.replace("<option/>", '<option density="1.2" wind="2 0 0"/>')
+    more = {} if tau is None else {"lookahead": tau, "local_damping": 0.0}
+    plant = fleet(tmp_path / "q.xml", text, ROTORS, {"body": "frame"}, 3, **more)
+    plant.reset(plant.state)
+    plant.step([0.8, -0.5, 0.3], 300)
+    mujoco.mj_forward(plant.model, plant.data)
+    mass = np.empty((6, 6))
+    mujoco.mj_fullM(plant.model, plant.data, mass)
+    moves = np.linalg.inv(mass)[:3]  # the centre of mass is off the frame's origin
+    drag = np.linalg.solve(moves[:, :3], moves @ plant.data.qfrc_fluid)
+    balance = acting_forces.balance(plant, np.array([0.8, -0.5, 0.3]), 1)
+    assert not balance["gravity"].any()
+    assert np.allclose(balance["fluid"], -drag, rtol=0.01, atol=1e-3 * np.abs(drag).max())
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_weight_is_a_load_where_a_hand_does_not_hold_it(tmp_path, held):
+    joints = {"controller": "hand", "joints": ["a", "b", "c", "d"], "site": "hand"}
+    given = {**joints, "hold_weight": held}
+    plant = fleet(tmp_path / "arm.xml", ARM, given, {"site": "hand"}, 3, contacts="none")
+    plant.reset(np.zeros((3, 2)))
+    gravity = acting_forces.balance(plant, np.zeros(3), 1)["gravity"]
+    assert gravity.any() != held
+    if not held:  # a force at the hand that keeps it where it is for a step
+        assert np.linalg.norm(gravity) > 1.0
+        plant.reset(np.zeros((3, 2)))
+        plant.step(gravity, 1)
+        assert np.max(np.abs(plant.output)) < 1e-5
 
 
 def test_servos_with_a_ctrlrange_give_forces_and_count_where_they_do_not(tmp_path):

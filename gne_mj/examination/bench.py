@@ -16,7 +16,6 @@ from gne_mj.plants.mjcf_robot import MjcfRobots
 
 Array = NDArray[np.float64]
 BUILT = 1e-9  # a limit that all actuators let through
-_LIMIT_JOINT = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +97,10 @@ class Bench:
 
     def stops(self) -> list[str]:
         """The joints that are at their stops now."""
-        model, data = self.plant.model, self.plant.data
         with quiet():
-            mujoco.mj_forward(model, data)
-        if not data.nefc:
-            return []
-        held = (data.efc_type == _LIMIT_JOINT) & (data.efc_force > 0.0)
-        names = [model.joint(int(j)).name.partition("/")[2] for j in data.efc_id[held]]
-        return [name or "a nameless one" for name in dict.fromkeys(names)]
+            mujoco.mj_forward(self.plant.model, self.plant.data)
+        names = [name.partition("/")[2] for name in acting_forces.joints_at_stops(self.plant)]
+        return [name or "a nameless one" for name in names]
 
 
 def bench(robot: MjcfRobots, timestep: float, integrator: str) -> Bench:

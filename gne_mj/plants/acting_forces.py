@@ -3,6 +3,10 @@
 A force f of MuJoCo's (gravity, springs, damping, fluid, dry friction) is measured by what it does
 to the outputs: they are looked at after some steps with f taken off, and without. Divided by how
 far inputs move them meanwhile that is the input that balances f, what is in between included.
+
+An agent with a low-level controller asks for a force at its output, which comes later than f: there
+it is how far such a force itself moves the output. A weight that the controller holds without being
+asked is no load.
 """
 
 import mujoco
@@ -18,6 +22,7 @@ _DRY = (
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
 )
+_STOP = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
 SHARE = 0.01  # of the greatest: what is less is not told
 REST = "contacts and the rest"
 
@@ -34,24 +39,36 @@ def restore(plant: FleetPlant, state: Array) -> None:
     mujoco.mj_setState(plant.model, plant.data, state, _STATE)
 
 
-def response(plant: FleetPlant, state: Array, u: Array, steps: int) -> Array:
-    """Outputs (m,) so many steps after a state, under inputs u (m,) held."""
+def response(
+    plant: FleetPlant, state: Array, u: Array, steps: int, force: Array | float = 0.0
+) -> Array:
+    """Outputs (m,) so many steps after a state, under inputs u (m,) and a force (nv,) held."""
     restore(plant, state)
+    plant.data.qfrc_applied[:] += force
     plant.step(u, steps)
     return plant.output
 
 
-def slopes(plant: FleetPlant, state: Array, u: Array, change: Array, steps: int) -> Array:
+def slopes(
+    plant: FleetPlant, state: Array, u: Array, change: Array, steps: int,
+    moves: Array | None = None,
+) -> Array:  # fmt: skip
     """(N, d, d) how each agent's outputs have risen so many steps later with its inputs.
 
     By differences of ``change`` (m,) to either side of u; other agents' inputs change meanwhile, so
-    that those are to be apart.
+    that those are to be apart. With ``moves`` (m, nv), how outputs' velocities are made of joint
+    velocities, it is with forces at the outputs in place of inputs.
     """
     d = plant.agents.dimension
     found = np.empty((plant.agents.count, d, d))
     for axis in range(d):
         part = np.where(np.arange(len(u)) % d == axis, change, 0.0)
-        up, down = (response(plant, state, u + sign * part, steps) for sign in (1.0, -1.0))
+        up, down = (
+            response(plant, state, u + sign * part, steps)
+            if moves is None
+            else response(plant, state, u, steps, sign * part @ moves)
+            for sign in (1.0, -1.0)
+        )
         found[:, :, axis] = ((up - down).reshape(-1, d)) / (2.0 * change[axis::d, None])
     return found
 
@@ -77,6 +94,15 @@ def forces(plant: FleetPlant) -> dict[str, Array]:
     }  # fmt: skip
 
 
+def joints_at_stops(plant: FleetPlant) -> list[str]:
+    """The names of the joints that their stops push at the present state, forces evaluated."""
+    model, data = plant.model, plant.data
+    if not data.nefc:
+        return []
+    pushed = (data.efc_type == _STOP) & (data.efc_force > 0.0)
+    return [model.joint(int(j)).name for j in dict.fromkeys(data.efc_id[pushed].tolist())]
+
+
 def holding(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:
     """The inputs (m,) that balance each of :func:`forces` at the present state.
 
@@ -86,16 +112,19 @@ def holding(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:
         steps: how many; the fewer, the less the forces change meanwhile.
     """
     state, acting = saved(plant), forces(plant)
-    rise = slopes(plant, state, u, 1e-3 * np.maximum(np.abs(u), 1.0), steps)
-    still = response(plant, state, u, steps)
-    found = {}
-    for name, force in acting.items():
+    change = 1e-3 * np.maximum(np.abs(u), 1.0)
+    rise = slopes(plant, state, u, change, steps)
+    controlled = list(plant.holds_weight)
+    if controlled:
         restore(plant, state)
-        plant.data.qfrc_applied[:] -= force
-        plant.step(u, steps)
-        moved = (plant.output - still).reshape(len(rise), -1, 1)
-        found[name] = (np.linalg.pinv(rise) @ moved).ravel()
-    return found
+        pushed = slopes(plant, state, u, change, steps, plant.output_moves)
+        rise[controlled] = pushed[controlled]
+    still, found = response(plant, state, u, steps), {}
+    for name, force in acting.items():
+        moved = response(plant, state, u, steps, -force) - still
+        found[name] = np.linalg.pinv(rise) @ moved.reshape(len(rise), -1, 1)
+    found["gravity"][[i for i, held in plant.holds_weight.items() if held]] = 0.0
+    return {name: value.ravel() for name, value in found.items()}
 
 
 def balance(plant: FleetPlant, u: Array, steps: int) -> dict[str, Array]:

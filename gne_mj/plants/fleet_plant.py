@@ -57,6 +57,20 @@ class FleetPlant(Plant):
         return {}
 
     @property
+    def holds_weight(self) -> dict[int, bool]:
+        """For each agent (from 0) with a low-level controller whether that holds its weight."""
+        return {}
+
+    @property
+    def output_moves(self) -> NDArray[np.float64]:
+        """(m, nv) how outputs' velocities are made of joint velocities; these are zero then.
+
+        Raises:
+            NotImplementedError: of a fleet without low-level controllers, where nobody asks.
+        """
+        raise NotImplementedError
+
+    @property
     def state_bits(self) -> int:
         """Of mjtState, what puts a fleet back to where it was, but for what a loop keeps."""
         return STATE

@@ -1,6 +1,6 @@
 """How inputs reach a fleet of users' robots: which controls each is a part of, and by how much.
 
-Those that a low-level controller takes are in :mod:`gne_mj.plants.mjcf_control`.
+Those that a low-level controller takes are in :mod:`gne_mj.plants.mjcf_low_level`.
 """
 
 from dataclasses import dataclass
@@ -86,8 +86,6 @@ def add_effort(spec: Any, given: str | Input | Controlled, channel: int, path: P
     if given.kind == "body":
         found.add_site(name=name)
     actuator = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE)
-    actuator.set_to_motor()  # whatever the file's defaults say
-    actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_FALSE
     actuator.target = name if given.kind == "body" else given.name
     if not given.own:
         if spec.site(_WORLD) is None:
@@ -95,9 +93,10 @@ def add_effort(spec: Any, given: str | Input | Controlled, channel: int, path: P
         actuator.refsite = _WORLD
     actuator.gear = np.eye(6)[given.axis + 3 * given.torque]
     # whatever the file's defaults are
-    actuator.ctrllimited = actuator.forcelimited = actuator.actlimited = 0
-    actuator.dyntype, actuator.biastype = mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtBias.mjBIAS_NONE
-    actuator.gaintype, actuator.gainprm[0] = mujoco.mjtGain.mjGAIN_FIXED, 1.0
+    actuator.set_to_motor()
+    actuator.ctrllimited = actuator.forcelimited = actuator.actlimited = (
+        mujoco.mjtLimited.mjLIMITED_FALSE
+    )
 
 
 def _effort(channel: int) -> str:

@@ -13,29 +13,22 @@ from gne_mj.native import compiled, kernel, source_key
 from gne_mj.numbers import dtype_in
 from gne_mj.parameter_block import ParameterBlock
 from gne_mj.plain import raise_pending
-from gne_mj.plants import mjcf_file, mjcf_robot, mjcf_start
+from gne_mj.plants import mjcf_robot, mjcf_start
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.callbacks import callbacks, quiet
 from gne_mj.plants.fleet import compile_model
 from gne_mj.plants.fleet_plant import FleetPlant
-from gne_mj.plants.low_level.table import Controller
-from gne_mj.plants.mjcf_contacts import (
-    Part,
-    counted_owners,
-    let_touch,
-    owners_of,
-    part_of,
-)
-from gne_mj.plants.mjcf_control import (
-    add_memory,
+from gne_mj.plants.mjcf_contacts import counted_owners, let_touch, owners_of
+from gne_mj.plants.mjcf_drive import driving
+from gne_mj.plants.mjcf_floors import show_one_floor
+from gne_mj.plants.mjcf_low_level import (
     controllers_of,
     fleet_controls,
     limits_met,
     own_entries,
     read_all,
 )
-from gne_mj.plants.mjcf_drive import add_effort, driving
-from gne_mj.plants.mjcf_floors import Floors, leave_out
+from gne_mj.plants.mjcf_output import Output
 from gne_mj.plants.mjcf_pose import check_leaves
 from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
@@ -50,7 +43,7 @@ from gne_mj.plants.mjcf_prediction import (
 )
 from gne_mj.plants.mjcf_reading import Term, array_word, fresh_by, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
-from gne_mj.plants.mjcf_terrain import check_options, ground, show_one_floor, without_floors
+from gne_mj.plants.mjcf_world import world_of
 from gne_mj.plants.mujoco import INTEGRATORS, Sizes, run_steps
 from gne_mj.plants.native_mujoco import (
     KNOWN_STATE,
@@ -130,7 +123,7 @@ class MjcfPlant(FleetPlant):
         self.passive = passive_callback(offsets(), self.kernels) if lookahead else None
         with named(path="agents.path"):
             controllers = controllers_of(agents)
-            world, parts, floors, memory_asked = _world(agents, controllers)
+            world, parts, floors, memory_asked = world_of(agents, controllers)
         own = own_entries(controllers)
         with named(world="agents.path"):
             self.model = compile_model(
@@ -279,6 +272,18 @@ class MjcfPlant(FleetPlant):
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
         return np.maximum(self.places.output, -1)
 
+    def push_unit(self, channel: int) -> str:
+        """See the base class; of a sum that of its first part."""
+        output = self.agents.robots[channel].output
+        if not isinstance(output, Output):
+            return super().push_unit(channel)
+        first = output.terms[0] if output.terms else output
+        if first.kind == "joint" and output.terms:
+            prefix = f"robot_{channel // self.agents.dimension + 1}/"
+            hinge = self.model.joint(prefix + first.name).type[0] == mujoco.mjtJoint.mjJNT_HINGE
+            return "N m" if hinge else "N"
+        return "N m" if first.angular else super().push_unit(channel)
+
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, 2), a copy: outputs and positions."""
@@ -310,6 +315,16 @@ class MjcfPlant(FleetPlant):
         """See the base class."""
         return limits_met(self.data, self.low_level)
 
+    @property
+    def holds_weight(self) -> dict[int, bool]:
+        """See the base class."""
+        return {i: each.holds_weight for i, each in self.low_level.controllers.items()}
+
+    @property
+    def output_moves(self) -> NDArray[np.float64]:
+        """See the base class."""
+        return mjcf_start.output_moves(self)
+
     def controls(self, u: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Write into out (nu,) what inputs u (m,) make of the controls that follow from them."""
         self._driving.set(out, u)
@@ -330,40 +345,6 @@ class MjcfPlant(FleetPlant):
 
 
 PLANT = MjcfPlant
-
-
-def _world(
-    agents: MjcfRobots, controllers: dict[int, Controller]
-) -> tuple[Any, list[Part], dict[str, set[int]], int]:
-    """A fleet's MjSpec, what of it is each robot's, floors of several of them by their names, and
-    the memory that they ask for in bytes."""
-    robots, places, terrain = agents.files, agents.places, agents.terrain
-    world = ground(terrain, places)
-    # which finds what is wrong with them
-    alone = {path: mjcf_file.alone(path) for path in dict.fromkeys(r.path for r in robots)}
-    parts, floors, memory = [], Floors(), 0
-    for i, robot in enumerate(robots):
-        spec = mjcf_file.read(robot.path)
-        if i == 0:
-            mjcf_file.adopt_options(world, spec)
-            if terrain is not None:
-                check_options(world, terrain)
-        mjcf_file.check_options(world, spec, robot.path)
-        if terrain is not None:
-            without_floors(spec, robot.path)
-        for channel in range(i * agents.dimension, (i + 1) * agents.dimension):
-            add_effort(spec, agents.robots[channel].input, channel, robot.path)
-        if i in controllers:
-            add_memory(spec, controllers[i])
-        prefix, part = f"robot_{i + 1}/", part_of(spec)
-        doubles: dict[str, str] = {}
-        if terrain is None:
-            doubles = floors.doubles(spec, alone[robot.path], places[i], i, prefix)
-        parts.append(part._replace(geoms=part.geoms - len(doubles)))
-        memory += max(spec.memory, 0)
-        mjcf_file.attach(world, spec, robot.path, prefix=prefix, at=places[i])
-        leave_out(world, doubles)
-    return world, parts, floors.owners, memory
 
 
 @cache

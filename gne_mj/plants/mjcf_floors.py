@@ -16,6 +16,7 @@ SURFACE = (
     "contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp",
     "margin", "gap",
 )  # fmt: skip
+HIDDEN = 5  # a group that neither the page nor MuJoCo's viewer shows unless told
 
 
 class Floors:
@@ -70,6 +71,25 @@ def leave_out(world: Any, doubles: dict[str, str]) -> None:
             sensor.refname = doubles.get(sensor.refname, sensor.refname)
     for name in doubles:
         world.delete(world.geom(name))
+
+
+def show_one_floor(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:
+    """Hide but one of the planes that lie in each other: a floor that all bring is seen once.
+
+    Args:
+        model: of the fleet; those that are hidden change their group.
+        data: positions evaluated.
+        owners: of each geom; a robot's own floor is seen before the lane's.
+    """
+    stands = (model.geom_bodyid == 0) & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    planes = sorted(np.flatnonzero(stands).tolist(), key=lambda geom: not owners[geom])
+    seen: set[tuple[float, ...]] = set()
+    for geom in planes:
+        normal = data.geom_xmat[geom].reshape(3, 3)[:, 2]
+        place = tuple(np.round([*normal, normal @ data.geom_xpos[geom]], 9).tolist())
+        if place in seen:
+            model.geom_group[geom] = HIDDEN
+        seen.add(place)
 
 
 def _key(alone: mujoco.MjModel, geom: int, place: Pose) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from gne_mj.native import kernel
 from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.parameter_block import floats, integers
-from gne_mj.plants.mjcf_control import Controls, run_all
+from gne_mj.plants.mjcf_low_level import Controls, run_all
 from gne_mj.plants.mjcf_reading import READING, position_of, velocity_of
 from gne_mj.plants.mujoco import PLACES, SIZES, Sizes, sizes_in
 from gne_mj.plants.native_mujoco import (

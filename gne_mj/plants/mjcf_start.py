@@ -20,7 +20,7 @@ from gne_mj.errors import InvalidInput, named
 from gne_mj.plants import mjcf_file
 from gne_mj.plants.callbacks import quiet
 from gne_mj.plants.mjcf_contacts import check_apart
-from gne_mj.plants.mjcf_control import begin
+from gne_mj.plants.mjcf_low_level import begin
 
 if TYPE_CHECKING:
     from gne_mj.plants.mjcf_contacts import Part
@@ -293,6 +293,18 @@ def _slopes(plant: MjcfPlant) -> Array:
     return slopes
 
 
+def output_moves(plant: MjcfPlant) -> Array:
+    """(m, nv) how the velocities that outputs are made of change with joint velocities.
+
+    Joint velocities are zero at the end.
+    """
+    plant.data.qvel[:] = 0.0
+    found = _slopes(plant)
+    if plant.passive is not None:  # y = q + tau (v - v_0)
+        found /= plant.agents.parameters[:, :1]
+    return found
+
+
 def _move_to(plant: MjcfPlant, positions: Array) -> None:
     """Move to these positions (m,) by Newton's method, each step the smallest that does.
 
@@ -304,7 +316,7 @@ def _move_to(plant: MjcfPlant, positions: Array) -> None:
     for _ in range(NEWTON):
         if np.max(np.abs(missed)) <= 1e-12 * size:
             return
-        move = np.linalg.lstsq(_slopes(plant) / agents.parameters[:, :1], missed, rcond=None)[0]
+        move = np.linalg.lstsq(output_moves(plant), missed, rcond=None)[0]
         mujoco.mj_integratePos(plant.model, plant.data.qpos, move, 1.0)
         missed = positions - plant.state[:, 1]
     if np.max(np.abs(missed)) > 1e-9 * size:

@@ -12,7 +12,6 @@ from gne_mj.plants.fleet import read_model
 from gne_mj.plants.mjcf_pose import Pose
 
 PREFIX = "terrain/"  # of the names of its elements
-HIDDEN = 5  # a group that neither the page nor MuJoCo's viewer shows unless told
 
 
 def ground(terrain: Path | None, poses: tuple[Pose, ...]) -> Any:
@@ -77,25 +76,6 @@ def without_floors(spec: Any, path: Path) -> None:
                 " <pair> of its contacts names: leave the pair or the terrain out",
             )  # fmt: skip
         spec.delete(geom)
-
-
-def show_one_floor(model: mujoco.MjModel, data: mujoco.MjData, owners: list[set[int]]) -> None:
-    """Hide but one of the planes that lie in each other: a floor that all bring is seen once.
-
-    Args:
-        model: of the fleet; those that are hidden change their group.
-        data: positions evaluated.
-        owners: of each geom; a robot's own floor is seen before the lane's.
-    """
-    stands = (model.geom_bodyid == 0) & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
-    planes = sorted(np.flatnonzero(stands).tolist(), key=lambda geom: not owners[geom])
-    seen: set[tuple[float, ...]] = set()
-    for geom in planes:
-        normal = data.geom_xmat[geom].reshape(3, 3)[:, 2]
-        place = tuple(np.round([*normal, normal @ data.geom_xpos[geom]], 9).tolist())
-        if place in seen:
-            model.geom_group[geom] = HIDDEN
-        seen.add(place)
 
 
 def _check_stands(spec: Any, path: Path) -> None:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from gne_mj.plants.low_level import planar_drive
-from gne_mj.plants.low_level.table import Controller, ControllerTable
+from gne_mj.plants.low_level.planar_drive import PlanarDriveTable
+from gne_mj.plants.low_level.table import Controller
 from gne_mj.registry import LOW_LEVEL
 from gne_mj.toml_table import Unit
 
@@ -23,27 +23,19 @@ if TYPE_CHECKING:
 
 
 @LOW_LEVEL.register
-class DifferentialDriveTable(ControllerTable):
+class DifferentialDriveTable(PlanarDriveTable):
     """A force on a car with two driven wheels: ahead, with a moment, or in the plane at a site."""
 
     controller: Literal["differential-drive"]
     wheels: list[str] = Field(
         min_length=2, max_length=2, description="actuators of the left and the right wheel's joint"
     )
-    site: str | None = Field(
-        None, description="ahead of the axle, at which a force in the plane acts"
-    )
     radius: Annotated[float | None, Unit("m")] = Field(
         None, gt=0, description="of the wheels; if left out that of their geoms"
     )
-    hold_heading: Annotated[float | None, Unit("rad/s")] = Field(
-        None, gt=0, description="of a force ahead alone: how fast it comes back to the heading that"
-        " it starts with; not held if left out",
-    )  # fmt: skip
 
     def bind(self, robot: "Robot", axes: int) -> Controller:
         """See the base class."""
-        kind, holding = planar_drive.kind_of(robot, axes, self.site, self.hold_heading)
         model, data = robot.model, robot.data
         joints = [robot.joint_of("wheels", name) for name in self.wheels]
         bodies = [int(model.jnt_bodyid[joint]) for joint in joints]
@@ -65,10 +57,5 @@ class DifferentialDriveTable(ControllerTable):
             for side, radius, sign in zip(np.sign(turning), radii, (-1.0, 1.0), strict=True)
             for part in (0.5, sign / apart)
         ]
-        ahead = planar_drive.ahead_of(robot, car, self.site, float(left[0]))
-        inertia = robot.yaw_inertia(car)
-        numbers = np.array([kind, ahead, *(inertia * gain for gain in holding), *rows])
-        body = robot.name("wheels", "body", car)
-        return Controller(
-            planar_drive, tuple(self.wheels), planar_drive.seen(body), numbers, axes, held=2
-        )
+        axle = float(left[0])
+        return self.drive(robot, axes, self.wheels, ("wheels", car), axle, np.array(rows))

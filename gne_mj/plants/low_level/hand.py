@@ -15,7 +15,6 @@ from pydantic import Field
 
 from gne_mj.native import kernel
 from gne_mj.plants.low_level.table import Controller, ControllerTable, three
-from gne_mj.plants.mjcf_output import AXES
 from gne_mj.registry import LOW_LEVEL
 
 if TYPE_CHECKING:
@@ -69,9 +68,7 @@ class HandTable(ControllerTable):
 
     def bind(self, robot: "Robot", axes: int) -> Controller:
         """See the base class."""
-        wished: list[str] = list(self.axes) if self.axes is not None else list(AXES[:axes])
-        if len(wished) != axes or len(set(wished)) != axes:
-            raise robot.refused("axes", wished, f"an action has {axes} entries: name as many axes")
+        numbers = robot.entries_of_axes(self.axes, axes)
         model = robot.model
         site = robot.find("site", "site", self.site)
         joints = [robot.joint_of("joints", name, slides=True) for name in self.joints]
@@ -83,7 +80,6 @@ class HandTable(ControllerTable):
                     "joints", self.joints, f"'{name}' carries the site as well: name its actuator"
                 )
         bodies = [int(model.jnt_bodyid[joint]) for joint in joints]
-        numbers = [float(wished.index(axis)) if axis in wished else -1.0 for axis in AXES]
         numbers += model.opt.gravity.tolist()
         seen = three("site", self.site, "site_xpos")
         for joint, body in zip(joints, bodies, strict=True):
@@ -95,4 +91,7 @@ class HandTable(ControllerTable):
             name = robot.name("joints", "joint", joint)
             seen += three("joint", name, "xaxis") + three("joint", name, "xanchor")
             seen += three("body", robot.name("joints", "body", body), "subtree_com")
-        return Controller(sys.modules[__name__], tuple(self.joints), seen, np.array(numbers), axes)
+        return Controller(
+            sys.modules[__name__], tuple(self.joints), seen, np.array(numbers), axes,
+            holds_weight=self.hold_weight,
+        )  # fmt: skip

@@ -7,15 +7,21 @@ left. With F alone, M is 0 or holds the heading psi that it starts with, by
 M = -k_1 sin(psi - psi_0) - k_2 psi'. The two actuators give what their places make of F and M.
 """
 
-from typing import TYPE_CHECKING, Any
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from gne_mj.native import kernel
-from gne_mj.plants.low_level.table import Seen, along, orientation
+from gne_mj.plants.low_level.table import Controller, ControllerTable, along, orientation
+from gne_mj.toml_table import Unit
 
 if TYPE_CHECKING:
     from gne_mj.plants.low_level.robot import Robot
+
+Array = NDArray[np.float64]
 
 FORWARD, FORCE_AND_MOMENT, IN_THE_PLANE = range(3)
 # q: which of these, l, k_1, k_2, then what the actuators give for F and M, a row of two each
@@ -47,41 +53,69 @@ def start(q, readings, out):
     out[0], out[1] = readings[0] / size, readings[1] / size
 
 
-def seen(body: str) -> tuple[Seen, ...]:
-    """What it reads of a body."""
-    turns = along("velocity", "body", body, angular=True, axes=(2,))
-    return (*orientation("body", body)[0:4:3], *turns)
+class PlanarDriveTable(ControllerTable):
+    """What the tables of both have: a site, and a heading that is held."""
 
+    site: str | None = Field(
+        None, description="ahead of where the forces act, at which a force in the plane acts"
+    )
+    hold_heading: Annotated[float | None, Unit("rad/s")] = Field(
+        None, gt=0, description="of a force ahead alone: how fast it comes back to the heading that"
+        " it starts with; not held if left out",
+    )  # fmt: skip
 
-def kind_of(
-    robot: "Robot", axes: int, site: str | None, hold_heading: float | None
-) -> tuple[int, tuple[float, float]]:
-    """Which of the three it is; and of a heading that is held w^2 and 2 w, else zeros.
+    def drive(
+        self, robot: "Robot", axes: int, actuators: list[str], body: tuple[str, int],
+        origin: float, rows: Array,
+    ) -> Controller:  # fmt: skip
+        """The controller.
 
-    Raises:
-        InvalidInput: the keys do not fit to so many entries; names ``input`` and the key.
-    """
-    if axes > 2:
-        raise robot.refused("controller", f"an action of {axes} entries", "it takes one or two")
-    if axes == 1 and site is not None:
-        raise robot.refused("site", site, "it is for actions with two entries")
-    if axes == 2 and hold_heading is not None:
-        raise robot.refused("hold_heading", hold_heading, "it is for actions with one entry")
-    kind = (FORWARD, FORCE_AND_MOMENT if site is None else IN_THE_PLANE)[axes - 1]
-    rate = hold_heading or 0.0
-    return kind, (rate**2, 2.0 * rate)
+        Args:
+            robot: its file.
+            axes: entries of the input.
+            actuators: the two.
+            body: the key that says it, and the body that they drive.
+            origin: in m, where on its x axis the forces act.
+            rows: (2, 2) what each actuator gives for F and M.
 
+        Raises:
+            InvalidInput: keys do not fit to so many entries, the site is not there or not ahead, or
+                the body has no name; names ``input`` and the key.
+        """
+        key, index = body
+        kind, ahead = self._kind(robot, axes), self._ahead(robot, index, origin)
+        inertia, rate = robot.yaw_inertia(index), self.hold_heading or 0.0
+        numbers = [kind, ahead, inertia * rate**2, inertia * 2.0 * rate, *rows.ravel()]
+        name = robot.name(key, "body", index)
+        turns = along("velocity", "body", name, angular=True, axes=(2,))
+        seen = (*orientation("body", name)[0:4:3], *turns)
+        return Controller(
+            sys.modules[__name__], tuple(actuators), seen, np.array(numbers), axes, held=2
+        )
 
-def ahead_of(robot: "Robot", body: int, site: str | None, origin: float) -> float:
-    """l in m: how far a site is ahead of a point on a body's x axis; 0 without one.
+    def _kind(self, robot: "Robot", axes: int) -> int:
+        """Which of the three inputs it is.
 
-    Raises:
-        InvalidInput: there is no such site, or it is not ahead; names ``input.site``.
-    """
-    if site is None:
-        return 0.0
-    index = robot.find("site", "site", site)
-    place: Any = robot.axes(body).T @ (robot.data.site_xpos[index] - robot.data.xpos[body])
-    if abs(place[0] - origin) < 1e-9:
-        raise robot.refused("site", site, "it must be ahead of where the forces act")
-    return float(place[0]) - origin
+        Raises:
+            InvalidInput: the keys do not fit to so many entries; names ``input`` and the key.
+        """
+        if axes > 2:
+            entries = f"an action of {axes} entries"
+            raise robot.refused("controller", entries, "it takes one or two")
+        if axes == 1 and self.site is not None:
+            raise robot.refused("site", self.site, "it is for actions with two entries")
+        if axes == 2 and self.hold_heading is not None:
+            raise robot.refused(
+                "hold_heading", self.hold_heading, "it is for actions with one entry"
+            )
+        return (FORWARD, FORCE_AND_MOMENT if self.site is None else IN_THE_PLANE)[axes - 1]
+
+    def _ahead(self, robot: "Robot", body: int, origin: float) -> float:
+        """l in m: how far the site is ahead of where the forces act; 0 without one."""
+        if self.site is None:
+            return 0.0
+        index = robot.find("site", "site", self.site)
+        place: Any = robot.axes(body).T @ (robot.data.site_xpos[index] - robot.data.xpos[body])
+        if abs(place[0] - origin) < 1e-9:
+            raise robot.refused("site", self.site, "it must be ahead of where the forces act")
+        return float(place[0]) - origin

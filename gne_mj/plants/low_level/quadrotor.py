@@ -19,7 +19,6 @@ from pydantic import Field
 
 from gne_mj.native import kernel
 from gne_mj.plants.low_level.table import Controller, ControllerTable, along, orientation
-from gne_mj.plants.mjcf_output import AXES
 from gne_mj.registry import LOW_LEVEL
 from gne_mj.toml_table import Unit
 
@@ -120,9 +119,7 @@ class QuadrotorTable(ControllerTable):
 
     def bind(self, robot: "Robot", axes: int) -> Controller:
         """See the base class."""
-        wished: list[str] = list(self.axes) if self.axes is not None else list(AXES[:axes])
-        if len(wished) != axes or len(set(wished)) != axes:
-            raise robot.refused("axes", wished, f"an action has {axes} entries: name as many axes")
+        entries = robot.entries_of_axes(self.axes, axes)
         body = robot.free_body("body", self.body)
         name = robot.name("body", "body", body)
         mass, centre, inertia = robot.composite(body)
@@ -134,7 +131,6 @@ class QuadrotorTable(ControllerTable):
                 "rotors", self.rotors, "together they must give thrust along the body's z and all"
                 " three moments",
             )  # fmt: skip
-        entries = [float(wished.index(axis)) if axis in wished else -1.0 for axis in AXES]
         gravity = -float(robot.model.opt.gravity[2])
         numbers = [
             mass, mass * gravity, np.tan(self.most_tilt), self.attitude, self.damping, self.hold,
@@ -146,5 +142,6 @@ class QuadrotorTable(ControllerTable):
             *along("position", "body", name),
         )  # fmt: skip
         return Controller(
-            sys.modules[__name__], tuple(self.rotors), seen, np.array(numbers), axes, held=5
-        )
+            sys.modules[__name__], tuple(self.rotors), seen, np.array(numbers), axes, held=5,
+            holds_weight=True,
+        )  # fmt: skip

@@ -1,5 +1,6 @@
 """A robot's file by itself, as controllers look into it for masses, places and wheels."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput, nearest
 from gne_mj.plants.mjcf_actuator import is_servo
+from gne_mj.plants.mjcf_output import AXES
 from gne_mj.plants.mjcf_reading import OBJECTS, names_in
 
 Array = NDArray[np.float64]
@@ -52,6 +54,21 @@ class Robot(NamedTuple):
     def refused(self, key: str, value: Any, expected: str) -> InvalidInput:
         """The error for a key of the controller's table."""
         return InvalidInput(f"input.{key}", value, expected)
+
+    def entries_of_axes(self, given: Sequence[str] | None, axes: int) -> list[float]:
+        """For x, y and z the entry of an input that is a force along it; -1 for none.
+
+        Args:
+            given: the table's ``axes``; if None the first ones.
+            axes: entries of the input.
+
+        Raises:
+            InvalidInput: they are not as many, or one is there twice; names ``input.axes``.
+        """
+        named = list(AXES[:axes] if given is None else given)
+        if len(named) != axes or len(set(named)) != axes:
+            raise self.refused("axes", named, f"an action has {axes} entries: name as many axes")
+        return [float(named.index(axis)) if axis in named else -1.0 for axis in AXES]
 
     def free_body(self, key: str, given: str | None) -> int:
         """The body of a name; without one that of the only free joint.

@@ -64,6 +64,7 @@ class Controller:
         start: in place of the module's.
         kept: what must be there as long as it is.
         raw: whether it says the actuators' own controls, which are not made forces.
+        holds_weight: whether it gives what holds the robot against gravity without being asked.
     """
 
     module: ModuleType
@@ -76,6 +77,7 @@ class Controller:
     start: Callable[..., None] | None = None
     kept: Any = None
     raw: bool = False
+    holds_weight: bool = False
 
 
 class ControllerTable(Table):
