@@ -249,16 +249,18 @@ class Law(ABC):
         """The law of agents between whom these links, pairs from 0, are lost; all others are there.
 
         Raises:
-            InvalidInput: its graph stays as it is, or it has none.
+            InvalidInput: its graph stays as it is, or it has none; names ``lost``.
         """
+        lost = list(lost)
+        pairs = [[first + 1, second + 1] for first, second in lost]
         if self.graph is None:
-            raise InvalidInput("link", "any", f"the {self.information} law has no links to lose")
+            raise InvalidInput("lost", pairs, f"the {self.information} law has no links to lose")
         if self.graph.changes:
-            raise InvalidInput("link", "any", "its graph changes by itself already")
+            raise InvalidInput("lost", pairs, "its graph changes by itself already")
         if self.kept is not None:
-            raise InvalidInput("link", "any", "agents must keep all estimates: estimates = 'all'")
+            raise InvalidInput("lost", pairs, "agents must keep all estimates: estimates = 'all'")
         if not hasattr(self, "__dataclass_fields__"):
-            raise InvalidInput("link", "any", "a law of one's own keeps its links")
+            raise InvalidInput("lost", pairs, "a law of one's own keeps its links")
         fewer: Law = replace(self, graph=self.graph.without(lost))  # type: ignore[type-var]
         return fewer
 

@@ -329,14 +329,14 @@ def check_link(system: System, agents: tuple[int, int]) -> tuple[int, int]:
     """The edge of a system's graph between two agents, from 0.
 
     Raises:
-        InvalidInput: there is none, or the law's links cannot be lost.
+        InvalidInput: there is none, or the law's links cannot be lost; names ``agents``.
     """
-    system.law.without_links(())
-    assert system.law.graph is not None
-    edge = min(agents), max(agents)
-    if edge not in system.law.graph.whole.edges:
+    edge, graph = (min(agents), max(agents)), system.law.graph
+    if graph is not None and edge not in graph.whole.edges:
         pair = [agents[0] + 1, agents[1] + 1]
         raise InvalidInput("agents", pair, "there is no link between them")
+    with named(lost="agents"):
+        system.law.without_links([edge])
     return edge
 
 

@@ -159,6 +159,19 @@ CASES = {
         ["game.system_matrix", "one length"],
     ),
     "a number for a table": ("velocity-sync", ["barrier=1"], ["barrier", "must be a table"]),
+    "a position that is no number": (
+        "cars",
+        ["agents.poses=[[nan, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"],
+        ["agents.poses.0.0: got nan", "finite number"],
+    ),
+    "a reading of nothing that there is": (
+        "cars",
+        [
+            'agents.input={controller="custom", file="x.py", actuators=["drive_left"],'
+            ' readings=[{body="car", value="speed"}]}'
+        ],
+        ["agents.input.readings.0.value: got 'speed'"],
+    ),
     "set without a value": ("velocity-sync", ["barrier.rho"], ["--set", "KEY=VALUE"]),
     "a state that robots lack": ("velocity-sync", ["initial.integral=1"], ["initial.integral"]),
 }

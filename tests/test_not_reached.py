@@ -74,6 +74,16 @@ def test_a_sound_cart_reaches_it_and_nothing_is_told():
     assert "not reached" not in str(run)
 
 
+def test_one_sample_does_not_show_that_outputs_rest():
+    """Half of the way is gone in a run whose last twentieth has one sample."""
+    from gne_mj.not_reached import Ended
+
+    time, action = np.array([0.0, 0.1, 0.2, 0.3]), np.array([[0.0], [1.0], [2.0], [3.0]])
+    ended = Ended(None, time, action, np.zeros((4, 1)), 6.0 - action[:, 0], 0.3, None)
+    assert not ended.rests[0]
+    assert Ended(None, time, 0.0 * action, action, 6.0 + 0.0 * time, 0.3, None).rests[0]
+
+
 @pytest.mark.parametrize(
     ("fault", "kind", "load"),
     [

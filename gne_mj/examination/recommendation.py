@@ -17,7 +17,7 @@ RESERVE = 0.5  # of the longest stable step
 SPREAD = 2.0  # of dy+/du over states, for an observer (docs/held-inputs.md)
 DEVELOPED = 1.5  # power of time with which a response that lags may still grow
 NEAR = 0.8  # of a limit
-SHIFTS = 0.01  # of the wished output: an equilibrium that is shifted by less is not told
+SHIFTS = 0.01  # of the wished output, or of 0.1 if that is more: a lesser shift is not told
 SLOWER = 3.0  # a step of rk4 costs more than so many of euler
 COUNT, DURATION = 3, 10.0  # robots, and s, of the scenario
 
@@ -173,11 +173,12 @@ def _shift(found: Found, slopes: Slopes) -> str:
     """How far what the wished output asks for shifts the equilibrium; empty if not far."""
     load, weight = float(np.max(np.abs(found.held.input))), _weight(slopes)
     size = float(np.max(np.abs(found.wished)))
-    if not found.held.held or load <= SHIFTS * weight * size:
+    if not found.held.held or load <= SHIFTS * weight * max(size, 0.1):
         return ""
+    away = min(load / weight, size or np.inf)
     return (
         f"at the wished output the input holds {load:.3g}, and robots rest where costs rise by as"
-        f" much as the input there, here up to {min(load / weight, size):.2g} away from y*."
+        f" much as the input there, here up to {away:.2g} away from y*."
     )
 
 

@@ -195,19 +195,27 @@ def complaint(error: ValidationError) -> InvalidInput:
     detail = details[0]
     if not detail["loc"]:
         return InvalidInput("source", list(detail["input"]), detail["msg"])
-    if detail["loc"][-1] in ("float", "str") and isinstance(detail["input"], list):
-        # of "one number, a list of them or a list of lists" the user meant what goes deepest
+    chosen = detail["loc"][-1]
+    if (chosen in ("float", "str") or _is_table(chosen)) and isinstance(detail["input"], list):
+        # of "one number (or table), a list or a list of lists" the user meant what goes deepest
         same = [d for d in details if d["loc"][: len(detail["loc"]) - 1] == detail["loc"][:-1]]
         detail = max(same[1:], key=lambda d: len(d["loc"]))
-    if isinstance(detail["input"], Mapping):  # so it is the tables among the choices that count
-        deeper = [d for d in details if any(_is_table(part) for part in d["loc"])]
-        detail = deeper[0] if deeper else detail
+    while isinstance(detail["input"], Mapping):  # so it is the tables among the choices that count
+        here = len(detail["loc"]) - 1  # where the choice is
+        deeper = [
+            d for d in details
+            if d["loc"][:here] == detail["loc"][:here] and any(map(_is_table, d["loc"][here:]))
+        ]  # fmt: skip
+        if not deeper or deeper[0] is detail:
+            break
+        detail = deeper[0]
     tags = union_tags() | {"float", "str", "list", "literal", _TABLES}
     where = [
         str(part)
         for depth, part in enumerate(detail["loc"])
-        # below this key stands a system's name, which may be that of a tag
+        # a system's name, and what an intervention does, may be called as a tag is
         if detail["loc"][:depth] == ("systems",)
+        or (depth == 2 and detail["loc"][0] == "interventions")
         or (str(part).split("[")[0] not in tags and not _is_table(part))
     ]
     value = detail["input"]
