@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
 from gne_mj.margins import Disturbance, Influence, influence
+from gne_mj.plants.agent_type import has_ode
 from gne_mj.plants.agents import Agents
 
 Array = NDArray[np.float64]
@@ -45,8 +46,11 @@ def beyond_estimates(
         guarded: whether periods may be shorter.
 
     Raises:
-        InvalidInput: slopes that are not known well enough for this gain.
+        InvalidInput: slopes that are not known well enough for this gain; of MJCF robots anything
+            but noise.
     """
+    if not has_ode(agents.kind):
+        _noise_alone(disturbance, guarded)
     if gain == 0.0:
         return disturbance
     change = np.zeros(agents.channels) if disturbance.change is None else disturbance.change
@@ -63,3 +67,20 @@ def beyond_estimates(
         read = (1.0 + effect.noise_gain) * disturbance.noise / effect.least_slope
         settled = np.maximum(settled, (change * (1.0 + gain * kappa) + gain * read) / (1.0 - q))
     return replace(disturbance, push=np.maximum(disturbance.push, settled) + change)
+
+
+def _noise_alone(disturbance: Disturbance, guarded: bool) -> None:
+    """Refuse what of robots that only MuJoCo knows no margin is known for."""
+    pushed = np.any(disturbance.push > 0)
+    changed = disturbance.change is not None and np.any(disturbance.change > 0)
+    if pushed or changed or disturbance.delay > 0:
+        what = "late sensors" if disturbance.delay > 0 else "pushes"
+        raise InvalidInput(
+            "disturbance", what, "no equation says how far pushes move MJCF robots, or where they"
+            " were: a margin of theirs is for noise",
+        )  # fmt: skip
+    if guarded:
+        raise InvalidInput(
+            "guarded", "guarded", "between instants no margin is known of MJCF robots: leave one of"
+            " both out",
+        )  # fmt: skip

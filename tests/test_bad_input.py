@@ -172,6 +172,16 @@ CASES = {
         ],
         ["agents.input.readings.0.value: got 'speed'"],
     ),
+    "a margin for pushes of MJCF robots": (
+        "cars",
+        ["margin.push=1.0"],
+        ["systems.cars.margin: got 'pushes'", "for noise"],
+    ),
+    "a margin of MJCF robots under a guard": (
+        "cars",
+        ["margin.noise=0.01", 'controller.between="guarded"'],
+        ["systems.cars.controller.between: got 'guarded'", "leave one of both out"],
+    ),
     "set without a value": ("velocity-sync", ["barrier.rho"], ["--set", "KEY=VALUE"]),
     "a state that robots lack": ("velocity-sync", ["initial.integral=1"], ["initial.integral"]),
 }

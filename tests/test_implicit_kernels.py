@@ -118,7 +118,10 @@ def test_a_prediction_that_moves_far_is_checked_where_it_arrives():
             zero_order_hold.predict(*arguments)
 
         counted = SimpleNamespace(
-            predict=predict, is_affine=zero_order_hold.is_affine, roll=zero_order_hold.roll
+            predict=predict,
+            is_affine=zero_order_hold.is_affine,
+            roll=zero_order_hold.roll,
+            is_coupled=zero_order_hold.is_coupled,
         )
         system = robot_system(robot_state(FIVE), UNEQUAL, mode="implicit", integrator="euler")
         run_plain(system, clock(h), 1, counted)
@@ -289,6 +292,10 @@ def test_both_entries_of_an_action_count_in_its_length():
 # ------------------------------------------------------------------------------------- secants
 
 
+ALONE = zero_order_hold
+COUPLED = SimpleNamespace(is_coupled=lambda: True)
+
+
 def secant_solver(u, held, reached, prediction):
     arrays = {"u": u, "held": held, "reached": reached, "prediction": prediction}
     return SimpleNamespace(
@@ -299,7 +306,7 @@ def secant_solver(u, held, reached, prediction):
 
 def test_slopes_become_the_secants_and_the_least_one_is_told():
     solver = secant_solver([1.0, 3.0, 2.0], [0.0, 1.0, 1.0], [4.0, 3.0, 1.0], [2.0, 2.5, 0.75])
-    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == 0.25
+    assert implicit.correct_slopes(ALONE, solver, solver.held, solver.prediction) == 0.25
     assert solver.slope.tolist() == [2.0, 0.25, 0.25]
     assert solver.stiff.tolist() == [0.5, 4.0, 4.0]
 
@@ -307,7 +314,7 @@ def test_slopes_become_the_secants_and_the_least_one_is_told():
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_a_slope_that_is_not_positive_is_seen_and_not_taken(way):
     solver = secant_solver([1.0, way], [0.0, 0.0], [2.0, -way], [0.0, 0.0])
-    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == -1.0
+    assert implicit.correct_slopes(ALONE, solver, solver.held, solver.prediction) == -1.0
     assert solver.slope.tolist() == [2.0, 0.5]
     assert solver.stiff.tolist() == [0.5, 2.0]
 
@@ -315,10 +322,23 @@ def test_a_slope_that_is_not_positive_is_seen_and_not_taken(way):
 def test_of_a_short_way_no_secant_is_taken():
     """Rounding is all that is seen, and nothing is known of an input that stayed."""
     solver = secant_solver([1.0, 1.0], [0.0, 1.0], [5.0 + 5e-9, 2.0], [5.0, 1.0])
-    assert implicit.correct_slopes(solver, solver.held, solver.prediction) == np.inf
+    assert implicit.correct_slopes(ALONE, solver, solver.held, solver.prediction) == np.inf
     assert solver.slope.tolist() == [0.5, 0.5]
     near = secant_solver([1.0], [0.0], [5.0 + 7e-9], [5.0])
-    assert implicit.correct_slopes(near, near.held, near.prediction) == pytest.approx(7e-9)
+    assert implicit.correct_slopes(ALONE, near, near.held, near.prediction) == pytest.approx(7e-9)
+
+
+def test_where_channels_are_coupled_a_small_move_is_not_taken_for_its_own_input():
+    """The map is y = A u: a secant of the second output is its slope where it moves enough."""
+    slopes = np.array([[1.0, 0.0], [0.02, 1.0]])
+    for own, taken in ((0.005, False), (0.5, True)):
+        u = np.array([1.0, own])
+        solver = secant_solver(u, [0.0, 0.0], slopes @ u, [0.0, 0.0])
+        implicit.correct_slopes(COUPLED, solver, solver.held, solver.prediction)
+        assert solver.slope[0] == 1.0
+        assert solver.slope[1] == (pytest.approx(1.0, rel=0.05) if taken else 0.5)
+        implicit.correct_slopes(ALONE, solver, solver.held, solver.prediction)
+        assert solver.slope[1] == pytest.approx((0.02 + own) / own)
 
 
 def test_first_slopes_are_what_a_unit_input_adds():
@@ -357,6 +377,9 @@ class Bent:
 
     def __init__(self, bend):
         self.bend, self.count = bend, 0
+
+    def is_coupled(self):
+        return False
 
     def is_affine(self, clock):
         return False

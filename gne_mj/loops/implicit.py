@@ -25,6 +25,9 @@ MOST_MAPS = 12
 AGREES = 1e-7
 # Outputs are taken to stay if they move by less, relative to 1 and their size
 KEEPS = 1e-9
+# Where inputs move each other's outputs, a secant is taken of outputs that move at least this part
+# of the way of the one that moves farthest: of others it would be mostly what those brought about
+OWN = 0.1
 # Where the map is affine in u, a prediction that moves farther than this is checked all the same:
 # the slope has rounding
 FAR = 1e-2
@@ -106,7 +109,7 @@ def solve(plant, context, parts, clock, known, memory, solver):
             solver.u[r], solver.held[r] = solver.held[r], solver.u[r]
             solver.prediction[r] = solver.reached[r]
         map_prediction(plant, context, channels, clock, known, solver)
-        least = correct_slopes(solver, solver.held, solver.prediction)
+        least = correct_slopes(plant, solver, solver.held, solver.prediction)
         copy(solver.u, solver.held)
         agreed = agrees(problem, solver)
         if agreed:
@@ -186,23 +189,27 @@ def find_keeping(plant, context, channels, clock, known, solver):
         if stays:
             break
         map_prediction(plant, context, channels, clock, known, solver)
-        correct_slopes(solver, solver.trial, solver.residual)
+        correct_slopes(plant, solver, solver.trial, solver.residual)
     copy(solver.u, solver.keeping)
 
 
 @kernel
-def correct_slopes(solver, tried, led):
+def correct_slopes(plant, solver, tried, led):
     """Slopes by the secants from inputs ``tried`` and the outputs that they ``led`` to to (u,
     reached); returns the least one seen.
 
     A secant that is not positive is not taken: the equation would not be monotone.
     """
-    least = np.inf
+    least, notable = np.inf, 0.0
+    if plant.is_coupled():
+        for r in range(len(solver.u)):
+            notable = max(notable, OWN * abs(solver.reached[r] - led[r]))
     for r in range(len(solver.u)):
         change = solver.u[r] - tried[r]
         moved = solver.reached[r] - led[r]
         # of a short way rounding is all that is seen
-        if abs(moved) > 1e-9 * (1.0 + abs(solver.reached[r])) and change != 0.0:
+        short = 1e-9 * (1.0 + abs(solver.reached[r]))
+        if abs(moved) > short and abs(moved) >= notable and change != 0.0:
             secant = moved / change
             least = min(least, secant)
             if 0.0 < secant < np.inf:

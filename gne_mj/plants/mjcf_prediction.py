@@ -222,11 +222,15 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     """Fill out (m,) with the outputs after a control period under u (m,), by a second mjData.
 
     The arguments are as :func:`gne_mj.plants.zero_order_hold.predict` has them, but that it starts
-    from the simulation itself and not from ``state``.
+    from the simulation itself. Where outputs of ``state`` are read wrong, what they change by over
+    the period is added to what is read.
     """
-    at, model, _data, parameter_block = context
+    at, model, data, parameter_block = context
     prediction = prediction_in(parameter_block)
     twin = prediction.twin
+    gather(at, data, parameter_block, trial)
+    for r in range(len(u)):
+        out[r] = state[2 * r] - trial[2 * r]
     set_out(context, channels, state, u, trial)
     for _ in range(clock.period):
         drive_again(at, model, twin, parameter_block, u)
@@ -234,7 +238,13 @@ def predict(context, channels, clock, state, u, out, trial, scratch):
     refresh(model, twin, parameter_block)
     gather(at, twin, parameter_block, trial)
     for r in range(len(u)):
-        out[r] = trial[2 * r]
+        out[r] += trial[2 * r]
+
+
+@kernel
+def is_coupled():
+    """Whether an input moves the outputs of other channels: axes of a body, robots that touch."""
+    return True
 
 
 @kernel

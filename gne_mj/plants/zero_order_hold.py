@@ -45,6 +45,12 @@ def step_on(context, channels, clock, u, out, trial, scratch):
 
 
 @kernel
+def is_coupled():
+    """Whether an input moves the outputs of other channels: each channel is by itself."""
+    return False
+
+
+@kernel
 def is_affine(clock):
     """Whether the map is affine in u beyond doubt: one Euler step, since x' is affine in u."""
     return clock.period == 1 and clock.method == 0

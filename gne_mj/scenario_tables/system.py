@@ -338,7 +338,11 @@ class SystemTable(Table):
                 f"no margin is known for a game that moves (game.{self.game.moving[0]})",
             )
         period = simulation.control_period or simulation.timestep
-        with named(period="simulation.control_period", observer="controller.observer"):
+        keys = {
+            "period": "simulation.control_period", "observer": "controller.observer",
+            "disturbance": "margin", "guarded": "controller.between",
+        }  # fmt: skip
+        with named(**keys):
             guarded = self.controller.between == GUARDED
             steps = max(1, round(period / simulation.timestep))
             unforeseen = beyond_estimates(

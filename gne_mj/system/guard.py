@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
-from gne_mj.faults import sensor_delay
+from gne_mj.faults import Bias, Noise, sensor_delay
 from gne_mj.load_margins import beyond_estimates
 from gne_mj.loops import link
 from gne_mj.loops.feedback import Order
@@ -58,6 +58,12 @@ def check_guard(system: SystemData) -> None:
         raise InvalidInput(
             key, value, "late sensors are late by whole control periods, under one input each:"
             " leave it out, or the delay",
+        )  # fmt: skip
+    wrong = any(isinstance(fault, Noise | Bias) for fault in system.faults)
+    if wrong and not has_ode(system.agents.kind):
+        raise InvalidInput(
+            key, value, "looking ahead it steps MJCF robots on from where they truly are, which"
+            " sensors with noise or bias do not tell: leave it out, or these faults",
         )  # fmt: skip
 
 

@@ -255,6 +255,8 @@ class ZeroOrderHold:
                 f"sensors are {declared.delay} periods late, and the margin covers {bound.delay}",
             )
         why = "the barrier is tightened by what they can do within a control period"
+        if system.observer > 0.0 and not has_ode(system.agents.kind):
+            return Assumption(label, ASSUMED, f"{why}, dy+/du being what the observer divides by")
         if system.game.tested:
             return Assumption(label, MET, why)
         kinds = "the constraints being affine or bounds on gaps"

@@ -32,7 +32,8 @@ class Fleet:
         scenario: its name.
         start: fills its table ``initial``, of a generator and its tables.
         load: greatest force on each entry of an action, in N.
-        noise: greatest error of a reading, in the output's unit; 0 where sensors read true.
+        noise: greatest error of a reading, in the output's unit; 0 where sensors read true. In
+            mode implicit the drawn one is the scenario's margin, too.
         changes: of the scenario besides.
     """
 
@@ -68,12 +69,12 @@ def places(rng: np.random.Generator, tables: Tables) -> Tables:
 
 
 def velocities(rng: np.random.Generator, tables: Tables) -> Tables:
-    """Velocities in space about the one to agree on, 50 to 99% of the way to the bounds."""
+    """Velocities in space about the one to agree on, 50 to 95% of the way to the bounds."""
     game = GAMES[tables["game"]["type"]].model_validate(tables["game"])
     count = tables["agents"]["count"]
     middle = np.tile(tables["game"]["reference_velocity"], count)
     seed = int(rng.integers(2**31))
-    (found,) = random_starts(game.game(count), middle, [seed], float(rng.uniform(0.5, 0.99)))
+    (found,) = random_starts(game.game(count), middle, [seed], float(rng.uniform(0.5, 0.95)))
     return {"action": found.reshape(count, -1).tolist()}
 
 
@@ -91,19 +92,20 @@ def in_the_air(rng: np.random.Generator, tables: Tables) -> Tables:
 
 
 FLEETS = {
-    "cars": Fleet("cars", speeds, load=2.0),
-    # mode implicit predicts from the true state, and so allows no noise; sampled observes no loads
+    "cars": Fleet("cars", speeds, load=2.0, noise=0.005),
+    # mode sampled knows no margins, and observes no loads
     "cars-sampled": Fleet(
         "cars",
         speeds,
         noise=0.02,
         changes={"controller.mode": "sampled", "controller.observer": 0.0},
     ),
+    # agents that keep apart need sensors that read true
     "cars-apart": Fleet("cars-apart", places, load=1.0),
     "boats": Fleet("boats", places, load=3.0),
-    "drones": Fleet("drones", velocities, load=0.3),
+    "drones": Fleet("drones", velocities, load=0.3, noise=0.003),
     "drones-apart": Fleet("drones-apart", in_the_air, load=0.15),
-    "mixed": Fleet("mixed", partial(speeds, share=0.6), load=0.2),
+    "mixed": Fleet("mixed", partial(speeds, share=0.6), load=0.2, noise=0.003),
 }
 
 
@@ -136,10 +138,15 @@ def drawn(fleet: Fleet, rng: np.random.Generator) -> Tables:
             {"type": "push", "agents": [agent + 1], "force": float(force)}
             for agent, force in enumerate(rng.uniform(-fleet.load, fleet.load, agents))
         ]
+    margin: Tables = {}
     if fleet.noise:
-        faults.append({"type": "noise", "amplitude": float(rng.uniform(0.0, fleet.noise))})
+        amplitude = float(rng.uniform(0.0, fleet.noise))
+        faults.append({"type": "noise", "amplitude": amplitude})
+        if tables["controller"]["mode"] == "implicit":
+            margin = {f"systems.{name}.margin": {"noise": amplitude}}
     return {
         **fleet.changes,
+        **margin,
         f"systems.{name}.initial": fleet.start(rng, tables),
         f"systems.{name}.faults": faults,
         "simulation.seed": int(rng.integers(2**31)),

@@ -16,7 +16,7 @@ import numpy as np
 from gne_mj.bounds import MOST_HELD, check_count
 from gne_mj.equilibrium import order
 from gne_mj.errors import InvalidInput
-from gne_mj.faults import Bias, Noise, SensorDelay, sensor_delay
+from gne_mj.faults import sensor_delay
 from gne_mj.loops import apart, cells, functions, guard, implicit, joint, link, loads, local
 from gne_mj.loops.feedback import Order
 from gne_mj.loops.ode import IMPLICIT
@@ -109,7 +109,7 @@ class Implicit(Mode):
             )
 
     def check_faults(self, system: SystemData) -> None:
-        """It predicts from the state, which sensors must tell."""
+        """It predicts from the state, which sensors must tell in time."""
         if sensor_delay(system.faults) > 0 and system.decentralised:
             raise InvalidInput(
                 "faults",
@@ -118,16 +118,13 @@ class Implicit(Mode):
                 " meanwhile, which an agent of the decentralised law does not have: use mode"
                 " 'sampled', or leave decentralised out",
             )
-        if has_ode(system.agents.kind):
-            return
-        for fault in system.faults:
-            if isinstance(fault, Noise | Bias | SensorDelay):
-                raise InvalidInput(
-                    "faults",
-                    type(fault).__name__.lower(),
-                    "mode 'implicit' predicts MJCF robots from their whole true state, which"
-                    " such sensors would not tell; use mode 'sampled'",
-                )
+        if not has_ode(system.agents.kind) and sensor_delay(system.faults) > 0:
+            raise InvalidInput(
+                "faults",
+                "late sensors",
+                "mode 'implicit' predicts MJCF robots from where they are now, of which late"
+                " sensors do not tell; use mode 'sampled'",
+            )
 
     def check_period(self, system: SystemData, clock: Clock) -> None:
         """Refuse periods over which dy+/du is not positive: exactly, or else from this start."""

@@ -10,12 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gne_mj.errors import InvalidInput
-from gne_mj.faults import Bias, Noise
 from gne_mj.loops import functions, guard
 from gne_mj.loops.feedback import NO_ORDER, Order
 from gne_mj.loops.ode import IMPLICIT, SAMPLED
-from gne_mj.plants.agent_type import has_ode
 from gne_mj.system.data import SystemData
 from gne_mj.system.guard import acting, room_for
 from gne_mj.system.modes.mode import Mode
@@ -49,17 +46,3 @@ class Sampled(Mode):
     def solver_length(self, system: SystemData, rows: Order) -> int:
         """Of the look ahead."""
         return room_for(system, rows) if system.guarded else 0
-
-    def check_faults(self, system: SystemData) -> None:
-        """A guard predicts from the state, which sensors must tell."""
-        super().check_faults(system)
-        if not system.guarded or has_ode(system.agents.kind):
-            return
-        for fault in system.faults:
-            if isinstance(fault, Noise | Bias):
-                raise InvalidInput(
-                    "between",
-                    system.between,
-                    "it predicts MJCF robots from their whole true state, which sensors with"
-                    f" {type(fault).__name__.lower()} would not tell; leave it out",
-                )
