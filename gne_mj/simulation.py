@@ -211,11 +211,11 @@ class Simulation:
         Args:
             system: its name.
             channel: which output, from 0.
-            force: in N (N m at a hinge), besides the input and other pushes.
+            force: in N (N m where the output turns), besides the input and other pushes.
             duration: in s, at least one step.
 
         Raises:
-            EngineError: the system does not run in MuJoCo, or the output is no joint's velocity.
+            EngineError: the system does not run in MuJoCo, or a sensor alone tells the output.
         """
         run = self._runs[system]
         if not run.inside:

@@ -266,14 +266,6 @@ def test_only_robots_in_mujoco_are_pushed():
     assert simulation.interventions == []
 
 
-def test_an_output_that_is_no_joints_is_not_pushed():
-    simulation = load_scenario(EXAMPLES / "robot" / "sensor.toml").simulation_object()
-    name = simulation.systems[0].name
-    with pytest.raises(EngineError, match="a sensor's, not a joint's"):
-        simulation.push(name, 0, 1.0, 0.1)
-    assert simulation.interventions == []
-
-
 def test_all_joints_of_own_robots_are_recorded():
     scenario = EXAMPLES / "robot" / "scenario.toml"
     simulation = load_scenario(scenario, {"simulation.duration": 0.5}).simulation_object()

@@ -255,6 +255,7 @@ def test_a_push_acts_on_the_robot_it_names():
     with watched(changes={"simulation.duration": 1.0}) as (session, page):
         session._move(10)
         page.ask(do="push", system="robots", agent=3, axis=0, force=-4.0)
+        session._move(1)
         data = session.simulation.runs["robots"].loop.plant.data
         assert np.count_nonzero(data.qfrc_applied) == 1
         assert data.qfrc_applied.min() == -4.0

@@ -7,7 +7,7 @@ import pytest
 from test_view_browser import live_wait, opened, origins, quiet, seek, session, until
 
 import gne_mj
-from gne_mj.scenario import as_done
+from gne_mj.scenario import as_done, load_scenario
 from gne_mj.viewer import serve
 
 WIDTHS = ((390, 844), (720, 900), (1440, 900), (1920, 1080))
@@ -40,7 +40,17 @@ def drag(page, at, by):
     page.mouse.move(at[0] + by[0] / 2, at[1] + by[1] / 2)
     page.mouse.move(at[0] + by[0], at[1] + by[1])
     settled(page)
+    told, labels = page.evaluate("[window.gne.told(), window.gne.labels()]")
     page.mouse.up()
+    return told, labels
+
+
+def apart(one, other):
+    """Whether two boxes have nothing in common."""
+    return (
+        one["x"] >= other["x"] + other["w"] or other["x"] >= one["x"] + one["w"]
+        or one["y"] >= other["y"] + other["h"] or other["y"] >= one["y"] + one["h"]
+    )  # fmt: skip
 
 
 @pytest.mark.slow  # a browser at several widths
@@ -58,13 +68,20 @@ def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
             page.keyboard.press("f")
             camera = page.evaluate("window.gne.head('robots', 0)")
             drag(page, head(page, 1), (60.0, 0.0))
-            live_wait(lambda n=number: len(live.simulation.interventions) > n, 60.0)
+            live_wait(lambda n=number: len(live.simulation.interventions) > 2 * n, 60.0)
             done = live.simulation.interventions[-1]
             assert (done["agent"], done["duration"]) == (2, 0.4)
             # 5 N are a drag of 50 px along x, which the view shows but for its perspective
             assert done["force"] == pytest.approx(6.0, rel=0.05)
             settled(page)
             assert page.evaluate("window.gne.head('robots', 0)") == pytest.approx(camera, abs=2.0)
+            # the text of the force is in the pane and off the labels, at the fleet's edge too
+            here, pane = head(page, 4), page.locator("#pane").bounding_box()
+            told, labels = drag(page, here, (pane["x"] + pane["width"] - here[0] - 4, 0.0))
+            assert told["x"] >= 0
+            assert told["x"] + told["w"] <= pane["width"]
+            assert all(apart(told, label) for label in labels)
+            live_wait(lambda n=number: len(live.simulation.interventions) > 2 * n + 1, 60.0)
         quiet(recorded, *origins(live.server))
 
 
@@ -109,6 +126,45 @@ def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
         assert np.hypot(one["force"], other["force"]) == pytest.approx(force, rel=0.01)
         assert min(one["force"], other["force"]) > 0  # to the right, and away
         assert page.evaluate("window.gne.state().follow.kind") == "fleet"
+        quiet(recorded, *origins(live.server))
+
+
+@pytest.mark.slow  # a fleet with controllers of its own
+def test_cars_are_dragged_along_their_own_axis(page, recorded):
+    """A car that faces the viewer is pushed back by the drag that pushes others forward."""
+    tables = load_scenario("cars").model_dump(mode="json", exclude_none=True)
+    agents = tables["systems"]["cars"]["agents"]
+    del agents["spacing"]
+    agents["poses"] = [{"position": [0.0, 1.0 * i, 0.0], "yaw": np.pi * (i == 1)} for i in range(4)]
+    with session(tables) as live:
+        opened(page, live.server.url)
+        paused(page)
+        for agent in (0, 1):
+            drag(page, head(page, agent, system="cars"), (0.0, -60.0))  # seen from behind
+            live_wait(lambda n=agent: len(live.simulation.interventions) > n, 60.0)
+        one, other = live.simulation.interventions
+        assert (one["agent"], other["agent"]) == (1, 2)
+        assert one["force"] == pytest.approx(6.0, rel=0.1)
+        assert other["force"] == pytest.approx(-6.0, rel=0.1)
+        quiet(recorded, *origins(live.server))
+
+
+@pytest.mark.slow  # a fleet with controllers of its own
+def test_drones_are_dragged_in_space(page, recorded):
+    with session("drones") as live:
+        opened(page, live.server.url)
+        paused(page)
+        drag(page, head(page, 3, system="drones"), (45.0, -30.0))
+        live_wait(lambda: len(live.simulation.interventions) == 2, 60.0)
+        page.keyboard.down("Shift")
+        drag(page, head(page, 3, system="drones"), (0.0, 50.0))
+        page.keyboard.up("Shift")
+        live_wait(lambda: len(live.simulation.interventions) == 3, 60.0)
+        done = [(each["agent"], each["axis"]) for each in live.simulation.interventions]
+        assert done == [(4, "x"), (4, "y"), (4, "z")]
+        x, y, z = (each["force"] for each in live.simulation.interventions)
+        assert np.hypot(x, y) == pytest.approx(5.0 * np.hypot(45.0, 30.0) / 50.0, rel=0.01)
+        assert z == pytest.approx(-5.0, rel=0.1)
         quiet(recorded, *origins(live.server))
 
 
@@ -233,11 +289,7 @@ def test_labels_make_way_and_the_selector_agrees_with_the_view(page, recorded):
             assert sum(label["system"] == "robots" for label in labels) == 5
             for n, one in enumerate(labels):
                 for other in labels[:n]:
-                    apart = (
-                        one["x"] >= other["x"] + other["w"] or other["x"] >= one["x"] + one["w"]
-                        or one["y"] >= other["y"] + other["h"] or other["y"] >= one["y"] + one["h"]
-                    )  # fmt: skip
-                    assert apart, (width, one, other)
+                    assert apart(one, other), (width, one, other)
         quiet(recorded, *origins(server))
     finally:
         server.close()

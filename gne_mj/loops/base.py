@@ -140,7 +140,7 @@ class ClosedLoop(ABC):
         raise EngineError("only robots in MuJoCo can be pushed while they run")
 
     def push_unit(self, channel: int) -> str:
-        """What pushes of an output (from 0) are measured in: N, or N m at a hinge."""
+        """What pushes of an output (from 0) are measured in: N, or N m where it turns."""
         return "N"
 
     @property

@@ -174,6 +174,10 @@ class MembershipLoop(LoopInPieces):
         self._part.loop.push(force[self._part.actions])
         self._force = force
 
+    def push_unit(self, channel: int) -> str:
+        """See the base class; of one that is there."""
+        return self._part.loop.push_unit(int(np.searchsorted(self._part.actions, channel)))
+
     def _adopt(self, setup: Setup) -> None:
         raise EngineError("numbers stay as they are where agents leave and join")
 

@@ -17,6 +17,7 @@ from gne_mj.loops.ode import CONTINUOUS
 from gne_mj.loops.recorder import Recorder
 from gne_mj.plants.callbacks import callbacks
 from gne_mj.plants.native_mujoco import LOOP_MARK, USERDATA_HEADER, offsets
+from gne_mj.plants.push import pushing, slopes
 
 if TYPE_CHECKING:
     from gne_mj.plants.fleet_plant import FleetPlant
@@ -42,6 +43,7 @@ class MujocoLoop(ClosedLoop):
     ) -> None:
         self.plant = plant
         self._control, self._remember, self._advance = build(offsets(), plant.kernels, faults)
+        self._acting = self._control  # or what takes its place while something is pushed
         self._parameter_block = mujoco_parameter_block(plant, setup, plant.agents, len(memory))
         self._faulty = faults.RECORDED
         data, sizes = plant.data, steps_of(self._parameter_block)
@@ -71,7 +73,7 @@ class MujocoLoop(ClosedLoop):
         recorder = self._recorder(samples, every)
         self._progress.stage = 0.0
         remember = self._remember if self._remembers else None
-        with callbacks(control=self._control, passive=self.plant.passive, activation=remember):
+        with callbacks(control=self._acting, passive=self.plant.passive, activation=remember):
             steps = self._advance(self._machine, samples * every)
         # The callback counts steps, but one that ended in an exit was not taken.
         self._progress.step = first + steps
@@ -110,13 +112,21 @@ class MujocoLoop(ClosedLoop):
         )
 
     def push(self, force: NDArray[np.float64]) -> None:
-        """See the base class; forces are MuJoCo's qfrc_applied at the outputs' joints."""
-        at = self.plant.output_joints
-        if np.any(force[at < 0]):
-            raise EngineError(
-                "this robot's output is a sensor's, not a joint's: nothing to push at"
-            )
-        self.plant.data.qfrc_applied[at[at >= 0]] = force[at >= 0]
+        """See the base class, and :mod:`gne_mj.plants.push`."""
+        plant = self.plant
+        for r in np.flatnonzero(force).tolist():
+            if plant.way(r) is None:
+                output = plant.outputs[r]
+                raise EngineError(
+                    f"the output {output} is told by a sensor alone, so that no force at it is"
+                    " known: nothing to push at"
+                )
+        plant.pushes[:] = self._control.address, *force
+        if np.any(force):
+            where = slopes(plant.model, plant.data)
+            self._acting = pushing(offsets(), where, plant.kernels)
+        else:
+            self._acting, plant.data.qfrc_applied[:] = self._control, 0.0
 
     def push_unit(self, channel: int) -> str:
         """See the base class."""

@@ -14,6 +14,7 @@ from gne_mj.plants.agent_type import fleet_module
 from gne_mj.plants.agents import Agents
 from gne_mj.plants.base import Plant
 from gne_mj.plants.native_mujoco import STATE
+from gne_mj.plants.way import Way
 
 if TYPE_CHECKING:
     from gne_mj.plants.mujoco import Sizes
@@ -28,6 +29,8 @@ class FleetPlant(Plant):
         model, data: MuJoCo's own.
         places: where native code finds each channel's numbers, (m,) by name.
         sizes: of MuJoCo's arrays.
+        pushes: (1 + m,) the address of a loop's control callback, and the forces at outputs, while
+            there are any (:mod:`gne_mj.plants.push`).
         parameter_arrays: the fleet's arrays at the start of every table.
     """
 
@@ -37,6 +40,7 @@ class FleetPlant(Plant):
     data: mujoco.MjData
     places: Any
     sizes: "Sizes"
+    pushes: NDArray[np.float64]
     parameter_arrays: list[NDArray[Any]]
 
     @property
@@ -80,16 +84,15 @@ class FleetPlant(Plant):
     def output_joints(self) -> NDArray[np.int64]:
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
 
+    @abstractmethod
+    def way(self, channel: int) -> Way | None:
+        """How an output (from 0) can be pushed; None if it is a sensor's of which no force is
+        known."""
+
     def push_unit(self, channel: int) -> str:
-        """What forces at an output's joint are measured in: N, or N m where it turns."""
-        dof, kinds = int(self.output_joints[channel]), mujoco.mjtJoint
-        if dof < 0:
-            return "N"
-        joint = self.model.dof_jntid[dof]
-        free = self.model.jnt_type[joint] == kinds.mjJNT_FREE
-        turns = free and dof - self.model.jnt_dofadr[joint] >= 3
-        hinge = int(self.model.jnt_type[joint]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_BALL))
-        return "N m" if turns or hinge else "N"
+        """What forces at an output are measured in: N, or N m where it turns."""
+        way = self.way(channel)
+        return "N" if way is None else way.unit
 
     @property
     @abstractmethod

@@ -28,7 +28,6 @@ from gne_mj.plants.mjcf_low_level import (
     own_entries,
     read_all,
 )
-from gne_mj.plants.mjcf_output import Output
 from gne_mj.plants.mjcf_pose import check_leaves
 from gne_mj.plants.mjcf_prediction import (
     ChannelPlace,
@@ -41,6 +40,7 @@ from gne_mj.plants.mjcf_prediction import (
     prediction_in,
     refresh,
 )
+from gne_mj.plants.mjcf_push import push, way_of
 from gne_mj.plants.mjcf_reading import Term, array_word, fresh_by, terms_of
 from gne_mj.plants.mjcf_robot import MjcfRobots, RobotFile
 from gne_mj.plants.mjcf_world import world_of
@@ -56,6 +56,7 @@ from gne_mj.plants.native_mujoco import (
     step_address,
     timed_step,
 )
+from gne_mj.plants.way import Way, way_of_joint
 from gne_mj.records import by_name
 
 __all__ = [
@@ -65,6 +66,7 @@ __all__ = [
     "drive",
     "drive_again",
     "gather",
+    "push",
     "refresh",
     "stored",
 ]
@@ -149,9 +151,11 @@ class MjcfPlant(FleetPlant):
         self.settled: dict[Any, NDArray[np.float64]] = {}
         self._twin = mujoco.MjData(model)  # where mode implicit predicts
         self._geom_owners = counted_owners(model, self.owners)
+        self.pushes = np.zeros(1 + agents.channels)
         self.sizes = Sizes(
             model.nq, model.nv, model.nu, model.nuserdata, model.na, USERDATA_HEADER + own,
-            model.na - memory, self._geom_owners.ctypes.data,
+            model.na - memory, self._geom_owners.ctypes.data, agents.channels,
+            self.pushes.ctypes.data,
         )  # fmt: skip
         numbers = self._numbers(agents)
         self.parameter_arrays = [flat, numbers, self._sizes(lookahead)]
@@ -272,17 +276,13 @@ class MjcfPlant(FleetPlant):
         """(m,) the degree of freedom whose velocity is each output; -1 where it is no joint's."""
         return np.maximum(self.places.output, -1)
 
-    def push_unit(self, channel: int) -> str:
-        """See the base class; of a sum that of its first part."""
-        output = self.agents.robots[channel].output
-        if not isinstance(output, Output):
-            return super().push_unit(channel)
-        first = output.terms[0] if output.terms else output
-        if first.kind == "joint" and output.terms:
-            prefix = f"robot_{channel // self.agents.dimension + 1}/"
-            hinge = self.model.joint(prefix + first.name).type[0] == mujoco.mjtJoint.mjJNT_HINGE
-            return "N m" if hinge else "N"
-        return "N m" if first.angular else super().push_unit(channel)
+    def way(self, channel: int) -> Way | None:
+        """See the base class."""
+        place = self.places[channel]
+        if place.output >= 0:
+            return way_of_joint(self.model, int(place.output))
+        first = -1 - int(place.output)
+        return way_of(self.model, self.data, self._terms[first : first + int(place.readings)])
 
     @property
     def state(self) -> NDArray[np.float64]:

@@ -68,10 +68,11 @@ class Reading(Numbers):
     matrix: int  # of the orientations whose axis it is along; 0 for the world's
     axis: int
     angular: int
+    last: int  # of the degrees of freedom that move a frame, the parents of which are the others
 
 
 READING = len(names_of(Reading))
-_reading_in = numbers_in(Reading)
+reading_at = numbers_in(Reading)  # (table, which)
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Term:
 
     Args:
         source, place, matrix: names of mjData's arrays, empty for none.
-        entry, place_entry, body, root, axis, angular: as a reading has them.
+        entry, place_entry, body, root, axis, angular, last: as a reading has them.
         factor: by which it is multiplied.
     """
 
@@ -93,6 +94,7 @@ class Term:
     matrix: str = ""
     axis: int = 0
     angular: bool = False
+    last: int = -1
     factor: float = 1.0
 
     @property
@@ -105,7 +107,7 @@ class Term:
         return [
             array_word(data, self.source), self.entry, array_word(data, self.place),
             self.place_entry, self.body, self.root, array_word(data, self.matrix), self.axis,
-            int(self.angular),
+            int(self.angular), self.last,
         ]  # fmt: skip
 
 
@@ -143,12 +145,20 @@ def velocity_of(data, twists, centres, readings, which):
     MuJoCo keeps velocities, and w x (p - c). ``twists`` and ``centres`` are cvel's and
     subtree_com's words.
     """
-    reading = _reading_in(readings, which)
-    points = word(data, reading.source)
+    reading = reading_at(readings, which)
     if reading.body < 0:
-        return number(points, reading.entry)
+        return number(word(data, reading.source), reading.entry)
     twist, centre = word(data, twists) + 48 * reading.body, word(data, centres) + 24 * reading.root
-    found = 0.0
+    return along_twist(data, reading, twist, centre)
+
+
+@kernel
+def along_twist(data, reading, twist, centre):
+    """The velocity that the reading of a frame is under a twist about its tree's centre of mass.
+
+    Both are addresses: the twist has the angular velocity first, as cvel's rows and cdof's do.
+    """
+    points, found = word(data, reading.source), 0.0
     for j in range(3):
         if reading.angular == 0:
             k, last = (j + 1) % 3, (j + 2) % 3
@@ -169,7 +179,7 @@ def velocity_of(data, twists, centres, readings, which):
 @kernel
 def position_of(data, readings, which):
     """The position whose rate that is; 0 where none is known."""
-    reading = _reading_in(readings, which)
+    reading = reading_at(readings, which)
     if reading.place_entry < 0:
         return 0.0
     return number(word(data, reading.place), reading.place_entry)
@@ -218,8 +228,15 @@ def _frame(model: mujoco.MjModel, index: int, output: Output) -> Term:
     at = 3 * index + output.axis if not own and not output.angular else -1
     return Term(
         place, 3 * index, place, at, body, int(model.body_rootid[body]), matrix if own else "",
-        output.axis, output.angular,
+        output.axis, output.angular, _last_dof(model, body),
     )  # fmt: skip
+
+
+def _last_dof(model: mujoco.MjModel, body: int) -> int:
+    """The last of the degrees of freedom that move a body; -1 if none does."""
+    while body and not model.body_dofnum[body]:
+        body = int(model.body_parentid[body])
+    return int(model.body_dofadr[body] + model.body_dofnum[body]) - 1 if body else -1
 
 
 def _dof(model: mujoco.MjModel, joint: int, axis: int) -> Term:

@@ -27,6 +27,7 @@ from gne_mj.plants.native_mujoco import (
     step_address,
     timed_step,
 )
+from gne_mj.plants.way import Way, way_of_joint
 from gne_mj.records import by_name, in_numbers
 
 INTEGRATORS = {"euler": "Euler", "rk4": "RK4"}
@@ -57,6 +58,8 @@ class Sizes(NamedTuple):
     workspace: int  # a loop's, in userdata
     memory: int  # in act
     owners: int  # address of the agent that each geom belongs to, from 0, -1 of none; or 0
+    channels: int  # m
+    pushes: int  # address of those at outputs, as FleetPlant has them
 
 
 PLACE = len(names_of(RobotPlace))
@@ -108,6 +111,14 @@ def drive(at, data, parameter_block, u, on):
     ctrl = field(data, at.ctrl, sizes_in(parameter_block).nu)
     for r in range(len(u)):
         ctrl[actuator_of(places, r)] = u[r] if on else 0.0
+
+
+@kernel
+def push(where, model, data, parameter_block, forces, applied):
+    """Add to joint forces (nv,) what forces (m,) at the outputs' joints are: themselves."""
+    places = integers(parameter_block, PLACES)
+    for r in range(len(forces)):
+        applied[place_of(places, r).main_v] += forces[r]
 
 
 @kernel
@@ -244,12 +255,11 @@ class MujocoPlant(FleetPlant):
         self.places.appendage_v = [joint.dofadr[0] for joint in appendage]
         self.places.actuator = [self.model.actuator(name).id for name in names("force")]
         self.joints = flat[:, :2].T.copy(), flat[:, 2:4].T.copy()
-        model = self.model
-        workspace = ARCTANGENTS + self.agents.channels
-        self._geom_owners = self._owners()
+        model, channels = self.model, self.agents.channels
+        self._geom_owners, self.pushes = self._owners(), np.zeros(1 + channels)
         self.sizes = Sizes(
-            model.nq, model.nv, model.nu, model.nuserdata, model.na, workspace, 0,
-            self._geom_owners.ctypes.data,
+            model.nq, model.nv, model.nu, model.nuserdata, model.na, ARCTANGENTS + channels, 0,
+            self._geom_owners.ctypes.data, channels, self.pushes.ctypes.data,
         )  # fmt: skip
         return [flat, self._forces(self.agents), np.array(self.sizes, dtype=np.int64)]
 
@@ -309,6 +319,10 @@ class MujocoPlant(FleetPlant):
         """(m,) the degree of freedom whose velocity is each output."""
         found: NDArray[np.int64] = self.places.main_v
         return found
+
+    def way(self, channel: int) -> Way | None:
+        """See the base class."""
+        return way_of_joint(self.model, int(self.output_joints[channel]))
 
     @property
     def state(self) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from gne_mj.plants.mujoco import (
     drive,
     drive_again,
     place_of,
+    push,
     refresh,
     sizes_in,
     stored_of,
@@ -27,7 +28,9 @@ from gne_mj.plants.mujoco import (
 from gne_mj.plants.native_mujoco import field, number
 from gne_mj.plants.position_robot import LOCAL_DAMPING, LOOKAHEAD, REFERENCE_VELOCITY
 
-__all__ = ["AGENT", "PLANT", "add_forces", "drive", "drive_again", "gather", "refresh", "stored"]
+__all__ = [
+    "AGENT", "PLANT", "add_forces", "drive", "drive_again", "gather", "push", "refresh", "stored",
+]  # fmt: skip
 
 AGENT = position_robot
 

@@ -20,7 +20,7 @@ class PushTable(Table):
     system: str | None = Field(None, description="whose; may be left out if there is only one")
     agent: int = Field(ge=1, description="which")
     axis: str = Field("", description="where actions have several entries, as `x`")
-    force: Annotated[float, Unit("N, or N m at a hinge")] = Field(description="along the axis")
+    force: Annotated[float, Unit("N, or N m where it turns")] = Field(description="along the axis")
     duration: Annotated[float, Unit("s")] = Field(gt=0, description="at least one timestep")
 
     def build(self, system: System) -> Act:

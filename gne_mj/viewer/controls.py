@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from gne_mj.game_model import Game
 from gne_mj.scenario import Scenario
@@ -94,44 +93,50 @@ def controls_of(scenario: Scenario) -> list[Control]:
 
 def pushes_of(shown_systems: list[ShownSystem]) -> list[dict[str, Any]]:
     """Whose agents can be pushed, robots that MuJoCo moves; and how, see the page's ``Push``."""
-    found = []
+    found, items = [], 0
     for shown_system in shown_systems:
         system, fleet = shown_system.system, shown_system.fleet
-        if system.engine != "mujoco" or fleet is None:
+        if fleet is None:
             continue
         axes = max(system.game.sizes)
-        found.append(
-            {
-                "system": system.name,
-                "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
-                "force": PUSH_FORCE,
-                "duration": PUSH_DURATION,
-                "ways": _ways(fleet, system.game),
-            }
-        )
+        if system.engine == "mujoco":
+            found.append(
+                {
+                    "system": system.name,
+                    "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
+                    "force": PUSH_FORCE,
+                    "duration": PUSH_DURATION,
+                    "ways": _ways(fleet, system.game, items),
+                }
+            )
+        items += len(fleet.mirror.items)
     return found
 
 
-def _ways(fleet: Fleet, game: Game) -> list[list[dict[str, Any] | None]]:
-    """Of each agent and axis the unit, and the direction in the world where the output's joint
-    slides (of others None); None where no joint can be pushed."""
-    plant, model, kinds = fleet.plant, fleet.plant.model, mujoco.mjtJoint
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+def _ways(fleet: Fleet, game: Game, first: int) -> list[list[dict[str, Any] | None]]:
+    """Of each agent and axis the unit, the force's direction (None where it has none), and the
+    item in whose frame that is (None: the world's); None of what cannot be pushed.
+
+    Args:
+        fleet, game: of the system.
+        first: the number of the fleet's first item.
+    """
+    data = mujoco.MjData(fleet.plant.model)
+    mujoco.mj_kinematics(fleet.plant.model, data)
     found: list[list[dict[str, Any] | None]] = [[] for _ in range(game.agents)]
-    for channel, (agent, dof) in enumerate(
-        zip(game.agent_of_action, plant.output_joints, strict=True)
-    ):
-        if dof < 0:
+    for channel, agent in enumerate(game.agent_of_action):
+        way = fleet.plant.way(channel)
+        if way is None:
             found[agent].append(None)
             continue
-        joint, along = int(model.dof_jntid[dof]), None
-        place = int(dof - model.jnt_dofadr[joint])
-        if model.jnt_type[joint] == kinds.mjJNT_SLIDE:
-            along = data.xaxis[joint].tolist()
-        elif model.jnt_type[joint] == kinds.mjJNT_FREE and place < 3:
-            along = np.eye(3)[place].tolist()
-        found[agent].append({"unit": plant.push_unit(channel), "along": along})
+        along, item = way.along, None
+        if along is not None:
+            try:
+                item = first + fleet.mirror.item_of(way.body)
+            except KeyError:  # it never moves
+                along = data.xmat[way.body].reshape(3, 3) @ along
+        told = None if along is None else along.tolist()
+        found[agent].append({"unit": way.unit, "along": told, "item": item})
     return found
 
 

@@ -37,6 +37,8 @@ export const handleOf = (page) => ({
   bodies: () => page.overlay.bodies,
   /** The labels of robots, px. */
   labels: () => page.overlay.labels.drawn,
+  /** Where the text of a force is while a robot is dragged, px. */
+  told: () => page.hands.pushing.told,
   /** What is plotted. */
   get plots() {
     return page.plots.describe();

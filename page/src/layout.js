@@ -61,6 +61,17 @@ export class Layout {
   }
 
   /**
+   * A direction of an item's own frame as it is in the world.
+   * @param {number} item
+   * @param {Point} along
+   * @returns {Point}
+   */
+  turned(item, along) {
+    const [w, x, y, z] = this.poses.slice(8 * item + 3, 8 * item + 7);
+    return new THREE.Vector3(...along).applyQuaternion(new THREE.Quaternion(x, y, z, w)).toArray();
+  }
+
+  /**
    * Where links of an agent begin: above a robot, on top of a bar.
    * @param {System} system
    * @param {number} agent

@@ -3,6 +3,7 @@ import { byId } from "./dom.js";
 import { notify } from "./notices.js";
 import { colour } from "./theme.js";
 import { number, withUnit } from "./words.js";
+/** @import { Box } from "./overlay.js" */
 /** @import { Page } from "./page.js" */
 /** @import { Agent, Point, Push, Scene, System, Way } from "./types.d.ts" */
 
@@ -10,6 +11,8 @@ import { number, withUnit } from "./words.js";
 
 const STILL = 6; // px, up to which a hand is where it was
 const FULL = 50; // px, a drag of which is the force that is set
+const HIGH = 18; // px of the text of a force
+const ROWS = [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6]; // above and below an arrow's tip
 
 /** @param {Place} a */
 const sizeOf = ({ x, y }) => Math.hypot(x, y);
@@ -31,6 +34,8 @@ export class Pushing {
     this.drag = null;
     /** @type {Place | null} */
     this.pressed = null; // where a hand went down on nobody
+    /** @type {Box | null} */
+    this.told = null; // where the text of a force is
     const pane = byId("pane");
     pane.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     pane.addEventListener("pointermove", (event) => this.move(event), { capture: true });
@@ -124,7 +129,7 @@ export class Pushing {
   /** @param {System} system */
   refusal({ name, agent_name: noun }) {
     return this.pushes.has(name)
-      ? `${name}: this ${noun} cannot be pushed, since its output is no joint's velocity.`
+      ? `${name}: this ${noun} cannot be pushed, since a sensor alone tells its output.`
       : `${name}: only robots that MuJoCo moves can be pushed.`;
   }
 
@@ -138,17 +143,18 @@ export class Pushing {
   }
 
   /**
-   * Along which way on the screen an axis goes, px a m; to the right where it turns.
+   * Along which way on the screen an axis goes now, px a m; to the right where it turns.
    * @param {System} system
    * @param {number} agent
    * @param {Way} way
    * @returns {Place}
    */
-  onScreen(system, agent, { along }) {
+  onScreen(system, agent, { along, item }) {
     const { camera, layout } = this.page.scene;
     const here = /** @type {Point} */ (Array.from(layout.agentAt(system, agent)));
+    const way = along && item !== null ? layout.turned(item, along) : along;
     const a = camera.project(here);
-    const b = along && camera.project(here.map((v, k) => v + 0.1 * along[k]));
+    const b = way && camera.project(here.map((v, k) => v + 0.1 * way[k]));
     if (!a || !b) return { x: 1, y: 0 };
     return { x: (b.x - a.x) / 0.1, y: (b.y - a.y) / 0.1 };
   }
@@ -199,6 +205,7 @@ export class Pushing {
   /** @param {CanvasRenderingContext2D} context of the overlay */
   draw(context) {
     const { drag } = this;
+    this.told = null;
     if (!drag || !this.pushing) return;
     const forces = this.forces(drag);
     if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
@@ -212,10 +219,36 @@ export class Pushing {
     const unit = this.unitOf(system, which.agent);
     const text = `${withUnit(force, unit)} for ${number(duration)} s`;
     context.font = "600 13px system-ui, sans-serif";
-    context.textAlign = to.x >= from.x ? "left" : "right";
+    context.textAlign = "left";
     context.textBaseline = "middle";
     context.fillStyle = colour("accent");
-    this.page.overlay.haloed(text, to.x + (to.x >= from.x ? 12 : -12), to.y);
+    const box = this.room(context.measureText(text).width + 4, to, to.x >= from.x ? 1 : -1);
+    this.page.overlay.taken.push(box);
+    this.page.overlay.haloed(text, box.x + 2, box.y + box.h / 2);
+    this.told = box;
+  }
+
+  /**
+   * Room for the text at an arrow's tip: within the pane, off all labels if there is any such place.
+   * @param {number} w of the text, px
+   * @param {Place} tip
+   * @param {number} side that is tried first: 1 to the right of it, -1 to the left
+   * @returns {Box}
+   */
+  room(w, tip, side) {
+    const { overlay } = this.page;
+    const { clientWidth: wide, clientHeight: high } = overlay.canvas;
+    const within = (/** @type {number} */ v, /** @type {number} */ most) =>
+      Math.max(Math.min(v, most - 2), 2);
+    const places = ROWS.flatMap((row) => (row ? [side, -side, 0] : [side, -side]).map((at) => ({
+      x: within(tip.x - w / 2 + at * (12 + w / 2), wide - w),
+      y: within(tip.y - HIGH / 2 + row * (HIGH + 4), high - HIGH),
+      w,
+      h: HIGH,
+    }))); // prettier-ignore
+    const off = (/** @type {Box} */ { x, y }) =>
+      tip.x < x - 6 || tip.x > x + w + 6 || tip.y < y - 6 || tip.y > y + HIGH + 6;
+    return places.find((box) => off(box) && overlay.free(box)) ?? places[0];
   }
 
   /**

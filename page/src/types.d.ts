@@ -97,7 +97,8 @@ export interface Control {
 /** How an agent is pushed along one of its axes. */
 export interface Way {
   unit: string; // N, or N m
-  along: number[] | null; // in the world; null where it turns
+  along: number[] | null; // the force's direction; null where it has none, as where it turns
+  item: number | null; // in whose frame that is, which may turn; null: the world's
 }
 
 export interface Push {

@@ -398,6 +398,8 @@
     bodies: () => page2.overlay.bodies,
     /** The labels of robots, px. */
     labels: () => page2.overlay.labels.drawn,
+    /** Where the text of a force is while a robot is dragged, px. */
+    told: () => page2.hands.pushing.told,
     /** What is plotted. */
     get plots() {
       return page2.plots.describe();
@@ -986,6 +988,8 @@
   // src/push.js
   var STILL = 6;
   var FULL = 50;
+  var HIGH = 18;
+  var ROWS = [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6];
   var sizeOf = ({ x, y }) => Math.hypot(x, y);
   var between = (from, to2) => ({ x: to2.x - from.x, y: to2.y - from.y });
   var Pushing = class {
@@ -995,6 +999,7 @@
       this.pushes = /* @__PURE__ */ new Map();
       this.drag = null;
       this.pressed = null;
+      this.told = null;
       const pane = byId("pane");
       pane.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
       pane.addEventListener("pointermove", (event) => this.move(event), { capture: true });
@@ -1076,7 +1081,7 @@
     }
     /** @param {System} system */
     refusal({ name, agent_name: noun }) {
-      return this.pushes.has(name) ? `${name}: this ${noun} cannot be pushed, since its output is no joint's velocity.` : `${name}: only robots that MuJoCo moves can be pushed.`;
+      return this.pushes.has(name) ? `${name}: this ${noun} cannot be pushed, since a sensor alone tells its output.` : `${name}: only robots that MuJoCo moves can be pushed.`;
     }
     /**
      * The unit that an agent is pushed in.
@@ -1087,20 +1092,21 @@
       return this.waysOf(system, agent).find((way) => way)?.unit ?? "N";
     }
     /**
-     * Along which way on the screen an axis goes, px a m; to the right where it turns.
+     * Along which way on the screen an axis goes now, px a m; to the right where it turns.
      * @param {System} system
      * @param {number} agent
      * @param {Way} way
      * @returns {Place}
      */
-    onScreen(system, agent, { along: along2 }) {
+    onScreen(system, agent, { along: along2, item }) {
       const { camera, layout } = this.page.scene;
       const here = (
         /** @type {Point} */
         Array.from(layout.agentAt(system, agent))
       );
+      const way = along2 && item !== null ? layout.turned(item, along2) : along2;
       const a = camera.project(here);
-      const b = along2 && camera.project(here.map((v, k) => v + 0.1 * along2[k]));
+      const b = way && camera.project(here.map((v, k) => v + 0.1 * way[k]));
       if (!a || !b) return { x: 1, y: 0 };
       return { x: (b.x - a.x) / 0.1, y: (b.y - a.y) / 0.1 };
     }
@@ -1154,6 +1160,7 @@
     /** @param {CanvasRenderingContext2D} context of the overlay */
     draw(context) {
       const { drag } = this;
+      this.told = null;
       if (!drag || !this.pushing) return;
       const forces = this.forces(drag);
       if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
@@ -1170,10 +1177,33 @@
       const unit = this.unitOf(system, which.agent);
       const text2 = `${withUnit(force, unit)} for ${number(duration)} s`;
       context.font = "600 13px system-ui, sans-serif";
-      context.textAlign = to2.x >= from.x ? "left" : "right";
+      context.textAlign = "left";
       context.textBaseline = "middle";
       context.fillStyle = colour("accent");
-      this.page.overlay.haloed(text2, to2.x + (to2.x >= from.x ? 12 : -12), to2.y);
+      const box = this.room(context.measureText(text2).width + 4, to2, to2.x >= from.x ? 1 : -1);
+      this.page.overlay.taken.push(box);
+      this.page.overlay.haloed(text2, box.x + 2, box.y + box.h / 2);
+      this.told = box;
+    }
+    /**
+     * Room for the text at an arrow's tip: within the pane, off all labels if there is any such place.
+     * @param {number} w of the text, px
+     * @param {Place} tip
+     * @param {number} side that is tried first: 1 to the right of it, -1 to the left
+     * @returns {Box}
+     */
+    room(w, tip, side) {
+      const { overlay } = this.page;
+      const { clientWidth: wide, clientHeight: high } = overlay.canvas;
+      const within2 = (v, most) => Math.max(Math.min(v, most - 2), 2);
+      const places = ROWS.flatMap((row) => (row ? [side, -side, 0] : [side, -side]).map((at) => ({
+        x: within2(tip.x - w / 2 + at * (12 + w / 2), wide - w),
+        y: within2(tip.y - HIGH / 2 + row * (HIGH + 4), high - HIGH),
+        w,
+        h: HIGH
+      })));
+      const off = ({ x, y }) => tip.x < x - 6 || tip.x > x + w + 6 || tip.y < y - 6 || tip.y > y + HIGH + 6;
+      return places.find((box) => off(box) && overlay.free(box)) ?? places[0];
     }
     /**
      * Where the arrow ends: along what acts, as far as was dragged.
@@ -1828,8 +1858,8 @@
   };
 
   // src/labels.js
-  var HIGH = 20;
-  var STEP = HIGH + 4;
+  var HIGH2 = 20;
+  var STEP = HIGH2 + 4;
   var PLACES = [
     [0, 0, 0, 0],
     [0, -1, 0, 0],
@@ -1914,7 +1944,7 @@
         if (!pill) continue;
         overlay.taken.push(pill);
         this.drawn.push({ ...pill, system: system.name });
-        overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH / 2, system: system.name, agent });
+        overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH2 / 2, system: system.name, agent });
         return this.pill(pill, body, { name, system, agent, out });
       }
       this.places.delete(`${system.name} ${agent}`);
@@ -1964,7 +1994,7 @@
       context.font = "12px system-ui, sans-serif";
       const more = text2 ? context.measureText(text2).width + 7 : 0;
       const w = wide + more + 14;
-      return { x: p.x - w / 2, y: p.y - 22, w, h: HIGH, wide, text: text2 };
+      return { x: p.x - w / 2, y: p.y - 22, w, h: HIGH2, wide, text: text2 };
     }
     /**
      * @param {Pill} box
@@ -6428,6 +6458,16 @@
     agentAt(system, agent) {
       const p = 8 * system.anchors[agent];
       return this.poses.slice(p, p + 3);
+    }
+    /**
+     * A direction of an item's own frame as it is in the world.
+     * @param {number} item
+     * @param {Point} along
+     * @returns {Point}
+     */
+    turned(item, along2) {
+      const [w, x, y, z] = this.poses.slice(8 * item + 3, 8 * item + 7);
+      return new THREE.Vector3(...along2).applyQuaternion(new THREE.Quaternion(x, y, z, w)).toArray();
     }
     /**
      * Where links of an agent begin: above a robot, on top of a bar.
