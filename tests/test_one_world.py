@@ -122,6 +122,23 @@ def test_robots_stand_where_their_poses_say(tmp_path):
     assert floor.size[1] == 3.0
 
 
+def test_the_lanes_sky_and_sun_make_way_for_those_that_files_bring(tmp_path):
+    def names(path, **more):
+        model = plant_of(path, **more).model
+        skies = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+        lights = [model.light(k).name for k in range(model.nlight)]
+        return [model.texture(int(k)).name for k in skies], lights
+
+    dusk = '<asset><texture name="dusk" type="skybox" builtin="flat" width="8" height="8"/></asset>'
+    lamp = '<worldbody><light name="lamp"/></worldbody>'
+    two = ("robot_1/{}", "robot_2/{}")
+    assert names(cart(tmp_path)) == (["sky"], ["sun"])
+    assert names(cart(tmp_path, dusk)) == ([each.format("dusk") for each in two], ["sun"])
+    assert names(cart(tmp_path, lamp)) == (["sky"], [each.format("lamp") for each in two])
+    over = names(cart(tmp_path), terrain=str(hills(tmp_path)), poses=POSES)
+    assert over == (["terrain/dusk"], ["terrain/lamp"])
+
+
 def test_lists_are_positions_and_a_spacing_is_the_short_form(tmp_path):
     path = cart(tmp_path)
     lists = plant_of(path, poses=[[0, 0, 0], [0, 3, 0]])

@@ -3,18 +3,23 @@
 The scene graph is asked where it has each robot, which must be where the data has it.
 """
 
+import io
 import threading
 import time
 from contextlib import contextmanager
 
+import mujoco
 import numpy as np
 import pytest
 from browser import Recorded
+from PIL import Image
 
 import gne_mj
 from gne_mj.notebook import notebook_html, replay_html
+from gne_mj.plants.fleet import read_model
 from gne_mj.scenario import load_scenario
 from gne_mj.viewer import Session, serve, write_html
+from gne_mj.viewer.surroundings import sky_of
 
 READY = "window.gne && window.gne.ready"
 CLOSE = 1e-6  # m
@@ -128,6 +133,30 @@ def test_the_slider_drives_scene_and_plots(page, served, paper):
     place = position(page, "meshcat/robots/robot_5/main")
     assert np.allclose(place[0], data["position"][4], atol=CLOSE)
     until(page, "text => document.getElementById('time').textContent === text", arg=f"{now:.2f}")
+
+
+def test_the_lane_has_its_sky_and_light_in_both_themes(page, recorded, served):
+    """Its own colours, darkened or paled so that texts stay readable; light is white, and no more
+    than a white surface can show."""
+    opened(page, served.url)
+    sky = sky_of(mujoco.MjModel.from_xml_string(read_model("lane.xml")))
+    shown = {"dark": lambda v: 0.25 * v, "light": lambda v: 1 - 0.35 * (1 - v)}
+    for _ in shown:
+        in_theme = shown[page.evaluate("window.gne.state().theme")]
+        expected = np.round(255 * in_theme(np.array(sky)))
+        around = page.evaluate("window.gne.around()")
+        drawn = [[int(part) for part in each[4:-1].split(",")] for each in around["sky"]]
+        assert np.allclose(drawn, expected, atol=1)
+        clip = {**page.locator("#pane").bounding_box(), "width": 4, "height": 4}
+        corner = np.asarray(Image.open(io.BytesIO(page.screenshot(clip=clip))))[..., :3]
+        assert np.allclose(corner.mean(axis=(0, 1)), expected[1], atol=12)  # near the horizon
+        page.keyboard.press("d")
+    above, head, sun = around["lights"]
+    assert {each["colour"] for each in around["lights"]} == {"rgb(255, 255, 255)"}
+    assert sum(each["intensity"] for each in around["lights"]) == pytest.approx(1, abs=1e-3)
+    assert np.allclose(sun["from"], [0, -0.406, 0.914])
+    assert head["intensity"] > 0 < above["intensity"]
+    quiet(recorded, *origins(served))
 
 
 def test_plots_have_the_bounds_and_all_lines(page, served):

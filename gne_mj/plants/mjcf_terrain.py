@@ -35,12 +35,17 @@ def ground(terrain: Path | None, poses: tuple[Pose, ...]) -> Any:
         spec = mjcf_file.read(terrain)
         _check_stands(spec, terrain)
         world.delete(world.geom("floor"))
-        if spec.lights:
-            world.delete(world.light("sun"))
-        if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
-            world.delete(world.texture("sky"))
+        make_way(world, spec)
         mjcf_file.attach(world, spec, terrain, prefix=PREFIX, at=Pose())
     return world
+
+
+def make_way(world: Any, spec: Any) -> None:
+    """Take the lane's own sun and sky out, if they are there, where a file brings its own."""
+    skies = [each for each in spec.textures if each.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
+    for own, brought in ((world.light("sun"), spec.lights), (world.texture("sky"), skies)):
+        if own is not None and brought:
+            world.delete(own)
 
 
 def check_options(world: Any, terrain: Path) -> None:

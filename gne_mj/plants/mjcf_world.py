@@ -9,7 +9,7 @@ from gne_mj.plants.mjcf_drive import add_effort
 from gne_mj.plants.mjcf_floors import Floors, leave_out
 from gne_mj.plants.mjcf_low_level import add_memory
 from gne_mj.plants.mjcf_robot import MjcfRobots
-from gne_mj.plants.mjcf_terrain import check_options, ground, without_floors
+from gne_mj.plants.mjcf_terrain import check_options, ground, make_way, without_floors
 
 
 def world_of(
@@ -53,6 +53,8 @@ def world_of(
             doubles = floors.doubles(spec, alone[robot.path], places[i], i, prefix)
         parts.append(part._replace(geoms=part.geoms - len(doubles)))
         memory += max(spec.memory, 0)
+        if terrain is None:
+            make_way(world, spec)
         mjcf_file.attach(world, spec, robot.path, prefix=prefix, at=places[i])
         leave_out(world, doubles)
     return world, parts, floors.owners, memory

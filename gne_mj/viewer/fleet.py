@@ -17,6 +17,7 @@ from gne_mj.system import Clock
 from gne_mj.system.data import SystemData
 from gne_mj.viewer.floors import of_the_lane
 from gne_mj.viewer.mirror import Mirror
+from gne_mj.viewer.surroundings import light_of, sky_of
 
 
 class Fleet:
@@ -102,6 +103,8 @@ class Fleet:
             "anchors": anchors,
             "rooms": self._rooms,
             "floor": mirror.floor,
+            "sky": sky_of(mirror.model),
+            "light": light_of(mirror.model),
             "tints": [[path] if path in drawn else [] for path in tints],
         }
 

@@ -21,20 +21,14 @@ from gne_mj.viewer.shapes import (
     material,
     mesh,
     plane,
-    plane_texture,
     primitive,
-    texture,
     tube,
 )
+from gne_mj.viewer.surfaces import colours, laid_surface, plane_surface, surface
 
 GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2 unless told otherwise
-DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)  # an element of this colour has its material's
 APART = 1e-3  # m between joints that a fixed tendon is drawn between
 COIL_RADIUS = 2.5, 0.02  # of a tendon's width, and at least so many m
-# A floor does not shine, and is behind what lies in it, as meshcat's own grid does
-FLOOR = {
-    "specular": 0, "polygonOffset": True, "polygonOffsetFactor": 1, "polygonOffsetUnits": 1
-}  # fmt: skip
 NOTHING = 1e-9  # scale of what is hidden; three.js cannot take 0 apart into rotation and scale
 
 # An item's entries in an array of poses
@@ -46,9 +40,10 @@ class Mirror:
 
     Geoms and sites that move with one body are one object, those that never move one more. As in
     MuJoCo's viewer, of groups 0 to 2 what is not transparent altogether is drawn, and an element's
-    own colour hides its material's. Of textures the 2-D ones of planes, and of meshes with texture
-    coordinates, are there. Flexes, skins, lights, cameras, contacts and what else a viewer adds
-    are not.
+    own colour hides its material's. 2-D textures are there (round on what is round), those of cubes
+    and of meshes without texture coordinates by their mean colour; materials shine and glow, and
+    mirror nothing. The sky and the lights are for the page to draw (:mod:`.surroundings`). Flexes,
+    skins, cameras, contacts and what else a viewer adds are not drawn.
 
     Tendons are lines of straight segments, as many as there can ever be. A fixed tendon goes
     through the anchors of its joints where they lie apart.
@@ -113,8 +108,13 @@ class Mirror:
         floors = joined(model, self._data, shown, lowest)
         self.floor = float(self._data.geom_xpos[min(lowest), 2]) if lowest else None
         for geom in shown:
-            path = paths[model.geom_bodyid[geom]] + ("/tint" if geom in tints else "")
-            drawn = self._floor(geom, floors[geom]) if geom in floors else self._parts("geom", geom)
+            tint = geom in tints
+            path = paths[model.geom_bodyid[geom]] + ("/tint" if tint else "")
+            drawn = (
+                self._floor(geom, floors[geom])
+                if geom in floors
+                else self._parts("geom", geom, plain=tint)
+            )
             if drawn:
                 parts.setdefault(path, []).extend(drawn)
         for site in _shown(model, "site"):
@@ -209,20 +209,20 @@ class Mirror:
                 for path, (_, other) in zip(paths, names, strict=True)
             ]
 
-    def _parts(self, what: str, number: int) -> list[DrawnPart]:
+    def _parts(self, what: str, number: int, *, plain: bool = False) -> list[DrawnPart]:
         """A geom or site as a mesh of its body's group; none if it cannot be drawn."""
         element = getattr(self.model, what)(number)
-        drawn = self._shape(element, int(getattr(self.model, f"{what}_dataid")[number]))
+        drawn = self._shape(element, int(getattr(self.model, f"{what}_dataid")[number]), plain)
         if drawn is None:
             return []
-        geometry, own, surface = drawn
+        geometry, own, look = drawn
         at = np.eye(4)
         if self.model.body_weldid[element.bodyid[0]]:
             at[:3, :3], at[:3, 3] = rotations(element.quat), element.pos
         else:
             place = getattr(self._data, what)(number)
             at[:3, :3], at[:3, 3] = place.xmat.reshape(3, 3), place.xpos
-        return [DrawnPart(element.name or f"{what}_{number}", geometry, surface, at @ own)]
+        return [DrawnPart(element.name or f"{what}_{number}", geometry, look, at @ own)]
 
     def _floor(self, geom: int, place: tuple[Any, Any] | None) -> list[DrawnPart]:
         """A plane that never moves, at the middle and of the size that are given; none for None."""
@@ -231,40 +231,28 @@ class Mirror:
         middle, size = place
         element, at = self.model.geom(geom), np.eye(4)
         at[:3, :3], at[:3, 3] = self._data.geom_xmat[geom].reshape(3, 3), middle
-        surface = self._plane_material(element, size)
-        return [DrawnPart(element.name or f"geom_{geom}", plane(size), surface, at)]
+        look = plane_surface(self.model, element, size)
+        return [DrawnPart(element.name or f"geom_{geom}", plane(size), look, at)]
 
-    def _plane_material(self, element: Any, size: Any) -> Json:
-        """Of a plane that may be larger than its element; its texture's squares stay the same."""
-        model, matid = self.model, int(element.matid[0])
-        rgba, image = _colours(model, element.rgba[None], element.matid)[0], _image(model, matid)
-        if image < 0:
-            return material(rgba, **FLOOR)
-        repeat, uniform = model.mat_texrepeat[matid], bool(model.mat_texuniform[matid])
-        if not uniform:  # repetitions over the plane, or over 2 m of what has no end
-            half, own = (np.where(each > 0, each, 1.0) for each in (size[:2], element.size[:2]))
-            repeat = repeat * half / own
-        drawn = plane_texture(model, image, size, repeat=repeat, uniform=uniform)
-        return material(rgba, **FLOOR, map=drawn)
-
-    def _shape(self, element: Any, number: int) -> tuple[Json, Matrix, Json] | None:
+    def _shape(self, element: Any, number: int, plain: bool) -> tuple[Json, Matrix, Json] | None:
         """Geometry (of mesh or height field ``number``), its own matrix, and material."""
-        model, kind, matid = self.model, int(element.type[0]), int(element.matid[0])
-        rgba = _colours(model, element.rgba[None], element.matid)[0]
-        image = _image(model, matid)
-        more: Json = {}
+        model, kind, still = self.model, int(element.type[0]), np.eye(4)
         match mujoco.mjtGeom(kind):
             case mujoco.mjtGeom.mjGEOM_PLANE:
-                surface = self._plane_material(element, element.size)
-                return plane(element.size), np.eye(4), surface
+                look = plane_surface(model, element, element.size, plain=plain)
+                return plane(element.size), still, look
             case mujoco.mjtGeom.mjGEOM_MESH | mujoco.mjtGeom.mjGEOM_SDF:
-                if image >= 0 and model.mesh_texcoordadr[number] >= 0:
-                    more["map"] = texture(model, image, model.mat_texrepeat[matid])
-                return mesh(model, number), np.eye(4), material(rgba, **more)
+                if model.mesh_texcoordadr[number] >= 0:
+                    look = laid_surface(model, element, np.ones(2), plain=plain)
+                else:
+                    look = surface(model, element, plain=plain)
+                return mesh(model, number), still, look
             case mujoco.mjtGeom.mjGEOM_HFIELD:
-                return height_field(model, number), np.eye(4), material(rgba)
+                look = laid_surface(model, element, model.hfield_size[number, :2], plain=plain)
+                return height_field(model, number, textured="map" in look), still, look
         drawn = primitive(kind, element.size)
-        return None if drawn is None else (*drawn, material(rgba))
+        half = np.where(element.size[:2] > 0, element.size[:2], element.size[0])
+        return drawn and (*drawn, laid_surface(model, element, half, plain=plain))
 
     def _is_fixed(self) -> NDArray[np.bool_]:
         """(tendons,)"""
@@ -327,29 +315,15 @@ class Mirror:
             geometry, matrix = coil(max(share * width, least), length)
         else:
             geometry, matrix = tube(width)
-        rgba = _colours(model, model.tendon_rgba[[tendon]], model.tendon_matid[[tendon]])[0]
+        rgba = colours(model, model.tendon_rgba[[tendon]], model.tendon_matid[[tendon]])[0]
         name = model.tendon(tendon).name or f"tendon_{tendon}"
         return DrawnPart(name, geometry, material(rgba), matrix)
-
-
-def _colours(model: mujoco.MjModel, rgba: Any, matid: Any) -> NDArray[np.float64]:
-    """(n, 4) what MuJoCo takes of elements' own colours (n, 4) and of their materials (n,)."""
-    of_material = (matid >= 0) & np.all(rgba == DEFAULT_RGBA, axis=1)
-    return np.where(of_material[:, None], model.mat_rgba[matid] if model.nmat else rgba, rgba)
-
-
-def _image(model: mujoco.MjModel, matid: int) -> int:
-    """The 2-D texture of a material; -1: none."""
-    roles = mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA
-    image = -1 if matid < 0 else max(int(model.mat_texid[matid, int(role)]) for role in roles)
-    flat = image >= 0 and model.tex_type[image] == mujoco.mjtTexture.mjTEXTURE_2D
-    return image if flat else -1
 
 
 def _shown(model: mujoco.MjModel, what: str) -> list[int]:
     """The geoms, sites or tendons that MuJoCo's viewer shows."""
     group, rgba, matid = (getattr(model, f"{what}_{n}") for n in ("group", "rgba", "matid"))
-    return np.flatnonzero((group < GROUPS) & (_colours(model, rgba, matid)[:, 3] > 0)).tolist()
+    return np.flatnonzero((group < GROUPS) & (colours(model, rgba, matid)[:, 3] > 0)).tolist()
 
 
 @compiled

@@ -148,6 +148,13 @@ def material(rgba: ArrayLike, **more: Any) -> Json:
     }
 
 
+def pixels(model: mujoco.MjModel, number: int) -> NDArray[np.uint8]:
+    """(height, width, channels) of a texture; a cube's six faces are below each other, or alike."""
+    at, channels = model.tex_adr[number], model.tex_nchannel[number]
+    height, width = model.tex_height[number], model.tex_width[number]
+    return model.tex_data[at : at + height * width * channels].reshape(height, width, channels)
+
+
 def texture(
     model: mujoco.MjModel, number: int, repeat: Any, offset: ArrayLike | None = None
 ) -> Json:
@@ -160,11 +167,8 @@ def texture(
         offset: (2,) where it begins, in repetitions; None: in the upper left corner.
     """
     offset = np.array([0.0, -repeat[1]]) if offset is None else np.asarray(offset)
-    at, channels = model.tex_adr[number], model.tex_nchannel[number]
-    height, width = model.tex_height[number], model.tex_width[number]
-    pixels = model.tex_data[at : at + height * width * channels].reshape(height, width, channels)
-    png = io.BytesIO()
-    Image.fromarray(pixels[..., 0] if channels == 1 else pixels).save(png, "png")
+    image, png = pixels(model, number), io.BytesIO()
+    Image.fromarray(image[..., 0] if image.shape[2] == 1 else image).save(png, "png")
     return {
         "image": {"url": "data:image/png;base64," + base64.b64encode(png.getvalue()).decode()},
         "wrap": [REPEAT, REPEAT],
@@ -309,8 +313,14 @@ def mesh(model: mujoco.MjModel, number: int) -> Json:
     return triangles(vertices[combinations[0]], normals[combinations[1]], corner, uv)
 
 
-def height_field(model: mujoco.MjModel, number: int) -> Json:
-    """The model's height field of this number: the surface on a solid base."""
+def height_field(model: mujoco.MjModel, number: int, *, textured: bool = False) -> Json:
+    """The model's height field of this number: the surface on a solid base.
+
+    Args:
+        model: whose.
+        number: which.
+        textured: with texture coordinates, from 0 to 1 along x and y.
+    """
     rows, columns = int(model.hfield_nrow[number]), int(model.hfield_ncol[number])
     half_x, half_y, top, base = model.hfield_size[number]
     at = model.hfield_adr[number]
@@ -338,10 +348,12 @@ def height_field(model: mujoco.MjModel, number: int) -> Json:
     quads = np.concatenate([walls, np.insert(bottom, 2, -base, axis=1)[None]]).reshape(-1, 3)
     quad_normals = np.repeat([*outward, [0.0, 0.0, -1.0]], 4, axis=0)
     first = len(points) + 4 * np.arange(len(edge) + 1)
+    points = np.concatenate([points, quads])
     return triangles(
-        np.concatenate([points, quads]),
+        points,
         np.concatenate([upward, quad_normals]),
         np.concatenate([surface, np.add.outer(first, [0, 1, 2]), np.add.outer(first, [0, 2, 3])]),
+        0.5 + 0.5 * points[:, :2] / [half_x, half_y] if textured else None,
     )
 
 

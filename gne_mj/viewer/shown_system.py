@@ -76,6 +76,8 @@ class ShownSystem:
             "anchors": [],
             "rooms": [],
             "floor": None,
+            "sky": None,
+            "light": None,
             "tints": [],
             "joints": [],
         }

@@ -33,6 +33,8 @@ export const handleOf = (page) => ({
   /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
   head: (/** @type {string} */ system, /** @type {number} */ a, /** @type {number} */ b = a) =>
     headOf(page, system, a, b),
+  /** Colours of the sky as they are drawn, from its zenith down, and of the lights that shine. */
+  around: () => aroundOf(page),
   /** What robots cover of the pane, px. */
   bodies: () => page.overlay.bodies,
   /** The labels of robots, px. */
@@ -96,6 +98,16 @@ const headOf = ({ meta, overlay, scene }, name, a, b) => {
   const curve = overlay.links.curve(system, a, b);
   return curve && along(curve, 0.5);
 };
+
+/** @param {Page} page */
+const aroundOf = ({ scene: { surroundings: { lights, sky } } }) => ({
+  sky: sky.mesh.visible ? Object.values(sky.uniforms).map(({ value }) => css(value.toArray())) : null,
+  lights: [lights.above, lights.head, ...lights.suns].map(({ color, intensity, position }) => ({
+    colour: css(color.toArray()),
+    intensity,
+    from: position.toArray(),
+  })),
+});
 
 /** @param {Page} page */
 const isAlive = ({ scene }) => {

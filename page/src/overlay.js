@@ -114,7 +114,7 @@ export class Overlay {
   /** Metres along the lane, at the ground's stronger lines. */
   distances() {
     const { context } = this;
-    const { camera, ground, layout } = this.scene;
+    const { camera, surroundings, layout } = this.scene;
     if (!layout.box) return;
     const { low, high } = layout.box;
     const y = low[1] - (layout.lane === null ? 1.5 : 0.75);
@@ -122,7 +122,7 @@ export class Overlay {
     context.textAlign = "center";
     context.textBaseline = "top";
     context.fillStyle = colour("muted");
-    const step = ground.major > 10 ? ground.major : 5;
+    const step = surroundings.ground.major > 10 ? surroundings.ground.major : 5;
     const wide = this.canvas.clientWidth;
     for (
       let x = Math.floor((low[0] - 2 * step) / step) * step;

@@ -4,19 +4,18 @@ import { Batches } from "./batches.js";
 import { Camera } from "./camera.js";
 import { ramp } from "./colours.js";
 import { Ghosts } from "./ghosts.js";
-import { Ground } from "./ground.js";
 import { Hidden } from "./hidden.js";
 import { Layout } from "./layout.js";
 import { THREE } from "./meshcat.js";
 import { plansOf } from "./plan.js";
-import { colour, theme } from "./theme.js";
+import { Surroundings } from "./surroundings.js";
+import { theme } from "./theme.js";
 import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
 /** @import { Plan } from "./plan.js" */
 /** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
 const FAINT = 0.3; // opacity of what lies over another run
 const BELOW = 0.02; // m from one floor to the next system's, so that none flickers in another
-const FADES = [2.5, 8]; // distances of the camera between which what is far fades
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 
 export class Scene {
@@ -25,7 +24,7 @@ export class Scene {
     this.viewer = viewerIn(pane, () => (this.stale = true));
     this.layout = new Layout();
     this.camera = new Camera(this.viewer, pane, this.layout);
-    this.ground = new Ground(this.viewer.scene);
+    this.surroundings = new Surroundings(this.viewer.scene);
     this.batches = new Batches(this.viewer.scene);
     this.ghosts = new Ghosts(this);
     this.hidden = new Hidden();
@@ -60,10 +59,7 @@ export class Scene {
   }
 
   restyle() {
-    this.ground.uniforms.colour.value.set(colour("grid"));
-    // a floor without an end fades into the page and not into a grey line
-    this.viewer.scene.fog = new THREE.Fog(colour("sky-middle"), 1, 2);
-    this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
+    this.surroundings.restyle();
     for (const each of [...this.bars, ...this.plans]) each.restyle();
     this.dimStatics();
     this.ghosts.forget();
@@ -101,6 +97,7 @@ export class Scene {
     this.meta = meta;
     this.fleets = meta.systems.filter((system) => system.drawn_as === "fleet");
     for (const each of [...this.bars, ...this.plans]) each.remove();
+    this.surroundings.setMeta(meta);
     this.plans = plansOf(this.viewer.scene, this.fleets);
     this.bars = meta.systems
       .filter((system) => system.drawn_as === "bars")
@@ -108,7 +105,6 @@ export class Scene {
     this.instant = null;
     this.ghosts.show(null);
     this.layout.begin(this.fleets, this.bars, this.plans);
-    this.ground.mesh.visible = this.fleets.every(({ floor }) => floor === null);
     this.camera.placed = false;
     this.floorKnown = false;
     this.stale = true;
@@ -170,7 +166,7 @@ export class Scene {
 
   /** A white floor would outshine a dark page and all that stands on it. */
   dimStatics() {
-    const part = theme() === "dark" ? 0.3 : 1;
+    const part = theme() === "dark" ? 0.35 : 1;
     for (const { material, userData } of this.statics) {
       userData.colour ??= material.color.clone();
       material.color.copy(userData.colour).multiplyScalar(part);
@@ -295,12 +291,8 @@ export class Scene {
   }
 
   render() {
-    const { camera, layout } = this;
-    const { x, y, z } = camera.controls.target;
-    const { fog } = this.viewer.scene;
-    [fog.near, fog.far] = FADES.map((times) => times * Math.max(camera.arm().distance, 5));
-    this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
-    camera.render();
+    this.surroundings.place(this.camera, this.layout);
+    this.camera.render();
   }
 
   /** Gives the graphics context up, of which a browser has some sixteen for all its pages. */

@@ -54,6 +54,8 @@ export interface System {
   anchors: number[]; // the item at which each robot is
   rooms: [number, number, number][]; // cylinders around anchors: radius, lower, upper end, m
   floor: number | null; // m, the height of its model's, if that has one
+  sky?: number[][] | null; // colours, 0 to 1, at its zenith, at its horizon and below
+  light?: Light | null;
   plan: Plan | null;
   joints: JointRow[][]; // of each robot
   tints: string[][]; // paths of what has each agent's colour
@@ -63,6 +65,12 @@ export interface System {
   shift: [number, number]; // m along x and y, by which it is drawn beside others of its run
   beside: [number, number]; // m more, where runs are drawn beside each other
   shown: Shown; // the page's own
+}
+
+/** Where a model's light comes from, in parts of all of it. */
+export interface Light {
+  from: number[][]; // toward each light, and its part
+  head: number; // the part at the camera
 }
 
 /** How the page draws a system. */

@@ -58,7 +58,6 @@ export const viewerIn = (pane, changed) => {
   viewer.scene_tree.folder = folder();
   for (const name of ["Grid", "Axes", "Lights"]) viewer.set_property([name], "visible", false);
   viewer.hide_background(); // the page's own shines through
-  light(viewer.scene);
   return viewer;
 };
 
@@ -79,15 +78,6 @@ const sharing = () => {
     } else if (known.has(uuid)) mesh.geometry = known.get(uuid);
     else waiting.set(uuid, [...(waiting.get(uuid) ?? []), mesh]);
   };
-};
-
-/** @param {Three} scene */
-const light = (scene) => {
-  const sky = new THREE.HemisphereLight(0xffffff, 0x8890a0, 0.72);
-  sky.position.set(0, 0, 1);
-  const sun = new THREE.DirectionalLight(0xffffff, 0.5);
-  sun.position.set(-3, -7, 9);
-  scene.add(sky, sun, sun.target);
 };
 
 /**

@@ -394,6 +394,8 @@
     compared: () => comparedOf(page2),
     /** Where an agent's head, or the middle of the link between two agents, from 0, is in the pane, px. */
     head: (system, a, b = a) => headOf(page2, system, a, b),
+    /** Colours of the sky as they are drawn, from its zenith down, and of the lights that shine. */
+    around: () => aroundOf(page2),
     /** What robots cover of the pane, px. */
     bodies: () => page2.overlay.bodies,
     /** The labels of robots, px. */
@@ -437,6 +439,14 @@
     const curve = overlay.links.curve(system, a, b);
     return curve && along(curve, 0.5);
   };
+  var aroundOf = ({ scene: { surroundings: { lights, sky } } }) => ({
+    sky: sky.mesh.visible ? Object.values(sky.uniforms).map(({ value }) => css(value.toArray())) : null,
+    lights: [lights.above, lights.head, ...lights.suns].map(({ color, intensity, position }) => ({
+      colour: css(color.toArray()),
+      intensity,
+      from: position.toArray()
+    }))
+  });
   var isAlive = ({ scene }) => {
     const gl = scene.viewer.renderer.getContext();
     if (gl.isContextLost()) return false;
@@ -2134,7 +2144,7 @@
     /** Metres along the lane, at the ground's stronger lines. */
     distances() {
       const { context } = this;
-      const { camera, ground, layout } = this.scene;
+      const { camera, surroundings, layout } = this.scene;
       if (!layout.box) return;
       const { low, high } = layout.box;
       const y = low[1] - (layout.lane === null ? 1.5 : 0.75);
@@ -2142,7 +2152,7 @@
       context.textAlign = "center";
       context.textBaseline = "top";
       context.fillStyle = colour("muted");
-      const step = ground.major > 10 ? ground.major : 5;
+      const step = surroundings.ground.major > 10 ? surroundings.ground.major : 5;
       const wide = this.canvas.clientWidth;
       for (let x = Math.floor((low[0] - 2 * step) / step) * step; x <= high[0] + 2 * step; x += step) {
         const p = camera.project([x, y, layout.floor]);
@@ -5914,7 +5924,6 @@
     viewer.scene_tree.folder = folder();
     for (const name of ["Grid", "Axes", "Lights"]) viewer.set_property([name], "visible", false);
     viewer.hide_background();
-    light2(viewer.scene);
     return viewer;
   };
   var sharing = () => {
@@ -5931,13 +5940,6 @@
       } else if (known.has(uuid)) mesh2.geometry = known.get(uuid);
       else waiting.set(uuid, [...waiting.get(uuid) ?? [], mesh2]);
     };
-  };
-  var light2 = (scene) => {
-    const sky = new THREE.HemisphereLight(16777215, 8949920, 0.72);
-    sky.position.set(0, 0, 1);
-    const sun = new THREE.DirectionalLight(16777215, 0.5);
-    sun.position.set(-3, -7, 9);
-    scene.add(sky, sun, sun.target);
   };
   var nodeAt = (viewer, path) => {
     let node = viewer.scene_tree;
@@ -6286,92 +6288,6 @@
       copy2.matrixAutoUpdate = false;
       this.group.add(copy2);
       return copy2;
-    }
-  };
-
-  // src/ground.js
-  var VERTEX = `
-  varying vec2 at;
-  uniform float size;
-  void main() {
-    at = position.xy * size;
-    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  }`;
-  var FRAGMENT = `
-  varying vec2 at;
-  uniform vec3 colour;
-  uniform vec2 middle;
-  uniform float minor, major, reach, lane, laneWidth, strength;
-  float lines(float spacing) {
-    vec2 width = fwidth(at / spacing);
-    vec2 away = abs(fract(at / spacing - 0.5) - 0.5) / max(width, 1e-6);
-    vec2 drawn = (1.0 - min(away, 1.0)) * clamp(0.5 / width - 0.5, 0.0, 1.0);
-    return max(drawn.x, drawn.y);
-  }
-  void main() {
-    float alpha = max(0.35 * lines(minor), 0.8 * lines(major));
-    float inside = laneWidth > 0.0 ? 1.0 - step(laneWidth, abs(at.y - lane)) : 0.0;
-    alpha = max(alpha, 0.16 * inside);
-    float fade = 1.0 - smoothstep(0.25, 1.0, length(at - middle) / reach);
-    gl_FragColor = vec4(colour, strength * alpha * fade);
-  }`;
-  var Ground = class {
-    /** @param {Three} scene */
-    constructor(scene) {
-      const uniform = (value) => ({ value });
-      this.uniforms = {
-        size: uniform(1),
-        colour: uniform(new THREE.Color()),
-        middle: uniform(new THREE.Vector2()),
-        minor: uniform(1),
-        major: uniform(10),
-        reach: uniform(30),
-        lane: uniform(0),
-        laneWidth: uniform(0),
-        strength: uniform(0.6)
-      };
-      const material = new THREE.ShaderMaterial({
-        uniforms: this.uniforms,
-        vertexShader: VERTEX,
-        fragmentShader: FRAGMENT,
-        transparent: true,
-        depthWrite: false,
-        polygonOffset: true,
-        // behind a lane's floor, also where that is seen at a grazing angle
-        polygonOffsetFactor: 4,
-        polygonOffsetUnits: 4,
-        side: THREE.DoubleSide,
-        extensions: { derivatives: true }
-      });
-      this.mesh = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), material);
-      this.mesh.renderOrder = -1;
-      this.mesh.frustumCulled = false;
-      scene.add(this.mesh);
-      this.major = 10;
-    }
-    /**
-     * Follows the point that the camera looks at, in whole squares, so that lines stand still.
-     * @param {number[]} target
-     * @param {number} distance
-     * @param {number} floor
-     * @param {number[] | null} lane its least and greatest y
-     */
-    place(target, distance, floor, lane) {
-      const u = this.uniforms;
-      const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
-      this.major = 10 * minor;
-      const { major } = this;
-      const snap = (v) => Math.round(v / major) * major;
-      const reach = Math.max(8, 4 * distance);
-      const origin = [snap(target[0]), snap(target[1])];
-      this.mesh.position.set(origin[0], origin[1], floor - 0.02);
-      this.mesh.scale.setScalar(2 * reach + major);
-      u.size.value = 2 * reach + major;
-      [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
-      u.middle.value.set(target[0] - origin[0], target[1] - origin[1]);
-      const [low, high] = lane ?? [0, 0];
-      u.laneWidth.value = lane === null ? 0 : 0.75 + (high - low) / 2;
-      u.lane.value = (low + high) / 2 - origin[1];
     }
   };
 
@@ -6750,10 +6666,233 @@
   };
   var plansOf = (parent, systems) => systems.flatMap((system) => system.plan ? [new Plan(parent, system, system.plan)] : []);
 
+  // src/ground.js
+  var VERTEX = `
+  varying vec2 at;
+  uniform float size;
+  void main() {
+    at = position.xy * size;
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  }`;
+  var FRAGMENT = `
+  varying vec2 at;
+  uniform vec3 colour;
+  uniform vec2 middle;
+  uniform float minor, major, reach, lane, laneWidth, strength;
+  float lines(float spacing) {
+    vec2 width = fwidth(at / spacing);
+    vec2 away = abs(fract(at / spacing - 0.5) - 0.5) / max(width, 1e-6);
+    vec2 drawn = (1.0 - min(away, 1.0)) * clamp(0.5 / width - 0.5, 0.0, 1.0);
+    return max(drawn.x, drawn.y);
+  }
+  void main() {
+    float alpha = max(0.35 * lines(minor), 0.8 * lines(major));
+    float inside = laneWidth > 0.0 ? 1.0 - step(laneWidth, abs(at.y - lane)) : 0.0;
+    alpha = max(alpha, 0.16 * inside);
+    float fade = 1.0 - smoothstep(0.25, 1.0, length(at - middle) / reach);
+    gl_FragColor = vec4(colour, strength * alpha * fade);
+  }`;
+  var Ground = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      const uniform = (value) => ({ value });
+      this.uniforms = {
+        size: uniform(1),
+        colour: uniform(new THREE.Color()),
+        middle: uniform(new THREE.Vector2()),
+        minor: uniform(1),
+        major: uniform(10),
+        reach: uniform(30),
+        lane: uniform(0),
+        laneWidth: uniform(0),
+        strength: uniform(0.6)
+      };
+      const material = new THREE.ShaderMaterial({
+        uniforms: this.uniforms,
+        vertexShader: VERTEX,
+        fragmentShader: FRAGMENT,
+        transparent: true,
+        depthWrite: false,
+        polygonOffset: true,
+        // behind a lane's floor, also where that is seen at a grazing angle
+        polygonOffsetFactor: 4,
+        polygonOffsetUnits: 4,
+        side: THREE.DoubleSide,
+        extensions: { derivatives: true }
+      });
+      this.mesh = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), material);
+      this.mesh.renderOrder = -1;
+      this.mesh.frustumCulled = false;
+      scene.add(this.mesh);
+      this.major = 10;
+    }
+    /**
+     * Follows the point that the camera looks at, in whole squares, so that lines stand still.
+     * @param {number[]} target
+     * @param {number} distance
+     * @param {number} floor
+     * @param {number[] | null} lane its least and greatest y
+     */
+    place(target, distance, floor, lane) {
+      const u = this.uniforms;
+      const minor = distance < 45 ? 1 : distance < 200 ? 5 : 25;
+      this.major = 10 * minor;
+      const { major } = this;
+      const snap = (v) => Math.round(v / major) * major;
+      const reach = Math.max(8, 4 * distance);
+      const origin = [snap(target[0]), snap(target[1])];
+      this.mesh.position.set(origin[0], origin[1], floor - 0.02);
+      this.mesh.scale.setScalar(2 * reach + major);
+      u.size.value = 2 * reach + major;
+      [u.minor.value, u.major.value, u.reach.value] = [minor, major, reach];
+      u.middle.value.set(target[0] - origin[0], target[1] - origin[1]);
+      const [low, high] = lane ?? [0, 0];
+      u.laneWidth.value = lane === null ? 0 : 0.75 + (high - low) / 2;
+      u.lane.value = (low + high) / 2 - origin[1];
+    }
+  };
+
+  // src/lights.js
+  var OWN2 = { above: 0.72, rest: 0.5 };
+  var MODELS = { above: 0.7, rest: 0.3 };
+  var SUN = { from: [[-3, -7, 9, 1]], head: 0 };
+  var Lights = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      this.scene = scene;
+      this.above = new THREE.HemisphereLight(16777215, 8949920);
+      this.above.position.set(0, 0, 1);
+      this.head = new THREE.DirectionalLight(16777215);
+      scene.add(this.above, this.head, this.head.target);
+      this.suns = [];
+      this.show(null);
+    }
+    /** @param {Light | null} light of a model that has some */
+    show(light2) {
+      const { above, rest } = light2 ? MODELS : OWN2;
+      const { from, head } = light2 ?? SUN;
+      this.scene.remove(...this.suns);
+      this.suns = from.map(([x, y, z, part]) => {
+        const sun = new THREE.DirectionalLight(16777215, rest * part);
+        sun.position.set(x, y, z);
+        return sun;
+      });
+      this.scene.add(...this.suns);
+      this.above.intensity = above;
+      this.head.intensity = rest * head;
+      this.head.visible = head > 0;
+    }
+    /**
+     * The light at the camera looks where that does.
+     * @param {Three} direction from what it looks at to the camera, as three.js sees it
+     */
+    place({ x, y, z }) {
+      this.head.position.set(x, -z, y);
+    }
+  };
+
+  // src/sky.js
+  var VERTEX2 = `
+  varying vec3 ray;
+  uniform mat4 lens, turn; // from the picture to the camera, and from it to the world
+  void main() {
+    vec4 far = lens * vec4(position.xy, 1.0, 1.0);
+    ray = mat3(turn) * far.xyz / far.w;
+    gl_Position = vec4(position.xy, 1.0, 1.0);
+  }`;
+  var FRAGMENT2 = `
+  varying vec3 ray;
+  uniform vec3 zenith, horizon, nadir;
+  void main() {
+    float up = normalize(ray).y;
+    vec3 end = up > 0.0 ? zenith : nadir;
+    gl_FragColor = vec4(mix(horizon, end, smoothstep(0.0, 0.7, abs(up))), 1.0);
+  }`;
+  var NIGHT = 0.25;
+  var HAZE = 0.35;
+  var inTheme = (rgb) => new THREE.Color(...rgb.map((v) => theme() === "dark" ? NIGHT * v : 1 - HAZE * (1 - v)));
+  var Sky = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      const colours2 = ["zenith", "horizon", "nadir"];
+      this.uniforms = Object.fromEntries(colours2.map((name) => [name, { value: null }]));
+      const material = new THREE.ShaderMaterial({
+        uniforms: { ...this.uniforms, lens: { value: null }, turn: { value: null } },
+        vertexShader: VERTEX2,
+        fragmentShader: FRAGMENT2,
+        depthTest: false,
+        depthWrite: false
+      });
+      this.mesh = new THREE.Mesh(new THREE.PlaneGeometry(2, 2), material);
+      this.mesh.renderOrder = -2;
+      this.mesh.frustumCulled = false;
+      this.mesh.visible = false;
+      this.mesh.onBeforeRender = (...[, , lens]) => {
+        material.uniforms.lens.value = lens.projectionMatrixInverse;
+        material.uniforms.turn.value = lens.matrixWorld;
+      };
+      scene.add(this.mesh);
+      this.colours = null;
+    }
+    /** @param {number[][] | null} colours at its zenith, at its horizon and below, from 0 to 1 */
+    show(colours2) {
+      this.colours = colours2;
+      this.restyle();
+    }
+    restyle() {
+      this.mesh.visible = this.colours !== null;
+      Object.values(this.uniforms).forEach((uniform, k) => {
+        uniform.value = this.colours && inTheme(this.colours[k]);
+      });
+    }
+    /** What is far fades into it; null without a sky. */
+    get horizon() {
+      return this.uniforms.horizon.value;
+    }
+  };
+
+  // src/surroundings.js
+  var FADES = [2.5, 8];
+  var Surroundings = class {
+    /** @param {Three} scene */
+    constructor(scene) {
+      this.scene = scene;
+      this.sky = new Sky(scene);
+      this.lights = new Lights(scene);
+      this.ground = new Ground(scene);
+    }
+    /** @param {Meta} meta of which the first system that has a sky, or lights, gives them */
+    setMeta({ systems }) {
+      this.sky.show(systems.find(({ sky }) => sky)?.sky ?? null);
+      this.lights.show(systems.find(({ light: light2 }) => light2)?.light ?? null);
+      this.ground.mesh.visible = systems.every(({ floor }) => floor === null);
+      this.restyle();
+    }
+    restyle() {
+      const { uniforms } = this.ground;
+      uniforms.colour.value.set(colour("grid"));
+      uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
+      this.sky.restyle();
+      this.scene.fog = new THREE.Fog(this.sky.horizon ?? colour("sky-middle"), 1, 2);
+    }
+    /**
+     * Goes with the camera.
+     * @param {Camera} camera
+     * @param {Layout} layout
+     */
+    place(camera, { floor, lane }) {
+      const { x, y, z } = camera.controls.target;
+      const { direction, distance } = camera.arm();
+      const { fog } = this.scene;
+      [fog.near, fog.far] = FADES.map((times) => times * Math.max(distance, 5));
+      this.lights.place(direction);
+      this.ground.place([x, -z, y], distance, floor, lane);
+    }
+  };
+
   // src/scene.js
   var FAINT2 = 0.3;
   var BELOW2 = 0.02;
-  var FADES = [2.5, 8];
   var AGAIN2 = 500;
   var Scene = class {
     /** @param {HTMLElement} pane */
@@ -6761,7 +6900,7 @@
       this.viewer = viewerIn(pane, () => this.stale = true);
       this.layout = new Layout();
       this.camera = new Camera(this.viewer, pane, this.layout);
-      this.ground = new Ground(this.viewer.scene);
+      this.surroundings = new Surroundings(this.viewer.scene);
       this.batches = new Batches(this.viewer.scene);
       this.ghosts = new Ghosts(this);
       this.hidden = new Hidden();
@@ -6786,9 +6925,7 @@
       if (this.layout.known && this.meta) this.camera.move();
     }
     restyle() {
-      this.ground.uniforms.colour.value.set(colour("grid"));
-      this.viewer.scene.fog = new THREE.Fog(colour("sky-middle"), 1, 2);
-      this.ground.uniforms.strength.value = theme() === "dark" ? 0.75 : 0.85;
+      this.surroundings.restyle();
       for (const each of [...this.bars, ...this.plans]) each.restyle();
       this.dimStatics();
       this.ghosts.forget();
@@ -6822,12 +6959,12 @@
       this.meta = meta;
       this.fleets = meta.systems.filter((system) => system.drawn_as === "fleet");
       for (const each of [...this.bars, ...this.plans]) each.remove();
+      this.surroundings.setMeta(meta);
       this.plans = plansOf(this.viewer.scene, this.fleets);
       this.bars = meta.systems.filter((system) => system.drawn_as === "bars").map((system) => new Bars(this.viewer.scene, system));
       this.instant = null;
       this.ghosts.show(null);
       this.layout.begin(this.fleets, this.bars, this.plans);
-      this.ground.mesh.visible = this.fleets.every(({ floor }) => floor === null);
       this.camera.placed = false;
       this.floorKnown = false;
       this.stale = true;
@@ -6884,7 +7021,7 @@
     }
     /** A white floor would outshine a dark page and all that stands on it. */
     dimStatics() {
-      const part = theme() === "dark" ? 0.3 : 1;
+      const part = theme() === "dark" ? 0.35 : 1;
       for (const { material, userData } of this.statics) {
         userData.colour ??= material.color.clone();
         material.color.copy(userData.colour).multiplyScalar(part);
@@ -6997,12 +7134,8 @@
       this.viewer.set_3d_pane_size();
     }
     render() {
-      const { camera, layout } = this;
-      const { x, y, z } = camera.controls.target;
-      const { fog } = this.viewer.scene;
-      [fog.near, fog.far] = FADES.map((times) => times * Math.max(camera.arm().distance, 5));
-      this.ground.place([x, -z, y], camera.arm().distance, layout.floor, layout.lane);
-      camera.render();
+      this.surroundings.place(this.camera, this.layout);
+      this.camera.render();
     }
     /** Gives the graphics context up, of which a browser has some sixteen for all its pages. */
     rest() {
