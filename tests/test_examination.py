@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from commands import gne_here
+from low_level_robots import QUADROTOR
 
 import gne_mj as gm
 from gne_mj.errors import InvalidInput
@@ -57,7 +58,7 @@ def test_a_sound_robot_needs_nothing_to_be_held_and_its_slope_is_the_masses():
     assert np.abs([*seen.rest.input, *seen.wished.input]).max() < 1e-9
     h = seen.slopes.periods[0]
     assert seen.slopes.least[0] == pytest.approx(h / 2.0, rel=5e-3)
-    assert seen.slopes.longest == seen.slopes.periods[-1]
+    assert seen.slopes.rising(False) == seen.slopes.periods
     assert seen.degrees == [1]
     assert seen.limits == [np.inf]
     assert not seen.recommendation.cautions
@@ -229,6 +230,66 @@ def test_robots_of_a_scenario_are_examined_at_their_equilibrium():
     seen = gm.examine("examples/robot/scenario.toml", agent=2, passivity=False)
     assert seen.file.endswith("cart.xml")
     assert seen.wished.wanted == pytest.approx([2.0])
+
+
+HIGH = '<key name="high" qpos="0 0 1.5 1 0 0 0"/><key name="low" qpos="0 0 0.0299 1 0 0 0"/>'
+FLYING = (
+    QUADROTOR.replace(
+        "</worldbody>",
+        """
+  <geom name="ground" type="plane" size="5 5 1"/>
+</worldbody><keyframe>KEYS</keyframe>""",
+    )
+    .replace("KEYS", HIGH)
+    .replace(
+        'size="0.1 0.1 0.03" mass="0.6" contype="0" conaffinity="0"',
+        'size="0.1 0.1 0.03" mass="0.6"',
+    )
+)
+FLIES = {
+    "output": {"body": "frame", "axes": ["x", "y", "z"]},
+    "input": {"controller": "quadrotor", "rotors": ["m1", "m2", "m3", "m4"]},
+}
+
+
+def test_a_quadrotor_is_to_begin_in_the_air_and_to_be_followed_at_its_centre():
+    """The battery hangs 0.2 / 0.8 of (2, 1, -5) cm off the frame's origin."""
+    off = f"{25.0 * np.sqrt(30.0) / 100.0:.2g} cm from the output's point"
+    for keyframe, stands in (("high", False), ("low", True)):
+        seen = gm.examine(FLYING, keyframe=keyframe, passivity=False, **FLIES)
+        assert [each.name for each in seen.offers if each.kind == "keyframe"] == ["high", "low"]
+        assert seen.recommendation.tables["systems"]["robots"]["agents"]["keyframe"] == keyframe
+        assert stands == any(
+            "It stands on something" in each for each in seen.recommendation.cautions
+        )
+        assert any(off in each for each in seen.recommendation.cautions)
+    with pytest.raises(InvalidInput, match=r"^keyframe: got 'hgih', .*; did you mean 'high'"):
+        gm.examine(FLYING, keyframe="hgih", **FLIES)
+
+
+def test_an_agent_of_a_scenario_is_examined_where_and_as_it_begins(tmp_path):
+    (tmp_path / "drone.xml").write_text(FLYING, encoding="utf-8")
+    game = gm.game(
+        2, lambda i, y, p: (y[i] - 0.2) @ (y[i] - 0.2),
+        lambda y, p: [("gap", (y[0] - y[1]) @ (y[0] - y[1]) <= 1.0)], dimension=3,
+    )  # fmt: skip
+    agents = gm.mjcf_robots(
+        2, tmp_path / "drone.xml", keyframe=["high", "low"], **FLIES,
+        poses=[[0, 0, 0], {"position": [3, 0, 0], "quaternion": [1, 0, 0, 1]}],
+    )  # fmt: skip
+    law = gm.full_information(mode="sampled")
+    made = gm.setup(game, agents=agents, law=law, start=np.zeros((2, 3)))
+    for agent, stands in ((1, False), (2, True)):
+        seen = gm.examine(made, agent=agent, passivity=False)
+        assert stands == any("It stands on" in each for each in seen.recommendation.cautions)
+
+
+def test_what_lags_may_rise_over_long_periods_only():
+    from gne_mj.examination.responses import Slopes
+
+    seen = Slopes([1.0, 2.0, 3.0, 4.0], [-1.0, 1.0, 2.0, -1.0], [1.0] * 4, [1.0] * 4, 9, 0.0)
+    assert seen.rising(lags=True) == [2.0, 3.0]
+    assert seen.rising(lags=False) == []
 
 
 def test_the_command(tmp_path, monkeypatch):

@@ -286,6 +286,9 @@ def examine_(
     input: Annotated[
         str | None, typer.Option(metavar="VALUE", help="u_i as a scenario has it; likewise.")
     ] = None,
+    keyframe: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of a file: in which it begins.")
+    ] = None,
     at: Annotated[
         str | None,
         typer.Option(
@@ -318,8 +321,8 @@ def examine_(
     wished = None if at is None else _numbers("at", at)
     with telling(PREPARING, quiet=as_json) as tell, named(changes="set_"):
         found = examining.of_source(
-            source, output, input, wished, changes=settings(set_), system=system,
-            passivity=passive, scenario=scenario, progress=tell,
+            source, output, input, wished, keyframe=keyframe, changes=settings(set_),
+            system=system, passivity=passive, scenario=scenario, progress=tell,
         )  # fmt: skip
     (only, *_) = found.values()
     if scenario is not None and only.usable:

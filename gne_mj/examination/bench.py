@@ -12,9 +12,11 @@ from gne_mj.plants import acting_forces
 from gne_mj.plants.callbacks import quiet
 from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
+from gne_mj.plants.mjcf_output import Output
 from gne_mj.plants.mjcf_robot import MjcfRobots
 
 Array = NDArray[np.float64]
+POINTS = ("body", "site", "geom")
 BUILT = 1e-9  # a limit that all actuators let through
 
 
@@ -94,6 +96,27 @@ class Bench:
         option = self.plant.model.opt
         option.timestep = self.plant.timestep = timestep
         option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+
+    def touches(self) -> bool:
+        """Whether the robot touches anything where it begins."""
+        self.go(self.start)
+        with quiet():
+            mujoco.mj_forward(self.plant.model, self.plant.data)
+        return bool(self.plant.data.ncon > 0)
+
+    def off_centre(self) -> float:
+        """How far in m the point whose velocity is y lies from the robot's centre of mass where it
+        begins; 0 where y is none's."""
+        output = self.plant.agents.robots[0].output  # type: ignore[attr-defined]
+        if not isinstance(output, Output) or output.kind not in POINTS or output.angular:
+            return 0.0
+        self.go(self.start)
+        data = self.plant.data
+        mujoco.mj_kinematics(self.plant.model, data)
+        mujoco.mj_comPos(self.plant.model, data)
+        part = getattr(data, output.kind)(f"robot_1/{output.name}")
+        whole = data.subtree_com[self.plant.model.body_rootid[self.plant.model.nbody - 1]]
+        return float(np.linalg.norm(part.xpos - whole))
 
     def stops(self) -> list[str]:
         """The joints that are at their stops now."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gne_mj.errors import InvalidInput, renaming
 from gne_mj.examination.bench import BUILT, Bench, bench
 from gne_mj.examination.holding import PERIOD, Held, hold
-from gne_mj.examination.offers import offers
+from gne_mj.examination.offers import keyframes, offers
 from gne_mj.examination.proposal import agents_of, entries, propose
 from gne_mj.examination.recommendation import Found, recommend
 from gne_mj.examination.report import Examination, Recommendation
@@ -46,12 +46,14 @@ class Subject:
         robot: one robot, with d channels.
         output: as a scenario has them.
         input: likewise.
+        keyframe: in which it begins; None for its file's pose.
     """
 
     file: str
     robot: MjcfRobots
     output: Any
     input: Any
+    keyframe: str | None = None
 
 
 def examine(
@@ -61,6 +63,7 @@ def examine(
     input: Any = None,
     wished: Array | None = None,
     *,
+    keyframe: str | None = None,
     passivity: bool = True,
     progress: Tell = nothing,
 ) -> Examination:
@@ -72,6 +75,7 @@ def examine(
         output: as a scenario's table has them; both proposed if left out.
         input: likewise.
         wished: (d,) outputs that are to be held, 0.5 each if left out.
+        keyframe: of the file, in which it begins.
         passivity: whether to try that, which takes longest.
         progress: told what is looked at.
 
@@ -80,11 +84,14 @@ def examine(
             ``input`` or ``wished``.
     """
     model = mjcf_file.alone(path)
-    offered = offers(model)
+    offered = [*offers(model), *keyframes(mjcf_file.with_keyframes(path))]
     if (output is None) != (input is None):
         missing = "input" if input is None else "output"
         raise InvalidInput(missing, None, "output and input are to be given together, or neither")
-    pair, vain = ((output, input), []) if output is not None else propose(path, model, offered)
+    pair: tuple[Any, Any] | None = (output, input)
+    vain: list[str] = []
+    if output is None:
+        pair, vain = propose(path, model, offered, keyframe)
     if pair is None:
         nothing = _NOTHING + _NAMELESS * any(not each.name for each in offered)
         nothing_there = Recommendation(
@@ -95,9 +102,9 @@ def examine(
             "not tried", nothing_there,
         )  # fmt: skip
     dimension = entries(pair[0]) if output is None or wished is None else len(wished)
-    robot = agents_of(path, *pair, dimension)
+    robot = agents_of(path, *pair, dimension, keyframe)
     found = examine_robot(
-        Subject(file, robot, *pair), wished, passivity=passivity, progress=progress
+        Subject(file, robot, *pair, keyframe), wished, passivity=passivity, progress=progress
     )
     return replace(found, offers=offered)
 
@@ -139,8 +146,9 @@ def examine_robot(
     progress(0.7, 1.0, "passivity")
     tried = _passivity(subject.robot, own, target, change) if passivity else "not tried"
     found = Found(
-        subject.file, subject.output, subject.input, target, rest, held, seen, degrees, late, steps,
-        own.limits, own.plant.measures_every_stage,
+        subject.file, subject.output, subject.input, subject.keyframe, target, rest, held, seen,
+        degrees, late, steps, own.limits, own.plant.measures_every_stage, own.touches(),
+        own.off_centre(),
     )  # fmt: skip
     return Examination(
         subject.file, _shown(subject.output), _shown(subject.input), _units(own), [],

@@ -25,7 +25,7 @@ class Offer:
     """One thing of a file.
 
     Args:
-        kind: "joint", "body", "tendon", "sensor" or "actuator".
+        kind: "joint", "body", "tendon", "sensor", "actuator" or "keyframe".
         name: its own; empty where it has none, and so cannot be named.
         about: what it is, or does, in words.
         usable: whether a scenario can name it.
@@ -43,6 +43,12 @@ def offers(model: mujoco.MjModel) -> list[Offer]:
     """All of them, kind by kind."""
     return [*_joints(model), *_bodies(model), *_tendons(model), *_sensors(model),
             *_actuators(model)]  # fmt: skip
+
+
+def keyframes(model: mujoco.MjModel) -> list[Offer]:
+    """Those of a model that has them, as starts."""
+    names = [model.key(k).name for k in range(model.nkey)]
+    return [Offer("keyframe", name, "a pose to begin in", bool(name)) for name in names]
 
 
 def _joints(model: mujoco.MjModel) -> list[Offer]:

@@ -17,15 +17,20 @@ MOST = 8  # pairs that are tried
 ROTORS, WHEELS = 4, 2
 
 
-def agents_of(path: Path, output: Any, input_: Any, dimension: int) -> MjcfRobots:
+def agents_of(
+    path: Path, output: Any, input_: Any, dimension: int, keyframe: str | None = None
+) -> MjcfRobots:
     """One robot as a scenario's table would have it.
 
     Raises:
-        InvalidInput: the table is refused; names ``output`` or ``input``.
+        InvalidInput: the table is refused; names ``output``, ``input`` or ``keyframe``.
     """
     table = MjcfAgents.model_validate(
-        {"type": "mjcf-robot", "count": 1, "file": str(path), "output": output, "input": input_}
-    )
+        {
+            "type": "mjcf-robot", "count": 1, "file": str(path), "output": output, "input": input_,
+            "keyframe": keyframe,
+        }
+    )  # fmt: skip
     made = table.build((dimension,))
     assert isinstance(made, MjcfRobots)
     return made
@@ -39,7 +44,7 @@ def entries(output: Any) -> int:
 
 
 def propose(
-    path: Path, model: mujoco.MjModel, offers: list[Offer]
+    path: Path, model: mujoco.MjModel, offers: list[Offer], keyframe: str | None = None
 ) -> tuple[tuple[Any, Any] | None, list[str]]:
     """An output and an input, as a scenario has them; None if nothing of the file can be used.
 
@@ -51,7 +56,7 @@ def propose(
     """
     best, rank, vain = None, 3, []
     for output, input_, free in [*_driven(model, offers), *_pairs(model, offers)]:
-        found, why = _rank(path, output, input_, free)
+        found, why = _rank(path, output, input_, free, keyframe)
         if why:
             vain.append(f"Output {output!r} with input {input_!r}: {why}.")
         if found < rank:
@@ -100,14 +105,16 @@ def _pairs(model: mujoco.MjModel, offers: list[Offer]) -> Iterator[tuple[Any, An
             count += 1
 
 
-def _rank(path: Path, output: Any, input_: Any, free: bool) -> tuple[int, str]:
+def _rank(
+    path: Path, output: Any, input_: Any, free: bool, keyframe: str | None
+) -> tuple[int, str]:
     """0: it moves its output at once and without end; 1: at once; 2: later; 3: it is refused.
 
     Of a pair that is refused also why.
     """
     try:
         d = entries(output)
-        tried = bench(agents_of(path, output, input_, d), 0.001, "rk4")
+        tried = bench(agents_of(path, output, input_, d, keyframe), 0.001, "rk4")
         degrees = relative_degrees(tried, tried.start, np.zeros(d), np.ones(d))
     except InvalidInput as refused:
         return 3, refused.about

@@ -17,6 +17,7 @@ RESERVE = 0.5  # of the longest stable step
 SPREAD = 2.0  # of dy+/du over states, for an observer (docs/held-inputs.md)
 DEVELOPED = 1.5  # power of time with which a response that lags may still grow
 NEAR = 0.8  # of a limit
+OFF_CENTRE = 0.005  # m that a quadrotor's output may be from its centre of mass untold
 SHIFTS = 0.01  # of the wished output, or of 0.1 if that is more: a lesser shift is not told
 SLOWER = 3.0  # a step of rk4 costs more than so many of euler
 COUNT, DURATION = 3, 10.0  # robots, and s, of the scenario
@@ -29,15 +30,19 @@ class Found:
     Args:
         file: as the scenario is to name it.
         output, input: as a scenario has them.
+        keyframe: in which it begins; None for the file's pose.
         wished: (d,) outputs.
         rest, held, slopes, degrees, dead_time, steps, limits: see
             :class:`gne_mj.examination.report.Examination`.
         fresh: whether outputs are known at every stage of a step.
+        touches: whether it touches anything where it begins.
+        off_centre: m from its centre of mass to the output's point; 0 where there is none.
     """
 
     file: str
     output: Any
     input: Any
+    keyframe: str | None
     wished: NDArray[np.float64]
     rest: Held
     held: Held
@@ -47,6 +52,13 @@ class Found:
     steps: StableSteps
     limits: NDArray[np.float64]
     fresh: bool
+    touches: bool
+    off_centre: float
+
+    @property
+    def lags(self) -> bool:
+        """Whether the relative degree is more than 1, or not known."""
+        return max((each for each in self.degrees if each is not None), default=2) > 1
 
 
 def step_for(steps: StableSteps, integrator: str, longest: float = STEPS[0]) -> float:
@@ -77,12 +89,14 @@ def recommend(found: Found) -> Recommendation:
         room = max(found.held.off, max(found.held.ripple) * abs(slopes.most[0]))
         more.append(
             f"margin: give bounds {room:.2g} more than you need, as far as outputs were off while"
-            " they were held; of MJCF robots no margin is computed."
+            " they were held; of MJCF robots [margin] is for noise alone."
         )
     agents = {
         "type": "mjcf-robot", "count": COUNT, "file": found.file, "output": found.output,
         "input": input_,
     }  # fmt: skip
+    if found.keyframe is not None:
+        agents["keyframe"] = found.keyframe
     if limited:
         limits = found.limits.tolist()
         agents["input_limit"] = limits[0] if len(limits) == 1 else [limits] * COUNT
@@ -98,9 +112,12 @@ def recommend(found: Found) -> Recommendation:
 
 def _clock(found: Found, slopes: Slopes) -> tuple[dict[str, Any], list[str]]:
     """The scenario's simulation, and why."""
-    lags = max((each for each in found.degrees if each is not None), default=2) > 1
-    offered = _developed(slopes) if lags else PERIODS
-    good = [each for each in offered if each <= slopes.longest * (1 + 1e-9)]
+    offered = _developed(slopes) if found.lags else PERIODS
+    rising = slopes.rising(found.lags)
+    low, high = min(rising, default=np.inf), max(rising, default=0.0)
+    if low == slopes.periods[0]:  # and below
+        low = 0.0
+    good = [each for each in offered if low * (1 - 1e-9) <= each <= high * (1 + 1e-9)]
     narrow = [each for each in good if _spread(slopes, each) < SPREAD]
     period = (narrow or good or [*offered, PERIODS[1]])[0]
     longest = found.steps.longest
@@ -146,7 +163,7 @@ def _controller(
     found: Found, slopes: Slopes, period: float, shift: str
 ) -> tuple[dict[str, Any], list[str]]:
     """The scenario's law, and why; ``shift`` is what :func:`_shift` tells."""
-    if not (slopes.longest > 0.0 and found.fresh):
+    if not (slopes.rising(found.lags) and found.fresh):
         return {"information": "full", "mode": "sampled"}, [
             "mode: sampled, which promises nothing; implicit needs an output that is fresh and"
             " rises with its input at all states."
@@ -185,13 +202,28 @@ def _shift(found: Found, slopes: Slopes) -> str:
 def _cautions(found: Found, slopes: Slopes, turned: bool, shift: str) -> list[str]:
     """What is wrong, or must be known; ``shift`` is what :func:`_shift` tells."""
     said = []
+    flies = isinstance(found.input, dict) and found.input.get("controller") == "quadrotor"
+    if flies and found.touches:
+        said.append(
+            "It stands on something where it begins, and no tilt moves it there: let it begin in"
+            " the air, in a keyframe of its file or a pose."
+        )
+    if flies and found.off_centre > OFF_CENTRE:
+        said.append(
+            f"Its centre of mass lies {100.0 * found.off_centre:.2g} cm from the output's point,"
+            " which a tilt first moves the wrong way: take a site at that centre."
+        )
     if turned:
         said.append("The output falls where its input rises: the input is to be turned round.")
-    if slopes.longest < PERIODS[0] and not turned:
+    longest = max(slopes.rising(found.lags), default=0.0)
+    if longest < PERIODS[0] and not turned:
         said.append(
-            f"dy+/du is not positive at all states over more than {1e3 * slopes.longest:.3g} ms"
+            f"dy+/du is not positive at all states over more than {1e3 * longest:.3g} ms"
             f" (at the worst at {min(slopes.positive):.0%} of them): nothing is promised over"
             " longer periods."
+            if longest
+            else "dy+/du is not positive at all states, from the shortest period on: nothing is"
+            " promised."
         )
     degrees = [each for each in found.degrees if each is not None]
     if max(degrees, default=1) > 1:

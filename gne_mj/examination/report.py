@@ -100,7 +100,7 @@ class Examination:
 
     def _offered(self) -> list[str]:
         lines = []
-        for kind in ("joint", "body", "tendon", "sensor", "actuator"):
+        for kind in ("joint", "body", "tendon", "sensor", "actuator", "keyframe"):
             there = [each for each in self.offers if each.kind == kind]
             for each in there[:MANY]:
                 name = f"'{each.name}'" if each.name else "no name"
@@ -120,7 +120,8 @@ class Examination:
             rows.append((f"held at {_numbers(self.wished.wanted)}",
                          _held(self.wished, unit, effort)))  # fmt: skip
         if self.slopes is not None:
-            rows.append(("dy+/du", _slopes(self.slopes)))
+            lags = max((each for each in self.degrees if each is not None), default=2) > 1
+            rows.append(("dy+/du", _slopes(self.slopes, lags)))
         rows.append(("relative degree", _degrees(self.degrees, self.dead_time)))
         free = all(each == float("inf") for each in self.limits)
         rows.append(("limits", "none" if free else f"{_numbers(self.limits)} {effort}"))
@@ -148,15 +149,17 @@ def _held(seen: Held, unit: str, effort: str) -> str:
     return text
 
 
-def _slopes(seen: Slopes) -> str:
+def _slopes(seen: Slopes, lags: bool) -> str:
     rows = [
         f"{least:.3g} to {most:.3g} over {1e3 * period:.3g} ms"
         for period, least, most in zip(seen.periods, seen.least, seen.most, strict=True)
     ]
     text = f"at {seen.states} states: {', '.join(rows[:: max(1, len(rows) // 3)])}"
-    if seen.longest < seen.periods[-1]:
-        where = f"beyond {1e3 * seen.longest:.3g} ms" if seen.longest else "at the shortest"
-        text += f"; not positive at all of them {where}"
+    if (rising := seen.rising(lags)) != seen.periods:
+        where = [f"below {1e3 * rising[0]:.3g} ms"] if rising[:1] > seen.periods[:1] else []
+        if rising and rising[-1] < seen.periods[-1]:
+            where.append(f"beyond {1e3 * rising[-1]:.3g} ms")
+        text += f"; not positive at all of them {' and '.join(where) or 'at the shortest'}"
     if seen.coupling > 0.1:
         text += f"; channels are coupled by up to {seen.coupling:.0%}"
     return text

@@ -35,15 +35,18 @@ class Slopes:
     states: int
     coupling: float
 
-    @property
-    def longest(self) -> float:
-        """The longest period in s up to which they are positive at all states; 0 for none."""
-        good = 0.0
-        for period, least in zip(self.periods, self.least, strict=True):
-            if not least > 0.0:
-                break
-            good = period
-        return good
+    def rising(self, lags: bool) -> list[float]:
+        """The periods in s over which they are positive at all states, up to the first where they
+        are not; none for none.
+
+        Args:
+            lags: whether the relative degree is more than 1: over short periods hardly anything is
+                seen then, and the shortest need not be among them.
+        """
+        good = [least > 0.0 for least in self.least]
+        first = good.index(True) if lags and any(good) else 0
+        end = next((k for k in range(first, len(good)) if not good[k]), len(good))
+        return self.periods[first:end]
 
 
 def slopes(bench: Bench, states: Sequence[tuple[Array, Array]], change: Array) -> Slopes:

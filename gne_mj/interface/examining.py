@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +30,7 @@ def examine(
     *,
     output: Any = None,
     input: Any = None,
+    keyframe: str | None = None,
     at: ArrayLike | None = None,
     system: str | None = None,
     agent: int = 1,
@@ -46,6 +46,7 @@ def examine(
         source: an MJCF file, or its text, which begins with ``<``; or a scenario with such robots.
         output: of a file, as :func:`gne_mj.mjcf_robots` has it; proposed if left out.
         input: likewise; given together with the output, or not at all.
+        keyframe: of a file, the one that it begins in; its own pose if left out.
         at: wished outputs, one or one an entry of the action, in the output's unit; 0.5 if left
             out, of a scenario's robots y*.
         system: of a scenario, which; may be left out if there is only one.
@@ -65,9 +66,9 @@ def examine(
             with in_one_sentence():
                 return examine_file(
                     located(path), path, output, input, _array(wished),
-                    passivity=passivity, progress=tell,
+                    keyframe=keyframe, passivity=passivity, progress=tell,
                 )  # fmt: skip
-        _unused(output, input)
+        _unused(output=output, input=input, keyframe=keyframe)
         scenario = load_scenario(source)
         name = scenario.name_of(system)
         built = scenario.systems[name].build_inside(name, scenario.simulation)[0]
@@ -86,6 +87,7 @@ def of_source(
     input: str | None,
     wished: Sequence[float] | None,
     *,
+    keyframe: str | None = None,
     changes: Mapping[str, Any],
     system: str | None,
     passivity: bool,
@@ -97,6 +99,7 @@ def of_source(
     Args:
         source: a file or a scenario.
         output, input: TOML values, or plain names.
+        keyframe: of a file.
         wished, system, passivity: as :func:`examine` has them.
         changes: of a scenario; a robot's file has none.
         scenario: where the recommended one is to be written.
@@ -115,10 +118,10 @@ def of_source(
             with in_one_sentence():
                 found = examine_file(
                     path, _beside(source, path, scenario), y, u, _array(wished),
-                    passivity=passivity, progress=progress,
+                    keyframe=keyframe, passivity=passivity, progress=progress,
                 )  # fmt: skip
             return {source: found}
-        _unused(output, input)
+        _unused(output=output, input=input, keyframe=keyframe)
         if scenario is not None:
             raise InvalidInput("scenario", str(scenario), "it is for a robot's file")
         loaded = load_scenario(source, changes)
@@ -161,19 +164,14 @@ def _of_system(
     if not 1 <= agent <= agents.count:
         raise InvalidInput("agent", agent, f"agents are numbered 1 to {agents.count}")
     d = agents.dimension
-    own = slice((agent - 1) * d, agent * d)
-    robot = replace(
-        agents, robots=agents.robots[own], parameters=agents.parameters[own],
-        input_limit=agents.input_limit[own],
-    )  # fmt: skip
+    own, robot = slice((agent - 1) * d, agent * d), agents.one(agent - 1)
     known = system.known_equilibrium
     target = known.action[own] if wished is None and known is not None else _array(wished)
     given = [_of_agent(each, agent, agents.count) for each in (table.output, table.input)]
-    file = str(robot.robots[0].path)
-    return examine_robot(
-        Subject(file, robot, *given), target, timestep=TIMESTEP, passivity=passivity,
-        progress=progress,
-    )  # fmt: skip
+    subject = Subject(
+        str(robot.robots[0].path), robot, given[0], given[1], next(iter(robot.keyframes), None)
+    )
+    return examine_robot(subject, target, timestep=TIMESTEP, passivity=passivity, progress=progress)
 
 
 def _of_agent(given: Any, agent: int, count: int) -> Any:
@@ -201,7 +199,7 @@ def _array(wished: Sequence[float] | None) -> Any:
     return None if wished is None else np.array(wished, dtype=np.float64)
 
 
-def _unused(output: Any, input: Any) -> None:
-    for key, value in (("output", output), ("input", input)):
+def _unused(**given: Any) -> None:
+    for key, value in given.items():
         if value is not None:
             raise InvalidInput(key, value, "a scenario has its own")

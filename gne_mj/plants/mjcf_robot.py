@@ -103,6 +103,18 @@ class MjcfRobots(Agents):
         """One an agent."""
         return self.robots[:: self.dimension]
 
+    def one(self, agent: int) -> Self:
+        """That agent, from 0, by itself, where and as it starts."""
+        own, only = (
+            slice(agent * self.dimension, (agent + 1) * self.dimension),
+            slice(agent, agent + 1),
+        )
+        return replace(
+            self, robots=self.robots[own], parameters=self.parameters[own],
+            input_limit=self.input_limit[own], poses=self.poses[only],
+            keyframes=self.keyframes[only],
+        )  # fmt: skip
+
     def repeated(self, copies: int) -> Self:
         """See the base class; several copies are put beside each other.
 
