@@ -163,8 +163,9 @@ def test_drones_are_dragged_in_space(page, recorded):
         done = [(each["agent"], each["axis"]) for each in live.simulation.interventions]
         assert done == [(4, "x"), (4, "y"), (4, "z")]
         x, y, z = (each["force"] for each in live.simulation.interventions)
-        assert np.hypot(x, y) == pytest.approx(5.0 * np.hypot(45.0, 30.0) / 50.0, rel=0.01)
-        assert z == pytest.approx(-5.0, rel=0.1)
+        # of a drone of 0.38 kg 50 px are 2 N
+        assert np.hypot(x, y) == pytest.approx(2.0 * np.hypot(45.0, 30.0) / 50.0, rel=0.01)
+        assert z == pytest.approx(-2.0, rel=0.1)
         quiet(recorded, *origins(live.server))
 
 

@@ -13,7 +13,8 @@ from gne_mj.viewer.shown_system import ShownSystem
 
 DECADES = 100.0  # a positive number's slider goes so many times up and down
 REACH = 5.0  # m/s, how far a velocity's slider goes up and down
-PUSH_FORCE, PUSH_DURATION = 5.0, 0.2  # N, s
+# N, of robots lighter than 1 kg for each kg; s
+PUSH_FORCE, PUSH_DURATION = 5.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -104,13 +105,24 @@ def pushes_of(shown_systems: list[ShownSystem]) -> list[dict[str, Any]]:
                 {
                     "system": system.name,
                     "axes": list(dict.fromkeys(system.game.axis_of_action)) if axes > 1 else [""],
-                    "force": PUSH_FORCE,
+                    "force": float(f"{PUSH_FORCE * min(_lightest(fleet), 1.0):.1g}"),
                     "duration": PUSH_DURATION,
                     "ways": _ways(fleet, system.game, items),
                 }
             )
         items += len(fleet.mirror.items)
     return found
+
+
+def _lightest(fleet: Fleet) -> float:
+    """The mass in kg of the lightest robot."""
+    model = fleet.plant.model
+    found = dict.fromkeys((f"robot_{i + 1}" for i in range(fleet.agents)), 0.0)
+    for body in range(model.nbody):
+        robot = model.body(body).name.partition("/")[0]
+        if robot in found:
+            found[robot] += float(model.body_mass[body])
+    return min(found.values())
 
 
 def _ways(fleet: Fleet, game: Game, first: int) -> list[list[dict[str, Any] | None]]:

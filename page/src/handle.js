@@ -40,7 +40,7 @@ export const handleOf = (page) => ({
   /** The labels of robots, px. */
   labels: () => page.overlay.labels.drawn,
   /** Where the text of a force is while a robot is dragged, px. */
-  told: () => page.hands.pushing.told,
+  told: () => page.hands.pushing.shown?.box ?? null,
   /** What is plotted. */
   get plots() {
     return page.plots.describe();

@@ -5,6 +5,7 @@ import { Labels } from "./labels.js";
 import { Links } from "./links.js";
 import { colour } from "./theme.js";
 import { decimals, fixed, number } from "./words.js";
+/** @import { Pushing } from "./push.js" */
 /** @import { Scene } from "./scene.js" */
 /** @import { Agent, Instant, Run, Scene as Meta, System, Text } from "./types.d.ts" */
 
@@ -49,7 +50,7 @@ export class Overlay {
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.links = new Links(this.context, scene);
     this.labels = new Labels(this);
-    /** @type {{draw: (context: CanvasRenderingContext2D) => void} | null} */
+    /** @type {Pushing | null} */
     this.hands = null; // what hands do in the pane
     this.labelled = true;
     /** @type {System[]} */
@@ -104,6 +105,7 @@ export class Overlay {
     this.links.draw(solid, instant, now);
     if (this.runs.length && solid.length === this.systems.length)
       for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
+    this.hands?.drawUnder(context);
     for (const system of solid)
       if (system.drawn_as === "bars") this.barTexts(system);
       else this.labels.draw(system, instant, this.labelled);

@@ -34,8 +34,8 @@ export class Pushing {
     this.drag = null;
     /** @type {Place | null} */
     this.pressed = null; // where a hand went down on nobody
-    /** @type {Box | null} */
-    this.told = null; // where the text of a force is
+    /** @type {{text: string, tip: Place, side: number, box: Box | null} | null} */
+    this.shown = null; // what an arrow says, and where
     const pane = byId("pane");
     pane.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     pane.addEventListener("pointermove", (event) => this.move(event), { capture: true });
@@ -202,10 +202,13 @@ export class Pushing {
 
   // ---- the arrow
 
-  /** @param {CanvasRenderingContext2D} context of the overlay */
-  draw(context) {
+  /**
+   * The arrow, under labels.
+   * @param {CanvasRenderingContext2D} context of the overlay
+   */
+  drawUnder(context) {
     const { drag } = this;
-    this.told = null;
+    this.shown = null;
     if (!drag || !this.pushing) return;
     const forces = this.forces(drag);
     if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
@@ -214,18 +217,28 @@ export class Pushing {
     const { duration } = /** @type {Push} */ (this.pushes.get(system.name));
     const from = this.page.scene.camera.project(this.page.scene.layout.headOf(system, which.agent));
     if (!from || !force) return;
-    const to = this.tip(drag, from, forces);
-    arrow(context, from, to);
+    const tip = this.tip(drag, from, forces);
+    arrow(context, from, tip);
     const unit = this.unitOf(system, which.agent);
     const text = `${withUnit(force, unit)} for ${number(duration)} s`;
+    this.shown = { text, tip, side: tip.x >= from.x ? 1 : -1, box: null };
+  }
+
+  /**
+   * Its text, beside them.
+   * @param {CanvasRenderingContext2D} context of the overlay
+   */
+  draw(context) {
+    const { shown } = this;
+    if (!shown) return;
+    const { overlay } = this.page;
     context.font = "600 13px system-ui, sans-serif";
     context.textAlign = "left";
     context.textBaseline = "middle";
     context.fillStyle = colour("accent");
-    const box = this.room(context.measureText(text).width + 4, to, to.x >= from.x ? 1 : -1);
-    this.page.overlay.taken.push(box);
-    this.page.overlay.haloed(text, box.x + 2, box.y + box.h / 2);
-    this.told = box;
+    shown.box = this.room(context.measureText(shown.text).width + 4, shown.tip, shown.side);
+    overlay.taken.push(shown.box);
+    overlay.haloed(shown.text, shown.box.x + 2, shown.box.y + shown.box.h / 2);
   }
 
   /**

@@ -401,7 +401,7 @@
     /** The labels of robots, px. */
     labels: () => page2.overlay.labels.drawn,
     /** Where the text of a force is while a robot is dragged, px. */
-    told: () => page2.hands.pushing.told,
+    told: () => page2.hands.pushing.shown?.box ?? null,
     /** What is plotted. */
     get plots() {
       return page2.plots.describe();
@@ -1009,7 +1009,7 @@
       this.pushes = /* @__PURE__ */ new Map();
       this.drag = null;
       this.pressed = null;
-      this.told = null;
+      this.shown = null;
       const pane = byId("pane");
       pane.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
       pane.addEventListener("pointermove", (event) => this.move(event), { capture: true });
@@ -1167,10 +1167,13 @@
       this.page.live?.send({ do: "push", system, agent: agent + 1, forces, duration });
     }
     // ---- the arrow
-    /** @param {CanvasRenderingContext2D} context of the overlay */
-    draw(context) {
+    /**
+     * The arrow, under labels.
+     * @param {CanvasRenderingContext2D} context of the overlay
+     */
+    drawUnder(context) {
       const { drag } = this;
-      this.told = null;
+      this.shown = null;
       if (!drag || !this.pushing) return;
       const forces = this.forces(drag);
       if (!forces || sizeOf(between(drag.from, drag.to)) <= STILL) return;
@@ -1182,18 +1185,27 @@
       );
       const from = this.page.scene.camera.project(this.page.scene.layout.headOf(system, which.agent));
       if (!from || !force) return;
-      const to2 = this.tip(drag, from, forces);
-      arrow(context, from, to2);
+      const tip = this.tip(drag, from, forces);
+      arrow(context, from, tip);
       const unit = this.unitOf(system, which.agent);
       const text2 = `${withUnit(force, unit)} for ${number(duration)} s`;
+      this.shown = { text: text2, tip, side: tip.x >= from.x ? 1 : -1, box: null };
+    }
+    /**
+     * Its text, beside them.
+     * @param {CanvasRenderingContext2D} context of the overlay
+     */
+    draw(context) {
+      const { shown: shown2 } = this;
+      if (!shown2) return;
+      const { overlay } = this.page;
       context.font = "600 13px system-ui, sans-serif";
       context.textAlign = "left";
       context.textBaseline = "middle";
       context.fillStyle = colour("accent");
-      const box = this.room(context.measureText(text2).width + 4, to2, to2.x >= from.x ? 1 : -1);
-      this.page.overlay.taken.push(box);
-      this.page.overlay.haloed(text2, box.x + 2, box.y + box.h / 2);
-      this.told = box;
+      shown2.box = this.room(context.measureText(shown2.text).width + 4, shown2.tip, shown2.side);
+      overlay.taken.push(shown2.box);
+      overlay.haloed(shown2.text, shown2.box.x + 2, shown2.box.y + shown2.box.h / 2);
     }
     /**
      * Room for the text at an arrow's tip: within the pane, off all labels if there is any such place.
@@ -2135,6 +2147,7 @@
       this.links.draw(solid, instant, now);
       if (this.runs.length && solid.length === this.systems.length)
         for (const text2 of headingTexts(solid, this.runs, this.scene.layout)) this.text(text2);
+      this.hands?.drawUnder(context);
       for (const system of solid)
         if (system.drawn_as === "bars") this.barTexts(system);
         else this.labels.draw(system, instant, this.labelled);
