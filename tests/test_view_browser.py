@@ -23,6 +23,7 @@ from gne_mj.viewer.surroundings import sky_of
 
 READY = "window.gne && window.gne.ready"
 CLOSE = 1e-6  # m
+WIDTHS = ((390, 844), (720, 900), (1440, 900), (1920, 1080))
 OUTSIDE = "rgb(219, 5, 41)"
 
 
@@ -245,6 +246,12 @@ def test_an_exit_is_shown_in_words_and_in_red(page, recorded):
         assert trajectory.reports["robots"]["message"] in text
         left = trajectory.reports["robots"]["exit"]
         assert page.evaluate("window.gne.state().exits.robots") == pytest.approx(left["time"])
+        for width, height in WIDTHS:
+            page.set_viewport_size({"width": width, "height": height})
+            page.locator(".exit-line").first.wait_for(state="visible")
+            texts = [each["text"] for each in page.evaluate("window.gne.labels()")]
+            # and not 100.0 %, as what is 0.04 % beyond the bound would be rounded
+            assert texts.count("⚠ outside") == len(left["agents"])
         quiet(recorded, *origins(server))
     finally:
         server.close()
@@ -313,6 +320,19 @@ def test_live_robots_are_where_the_simulation_has_them(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+def test_a_chip_says_whether_its_run_goes_on(page):
+    with session(begin="paused") as live:
+        opened(page, live.server.url)
+        chip = page.locator(".chip")
+        assert chip.inner_text().split("\n")[1:] == ["robots: not begun", "no margin yet"]
+        page.keyboard.press("Space")
+        chip.get_by_text("running").wait_for()
+        page.keyboard.press("Space")
+        chip.get_by_text("paused").wait_for()
+        live.server.close()
+        chip.get_by_text("not connected").wait_for()
+
+
 def test_a_run_begins_with_its_first_browser(page, recorded):
     with session(begin="viewer") as live:
         time.sleep(0.1)
@@ -363,6 +383,12 @@ def test_sliders_and_pushes_act_on_the_simulation(page, recorded):
         page.locator(".toast.error button").click()
         assert page.locator(".toast.error").count() == 0
         assert len(live.simulation.interventions) == 1
+        reference.fill("302")
+        reference.press("Enter")
+        page.locator(".toast.error").wait_for()
+        reference.fill("2.9")  # with which what was said of the slider is the past
+        reference.press("Enter")
+        until(page, "!document.querySelector('.toast.error')")
         quiet(recorded, *origins(live.server))
 
 

@@ -176,7 +176,7 @@ def test_two_runs_in_a_browser(page, recorded, runs):
         until(page, "window.gne.compared()[1].opacity < 0.5")
         assert position(page, "meshcat/rho = 0.5/robot_2/main")[1] == pytest.approx(0.0)
         assert [each["opacity"] < 0.5 for each in drawn(page).values()] == [False, True]
-        assert "translucent: rho = 0.5" in page.locator("#compare-note").inner_text()
+        assert "translucent, in rings: rho = 0.5" in page.locator("#compare-note").inner_text()
         page.locator("#run-keys button").nth(0).click()  # the first is switched off
         until(page, "window.gne.compared().map(each => each.visible).join() === 'false,true'")
         assert page.evaluate("window.gne.plots[0].shown") == [*[False] * 5, *[True] * 5]

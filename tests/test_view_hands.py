@@ -1,16 +1,26 @@
 """Hands on a live page: robots dragged, joints looked at, links lost by a click, at every width."""
 
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
-from test_view_browser import live_wait, opened, origins, quiet, seek, session, until
+from test_view_browser import (
+    WIDTHS,
+    live_wait,
+    opened,
+    origins,
+    quiet,
+    seek,
+    session,
+    until,
+)
 
 import gne_mj
 from gne_mj.scenario import as_done, load_scenario
 from gne_mj.viewer import serve
 
-WIDTHS = ((390, 844), (720, 900), (1440, 900), (1920, 1080))
+ROBOTS = Path(__file__).parents[1] / "examples" / "robot" / "scenario.toml"
 PARTIAL = {"controller": {"information": "partial", "graph": "ring", "coupling": 5.0}}
 
 
@@ -220,6 +230,33 @@ def test_joints_of_a_replay(page, recorded):
         found = [float(shown[k].replace("−", "-")) for k in (0, 1, 3, 4)]
         assert np.allclose(found, expected, atol=2e-3)
         assert page.locator("#chosen button.push").count() == 0
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
+
+
+@pytest.mark.slow  # a browser at several widths
+def test_joints_that_were_not_recorded_are_told(page, recorded):
+    """Of robots from files of one's own a replay has the velocities of outputs alone."""
+    trajectory = gne_mj.run(ROBOTS, {"simulation.duration": 0.5})
+    data, server = trajectory["fleet"], serve(trajectory)
+    try:
+        opened(page, server.url)
+        page.locator("#follow").select_option(label="robot 1")
+        seek(page, 0.25)
+        row = data.sel(time=0.25, agent=1, method="nearest")
+        travel, swing = row["configuration"].to_numpy()[:2]  # of the first crane
+        expected = [travel, float(row["action"]), swing, float(row["input"])]
+        for width, height in WIDTHS:
+            page.set_viewport_size({"width": width, "height": height})
+            until(page, "document.querySelector('#chosen td span')?.textContent")
+            panel = page.locator("#chosen")
+            shown = [text.replace("−", "-") for text in panel.locator("td span").all_inner_texts()]
+            assert np.allclose([float(text) for text in shown], expected, atol=2e-3)
+            assert panel.locator("td.muted").all_inner_texts() == ["–"]  # how fast it swings
+            assert "Its other numbers were not recorded." in panel.inner_text()
+            box = panel.bounding_box()
+            assert 0 <= box["x"] < box["x"] + box["width"] <= width
         quiet(recorded, *origins(server))
     finally:
         server.close()

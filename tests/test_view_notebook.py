@@ -1,7 +1,7 @@
 """Replays in a notebook: many in one page, the wheel, and files that can be kept from there."""
 
 import pytest
-from test_view_browser import until
+from test_view_browser import WIDTHS, until
 
 import gne_mj
 from gne_mj.notebook import HEIGHT, replay_html
@@ -33,15 +33,20 @@ def test_twenty_replays_live_when_they_are_scrolled_to(page, recorded, replay):
     has = "Boolean(window.gne && window.gne.alive())"
     assert sum(each.evaluate(has) for each in page.frames[1:]) <= 3
     frame.evaluate("window.gne.seek(0.25)")
-    alive(page, 9)
-    assert alive(page, 0).evaluate("window.gne.time()") == pytest.approx(0.25)
+    for width, height in WIDTHS:
+        page.set_viewport_size({"width": width, "height": height})
+        for number in (4, MANY // 2, MANY - 1):
+            assert alive(page, number).evaluate("innerWidth") <= width
+        assert alive(page, 0).evaluate("window.gne.time()") == pytest.approx(0.25)
+        assert frame.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert recorded.errors == []
     assert [text for text in recorded.complaints if "GL Driver" not in text] == []
     assert recorded.left() == []
 
 
-def test_the_wheel_scrolls_the_notebook_unless_the_view_has_the_focus(page, replay):
-    page.set_viewport_size({"width": 1440, "height": 700})
+@pytest.mark.parametrize("width", [1440, pytest.param(1920, marks=pytest.mark.slow)])
+def test_the_wheel_scrolls_the_notebook_unless_the_view_has_the_focus(page, replay, width):
+    page.set_viewport_size({"width": width, "height": 700})
     page.set_content(f"<div style=height:200px></div>{replay}<div style=height:3000px></div>")
     frame = page.frames[1]
     until(frame, "Boolean(window.gne && window.gne.ready)")

@@ -190,18 +190,24 @@ ON_TOP = """selector => {
 }"""
 
 
+@pytest.mark.slow  # a browser at several widths
 def test_nothing_covers_anything_at_any_size(page, recorded):
     with session() as live:
         opened(page, live.server.url)
         page.evaluate("document.getElementById('tuning').open = true")
+        reference = page.get_by_label("reference v₀, as a number")
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
+            reference.fill(f"{width}")  # is refused, with a note that covers no part either
+            reference.press("Enter")
+            page.locator(".toast.error", has_text="stays at 3").wait_for()
             page.evaluate("() => new Promise(resolve => requestAnimationFrame(resolve))")
             assert page.locator("#time-track").bounding_box()["width"] > 150
             assert page.evaluate("document.documentElement.scrollWidth") == width
             assert page.locator("#view").bounding_box()["height"] >= 150
-            for part in ("#legend", "#plots figure figcaption", "#plots .chart", "#tuning-body",
-                         "#tools", "#play", "#fold"):  # fmt: skip
+            for part in ("#legend", "#legend .ramp", "#plots figure figcaption", "#plots .chart",
+                         "#tuning-body", "#tuning-body .push", "#tools", "#play", "#fold", "#chips",
+                         ".toast .icon"):  # fmt: skip
                 assert page.evaluate(ON_TOP, part), (width, part)
         quiet(recorded, *origins(live.server))
 

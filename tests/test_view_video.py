@@ -5,7 +5,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from test_view_browser import opened, origins, quiet, seek, until
+from test_view_browser import WIDTHS, opened, origins, quiet, seek, until
 
 import gne_mj
 from gne_mj.viewer import serve
@@ -13,7 +13,8 @@ from gne_mj.viewer import serve
 # Elements of Matroska (RFC 9559) that hold others, and those that are looked at
 MASTERS = {0x18538067, 0x1549A966, 0x1654AE6B, 0xAE, 0xE0, 0x1F43B675, 0x1C53BB6B, 0xBB, 0xB7}
 SEGMENT, DURATION, CLUSTER, TIMECODE, BLOCK = 0x18538067, 0x4489, 0x1F43B675, 0xE7, 0xA3
-CODEC, CUE = 0x86, 0xF1
+CODEC, CUE, WIDTH, HEIGHT = 0x86, 0xF1, 0xB0, 0xBA
+MOST = 1280  # px
 
 
 def elements(data, at=0, end=None):
@@ -118,6 +119,31 @@ def played(page, data):
     )
     assert len(set(first)) > 50
     assert sum(abs(a - b) > 20 for a, b in zip(first, last, strict=True)) > 50
+
+
+@pytest.mark.slow  # several videos
+def test_a_video_is_of_what_is_seen_at_every_width(page, recorded, run):
+    """Of its view's shape, no wider than is allowed, with nothing over the view in the way."""
+    server = serve(run, "paper")
+    try:
+        opened(page, server.url)
+        page.evaluate("window.gne.show(1, 1.1)")
+        for width, height in WIDTHS:
+            page.set_viewport_size({"width": width, "height": height})
+            seek(page, 1.0)
+            view = page.locator("#view").bounding_box()
+            found = list(elements(Path(saved(page).path()).read_bytes()))
+            assert sum(number == BLOCK for number, *_ in found) == 3
+            wide, high = (
+                int.from_bytes(next(content for n, _, content in found if n == each), "big")
+                for each in (WIDTH, HEIGHT)
+            )
+            assert wide <= MOST
+            assert wide / high == pytest.approx(view["width"] / view["height"], rel=0.01)
+            until(page, "!document.getElementById('recording').checkVisibility()")
+        quiet(recorded, *origins(server))
+    finally:
+        server.close()
 
 
 def test_what_cannot_be_a_video_is_told(page, run):

@@ -157,4 +157,6 @@ def in_words(error: GneError, where: str = "at the present outputs") -> str:
             f"{where} constraint '{error.constraint}' would have g = {error.value:.4g},"
             " which must be negative"
         )
+    if isinstance(error, InvalidInput) and error.key.startswith("simulation."):
+        return error.expected  # the value is the clock's, and no slider's
     return error.about if isinstance(error, Refusal) else str(error)

@@ -34,9 +34,8 @@ export const captionOf = (plot) => {
   return element(
     "figcaption",
     {},
-    element("span", { class: "plot-system", text: spec.whose }),
-    element("span", { class: "plot-title", text: spec.title }),
-    symbolOf(spec.symbol),
+    spec.whose ? element("span", { class: "plot-system", text: spec.whose }) : null,
+    element("span", { class: "plot-title" }, `${spec.title} `, symbolOf(spec.symbol)),
     element(
       "span",
       { class: "plot-tools" },

@@ -10,6 +10,7 @@ export const MOST_CHIPS = 14; // lines, up to which each has a chip with its val
 const FONT = "12px system-ui, sans-serif";
 const LABEL = 13; // px of a bound's label
 const UNIT = 18; // px of the unit beside an axis
+const LATE = 0.7; // of the width, from which on words about a time stand before it
 
 /**
  * @param {Plot} plot
@@ -146,7 +147,7 @@ const drawMarks = (u, plot) => {
   drawInterventions(u, plot.plots.source.interventions);
   for (const system of plot.spec.systems) drawApproach(u, plot, system);
   if (plot.look.log) return context.restore();
-  drawBounds(u, plot.spec);
+  drawBounds(u, plot);
   drawMovingBounds(u, plot.movingBounds);
   context.restore();
 };
@@ -169,6 +170,21 @@ const drawInterventions = (u, interventions) => {
   }
 };
 
+/** @param {Spec} spec */
+const saysApproach = ({ name, systems }) => name === "constraint" && systems.length === 1;
+
+/**
+ * Whether words about an exit or a closest approach stand at the right.
+ * @param {Plot} plot
+ */
+const isLate = ({ spec, plots: { source, window: [from, to] } }) =>
+  spec.systems
+    .flatMap((system) => [
+      source.exits[system.name],
+      saysApproach(spec) ? source.stateOf(system).margin_time : NaN,
+    ])
+    .some((time) => typeof time === "number" && time > from + LATE * (to - from) && time <= to);
+
 /**
  * Where a run's least margin was.
  * @param {uPlot} u
@@ -188,10 +204,10 @@ const drawApproach = (u, { spec, plots }, system) => {
   context.lineTo(x - 5 * ratio, bbox.top);
   context.lineTo(x + 5 * ratio, bbox.top);
   context.fill();
-  if (spec.name !== "constraint" || spec.systems.length > 1) return;
+  if (!saysApproach(spec)) return;
   context.font = `${12 * ratio}px system-ui, sans-serif`;
   context.textBaseline = "top";
-  const leftward = x > bbox.left + 0.7 * bbox.width;
+  const leftward = x > bbox.left + LATE * bbox.width;
   context.textAlign = leftward ? "right" : "left";
   context.fillText("closest approach", x + (leftward ? -8 : 8) * ratio, bbox.top);
 };
@@ -212,12 +228,16 @@ const asBounds = (context, ratio) => {
 
 /**
  * @param {uPlot} u
- * @param {Spec} spec
+ * @param {Plot} plot
  */
-const drawBounds = (u, { bounds, unit }) => {
+const drawBounds = (u, plot) => {
   const { ctx: context, bbox } = u;
+  const { bounds, unit } = plot.spec;
   const ratio = uPlot.pxRatio;
   asBounds(context, ratio);
+  const late = isLate(plot);
+  if (late) context.textAlign = "left";
+  const x = bbox.left + (late ? 4 * ratio : bbox.width - 4 * ratio);
   let last = Infinity;
   for (const { value, note } of bounds) {
     const y = u.valToPos(value, "y", true);
@@ -228,7 +248,7 @@ const drawBounds = (u, { bounds, unit }) => {
     if (last - y < LABEL * ratio) continue; // no room for another label
     last = y;
     const text = `bound ${withUnit(value, unit)}${note}`;
-    context.fillText(text, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+    context.fillText(text, x, y - 2 * ratio);
   }
 };
 

@@ -118,7 +118,8 @@ export class Chosen {
     const columns = COLUMNS.filter((column) => rows.some((row) => has(row, column)));
     const cell = (/** @type {JointRow} */ row, /** @type {Column} */ column) => {
       const there = row[column];
-      if (!there || !isKnown(there[0])) return element("td");
+      if (!there) return element("td");
+      if (!isKnown(there[0])) return element("td", { class: "muted", text: "–" });
       const place = element("span");
       this.values.push({ at: there[0], place });
       return element("td", {}, place, element("small", { text: ` ${there[1]}` }));

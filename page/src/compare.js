@@ -146,7 +146,7 @@ export class Comparison {
     const note = byId("compare-note");
     note.hidden = !this.ghosts || !this.runs.length;
     const seen = this.runs.filter((_, k) => !this.hidden.has(k)).map(({ heading }) => heading);
-    const others = seen.length > 1 ? `; translucent: ${seen.slice(1).join("; ")}` : "";
+    const others = seen.length > 1 ? `; translucent, in rings: ${seen.slice(1).join("; ")}` : "";
     note.textContent = `solid: ${seen[0] ?? "none"}${others}`;
   }
 

@@ -110,8 +110,9 @@ const chipOf = (system, state, of, lead) => {
  * @param {string} of what it is
  * @param {(time: number) => void} lead
  */
-const marginOf = ({ margin, margin_name: name, margin_time: time }, of, lead) => {
-  if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
+const marginOf = ({ status: word, margin, margin_name: name, margin_time: time }, of, lead) => {
+  const none = word === "not_begun" ? "no margin yet" : "no margin known";
+  if (typeof margin !== "number") return element("span", { class: "margin", text: none });
   const text = `${of}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
   if (typeof time !== "number") return element("span", { class: "margin", text });
   const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;

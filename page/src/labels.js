@@ -3,6 +3,7 @@
 import { line } from "./colours.js";
 import { isThere } from "./instant.js";
 import { colour } from "./theme.js";
+import { percent } from "./words.js";
 /** @import { Box, Overlay } from "./overlay.js" */
 /** @import { Instant, System } from "./types.d.ts" */
 
@@ -102,10 +103,8 @@ export class Labels {
     overlay.marks.push({ x: p.x, y: p.y, system: system.name, agent });
     const name = String(agent + 1);
     const out = share > 1;
-    const digits = out && share < 1.1 ? 1 : 0; // not "100 %" of what is outside
-    const used = out ? "outside" : "";
-    const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used;
-    for (const text of percent ? [percent, ""] : [""]) {
+    const used = percent(share);
+    for (const text of used ? [used, ""] : [""]) {
       const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text}` : text), body);
       if (!pill) continue;
       overlay.taken.push(pill);

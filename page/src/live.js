@@ -2,7 +2,7 @@
 import { History } from "./history.js";
 import { instantOfFrame } from "./instant.js";
 import { keepScenario } from "./keep.js";
-import { notify } from "./notices.js";
+import { dismiss, notify } from "./notices.js";
 import { fetchReplay } from "./pack.js";
 import { Socket } from "./socket.js";
 import { number, outside } from "./words.js";
@@ -43,6 +43,8 @@ export class Live {
     this.exits = {};
     /** @type {Intervention[]} */
     this.interventions = [];
+    /** @type {Record<string, number>} */
+    this.values = {}; // of sliders
     /** @type {Instant | null} */
     this.pending = null;
     this.told = false; // whether the simulation knows that it is seen
@@ -202,8 +204,16 @@ export class Live {
   hear(message) {
     if (message.kind === "notice") notify(message.text, message.level, message.about);
     else if (message.kind === "scenario") keepScenario(message.text);
-    else if (message.kind === "controls") this.listener.controls(message.values);
+    else if (message.kind === "controls") this.takeValues(message.values);
     else if (message.kind === "interventions") this.interventions = message.done;
+  }
+
+  /** @param {Record<string, number>} values where sliders are now */
+  takeValues(values) {
+    // what was refused of a slider that has moved since is the past
+    for (const key of Object.keys(values)) if (values[key] !== this.values[key]) dismiss(key);
+    this.values = values;
+    this.listener.controls(values);
   }
 
   // ---- in words
@@ -213,7 +223,11 @@ export class Live {
    * @returns {State}
    */
   stateOf({ name }) {
-    return this.frame?.state[name] ?? { status: "waiting" };
+    const state = this.frame?.state[name] ?? { status: "waiting" };
+    if (state.status !== "running") return state;
+    if (!this.connected) return { ...state, status: "not_connected" };
+    if (this.playing) return state;
+    return { ...state, status: this.time > 0 ? "paused" : "not_begun" };
   }
 
   get pace() {
@@ -222,6 +236,7 @@ export class Live {
     if (!this.playing) return "paused";
     const { speed, pace } = this.frame;
     const wished = speed === null ? "as fast as possible" : `×${number(speed)}`;
-    return pace === null ? wished : `${wished}, ${number(pace)} reached`;
+    const reached = speed !== null && pace !== null && Math.abs(pace / speed - 1) < 0.05;
+    return pace === null || reached ? wished : `${wished}, ×${number(pace)} reached`;
   }
 }

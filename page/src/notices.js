@@ -1,4 +1,5 @@
-// Sentences that go away by themselves, or when they are closed.
+// Sentences that go away by themselves, or when they are closed. They stand over the 3-D view, or on
+// a small window above the transport, where they cover nothing.
 import { byId, element } from "./dom.js";
 
 const MOST = 3; // at once
@@ -38,6 +39,22 @@ export const notify = (text, level = "info", about = text) => {
   };
   shown.set(about, close);
   const place = byId(error ? "alerts" : "notices");
-  place.append(notice);
-  while (place.children.length > MOST) place.firstChild?.remove();
+  place.prepend(notice); // so that those that are read stay where they are
+  while (place.children.length > MOST) place.lastChild?.remove();
+};
+
+/**
+ * Takes away what was said about something, as it holds no more.
+ * @param {string} about
+ */
+export const dismiss = (about) => shown.get(about)?.();
+
+/** Keeps notes above the legend, however many lines it has. */
+export const placeNotes = () => {
+  const legend = byId("legend");
+  const place = () => {
+    const below = innerHeight - legend.getBoundingClientRect().top;
+    byId("notes").style.setProperty("--below", `${below}px`);
+  };
+  new ResizeObserver(place).observe(legend);
 };

@@ -1,5 +1,5 @@
 // Drawn flat over the 3-D pane: labels, links, messages on their way, distances on the ground.
-import { setPalette } from "./colours.js";
+import { dashOf, setPalette } from "./colours.js";
 import { headingTexts, isSolid } from "./compare.js";
 import { Labels } from "./labels.js";
 import { Links } from "./links.js";
@@ -14,6 +14,7 @@ import { decimals, fixed, number } from "./words.js";
 const colourOf = ({ bad, limit, chosen, title }) =>
   bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
 
+const RING = 3; // px between a robot and the ring around it
 const MANY = 60; // robots, of which labels make way for each other alone
 
 /**
@@ -103,6 +104,7 @@ export class Overlay {
     const solid = this.systems.filter(isSolid);
     this.bodies = this.bodiesOf(solid.filter(({ drawn_as: as }) => as === "fleet"));
     this.links.draw(solid, instant, now);
+    for (const system of this.systems) if (system.shown.faint) this.rings(system);
     if (this.runs.length && solid.length === this.systems.length)
       for (const text of headingTexts(solid, this.runs, this.scene.layout)) this.text(text);
     this.hands?.drawUnder(context);
@@ -111,6 +113,28 @@ export class Overlay {
       else this.labels.draw(system, instant, this.labelled);
     this.distances();
     this.hands?.draw(context);
+  }
+
+  /**
+   * Rings around robots that lie over those of another run, dashed as their run is in the plots:
+   * where both are nearly at one place, one would not see them.
+   * @param {System} system
+   */
+  rings(system) {
+    const { context } = this;
+    if (system.drawn_as === "bars" || system.agents > MANY) return;
+    context.strokeStyle = colour("ghost");
+    context.lineWidth = 2;
+    context.setLineDash(dashOf(system.run));
+    for (const agent of system.anchors.keys()) {
+      const box = this.scene.camera.boxOf(system, agent);
+      if (!box) continue;
+      const [w, h] = [box.w / 2 + RING, box.h / 2 + RING];
+      context.beginPath();
+      context.ellipse(box.x + box.w / 2, box.y + box.h / 2, w, h, 0, 0, 2 * Math.PI);
+      context.stroke();
+    }
+    context.setLineDash([]);
   }
 
   /** Metres along the lane, at the ground's stronger lines. */

@@ -107,8 +107,9 @@ export class Plot {
    * @param {number} height
    */
   setSize(width, height) {
-    if (this.uplot) return this.uplot.setSize({ width, height });
-    this.make(width, height);
+    if (!this.uplot) return this.make(width, height);
+    this.uplot.setSize({ width, height });
+    this.uplot.setData(this.uplot.data, true); // the room for a bound's label is another one
   }
 
   /**

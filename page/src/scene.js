@@ -14,7 +14,7 @@ import { drawnIn, empty, matrixIn, nodeAt, viewerIn } from "./viewer.js";
 /** @import { Plan } from "./plan.js" */
 /** @import { Instant, Numbers, Scene as Meta, Store, System, Three } from "./types.d.ts" */
 
-const FAINT = 0.3; // opacity of what lies over another run
+const FAINT = 0.4; // opacity of what lies over another run
 const BELOW = 0.02; // m from one floor to the next system's, so that none flickers in another
 const AGAIN = 500; // ms until objects that are not there yet are looked for again
 

@@ -1,12 +1,13 @@
 // Vertical lines over a chart, at a time.
+import uPlot from "uplot";
 import { element } from "./dom.js";
-/** @import uPlot from "uplot" */
 
 export class TimeLine {
   /** @param {HTMLElement} root */
   constructor(root) {
     this.root = root;
     this.x = NaN;
+    this.seen = true;
   }
 
   /**
@@ -15,10 +16,11 @@ export class TimeLine {
    */
   place(u, time) {
     const x = Math.round(u.valToPos(time, "x"));
-    if (this.x === x) return; // painting anew costs more than all else here
+    const seen = x >= 0 && x <= u.bbox.width / uPlot.pxRatio;
+    if (this.x === x && this.seen === seen) return; // painting anew costs more than all else here
     this.x = x;
+    this.seen = seen;
     this.root.style.transform = `translateX(${x}px)`;
-    const seen = x >= 0 && x <= u.over.clientWidth;
     this.root.style.visibility = seen ? "visible" : "hidden";
   }
 }

@@ -43,8 +43,12 @@ export class Tuning {
       "div",
       { class: "tuning-row", role: "group", "aria-label": system.name },
       element("h3", { text: system.name }),
-      ...controls.map((control) => this.slider(control)),
-      ...pushes.map(() => this.pushes(system)),
+      element(
+        "div",
+        { class: "tuning-items" },
+        ...controls.map((control) => this.slider(control)),
+        ...pushes.map(() => this.pushes(system)),
+      ),
     );
   }
 

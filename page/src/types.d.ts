@@ -291,6 +291,8 @@ export interface Elements {
   "time-slider": HTMLInputElement;
   "time-marks": HTMLElement;
   fold: HTMLButtonElement;
+  legend: HTMLElement;
+  notes: HTMLElement;
   notices: HTMLElement;
   alerts: HTMLElement;
   help: HTMLDialogElement;

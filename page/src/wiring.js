@@ -1,6 +1,7 @@
 // What keys, buttons and the mouse do.
 import { byId, press } from "./dom.js";
 import { onKeys } from "./keys.js";
+import { placeNotes } from "./notices.js";
 import { leaveWheel } from "./sight.js";
 /** @import { Page } from "./page.js" */
 
@@ -29,6 +30,7 @@ export const wire = (page) => {
     "=": () => scene.camera.nudge(0, 0.88),
     "-": () => scene.camera.nudge(0, 1.14),
   };
+  placeNotes();
   onKeys(actions);
   byId("fit").onclick = actions.f;
   byId("labels").onclick = actions.l;

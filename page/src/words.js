@@ -39,7 +39,7 @@ export const decimals = (greatest) =>
  */
 export const withUnit = (value, unit) => number(value) + (unit ? ` ${unit}` : "");
 
-const SYMBOLS = { ok: "✓", going: "▸", bad: "⚠", unknown: "?" };
+const SYMBOLS = { ok: "✓", going: "▸", still: "‖", bad: "⚠", unknown: "?" };
 
 /**
  * Kind of a status, and its symbol and words.
@@ -51,7 +51,18 @@ export const status = (word) => {
   if (/^(converged|completed)$/.test(word)) kind = "ok";
   else if (/left|outside|diverged|too_small/.test(word)) kind = "bad";
   else if (word === "running") kind = "going";
+  else if (/^(paused|not_begun|not_connected)$/.test(word)) kind = "still";
   return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
+};
+
+/**
+ * A share of a bound; beyond it never "100 %".
+ * @param {number} share
+ */
+export const percent = (share) => {
+  if (!(share > 1)) return Number.isFinite(share) ? `${(100 * share).toFixed(0)} %` : "";
+  const text = (100 * share).toFixed(share < 1.1 ? 1 : 0);
+  return Number.isFinite(share) && Number(text) > 100 ? `${text} %` : "outside";
 };
 
 /** @param {string} word */

@@ -580,9 +580,8 @@
     return element(
       "figcaption",
       {},
-      element("span", { class: "plot-system", text: spec.whose }),
-      element("span", { class: "plot-title", text: spec.title }),
-      symbolOf(spec.symbol),
+      spec.whose ? element("span", { class: "plot-system", text: spec.whose }) : null,
+      element("span", { class: "plot-title" }, `${spec.title} `, symbolOf(spec.symbol)),
       element(
         "span",
         { class: "plot-tools" },
@@ -618,13 +617,19 @@
   var fixed = (value, decimals2) => value === null || Number.isNaN(value) ? "–" : value.toFixed(decimals2).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   var decimals = (greatest) => greatest > 0 ? Math.min(Math.max(2 - Math.floor(Math.log10(greatest)), 0), 8) : 2;
   var withUnit = (value, unit) => number(value) + (unit ? ` ${unit}` : "");
-  var SYMBOLS = { ok: "✓", going: "▸", bad: "⚠", unknown: "?" };
+  var SYMBOLS = { ok: "✓", going: "▸", still: "‖", bad: "⚠", unknown: "?" };
   var status = (word) => {
     let kind = "unknown";
     if (/^(converged|completed)$/.test(word)) kind = "ok";
     else if (/left|outside|diverged|too_small/.test(word)) kind = "bad";
     else if (word === "running") kind = "going";
+    else if (/^(paused|not_begun|not_connected)$/.test(word)) kind = "still";
     return { kind, symbol: SYMBOLS[kind], words: String(word || "unknown").replaceAll("_", " ") };
+  };
+  var percent = (share) => {
+    if (!(share > 1)) return Number.isFinite(share) ? `${(100 * share).toFixed(0)} %` : "";
+    const text2 = (100 * share).toFixed(share < 1.1 ? 1 : 0);
+    return Number.isFinite(share) && Number(text2) > 100 ? `${text2} %` : "outside";
   };
   var outside = (word) => status(word).kind === "bad";
 
@@ -745,7 +750,7 @@
       const note = byId("compare-note");
       note.hidden = !this.ghosts || !this.runs.length;
       const seen = this.runs.filter((_, k) => !this.hidden.has(k)).map(({ heading }) => heading);
-      const others = seen.length > 1 ? `; translucent: ${seen.slice(1).join("; ")}` : "";
+      const others = seen.length > 1 ? `; translucent, in rings: ${seen.slice(1).join("; ")}` : "";
       note.textContent = `solid: ${seen[0] ?? "none"}${others}`;
     }
     /**
@@ -899,7 +904,8 @@
       const columns = COLUMNS.filter((column) => rows.some((row) => has(row, column)));
       const cell = (row, column) => {
         const there = row[column];
-        if (!there || !isKnown(there[0])) return element("td");
+        if (!there) return element("td");
+        if (!isKnown(there[0])) return element("td", { class: "muted", text: "–" });
         const place = element("span");
         this.values.push({ at: there[0], place });
         return element("td", {}, place, element("small", { text: ` ${there[1]}` }));
@@ -991,8 +997,17 @@
     };
     shown.set(about, close);
     const place = byId(error ? "alerts" : "notices");
-    place.append(notice);
-    while (place.children.length > MOST) place.firstChild?.remove();
+    place.prepend(notice);
+    while (place.children.length > MOST) place.lastChild?.remove();
+  };
+  var dismiss = (about) => shown.get(about)?.();
+  var placeNotes = () => {
+    const legend = byId("legend");
+    const place = () => {
+      const below = innerHeight - legend.getBoundingClientRect().top;
+      byId("notes").style.setProperty("--below", `${below}px`);
+    };
+    new ResizeObserver(place).observe(legend);
   };
 
   // src/push.js
@@ -1443,8 +1458,9 @@
       marginOf(state, of2, lead)
     );
   };
-  var marginOf = ({ margin, margin_name: name, margin_time: time }, of2, lead) => {
-    if (typeof margin !== "number") return element("span", { class: "margin", text: "no margin known" });
+  var marginOf = ({ status: word, margin, margin_name: name, margin_time: time }, of2, lead) => {
+    const none = word === "not_begun" ? "no margin yet" : "no margin known";
+    if (typeof margin !== "number") return element("span", { class: "margin", text: none });
     const text2 = `${of2}: margin ${number(margin)}${name ? ` · ${name}` : ""}`;
     if (typeof time !== "number") return element("span", { class: "margin", text: text2 });
     const when = ` at ${fixed(time, time < 10 ? 2 : 1)} s`;
@@ -1717,6 +1733,7 @@
       this.grown = false;
       this.exits = {};
       this.interventions = [];
+      this.values = {};
       this.pending = null;
       this.told = false;
       this.fetching = false;
@@ -1858,8 +1875,14 @@
     hear(message) {
       if (message.kind === "notice") notify(message.text, message.level, message.about);
       else if (message.kind === "scenario") keepScenario(message.text);
-      else if (message.kind === "controls") this.listener.controls(message.values);
+      else if (message.kind === "controls") this.takeValues(message.values);
       else if (message.kind === "interventions") this.interventions = message.done;
+    }
+    /** @param {Record<string, number>} values where sliders are now */
+    takeValues(values) {
+      for (const key of Object.keys(values)) if (values[key] !== this.values[key]) dismiss(key);
+      this.values = values;
+      this.listener.controls(values);
     }
     // ---- in words
     /**
@@ -1867,7 +1890,11 @@
      * @returns {State}
      */
     stateOf({ name }) {
-      return this.frame?.state[name] ?? { status: "waiting" };
+      const state = this.frame?.state[name] ?? { status: "waiting" };
+      if (state.status !== "running") return state;
+      if (!this.connected) return { ...state, status: "not_connected" };
+      if (this.playing) return state;
+      return { ...state, status: this.time > 0 ? "paused" : "not_begun" };
     }
     get pace() {
       if (!this.frame) return "";
@@ -1875,7 +1902,8 @@
       if (!this.playing) return "paused";
       const { speed, pace } = this.frame;
       const wished = speed === null ? "as fast as possible" : `×${number(speed)}`;
-      return pace === null ? wished : `${wished}, ${number(pace)} reached`;
+      const reached = speed !== null && pace !== null && Math.abs(pace / speed - 1) < 0.05;
+      return pace === null || reached ? wished : `${wished}, ×${number(pace)} reached`;
     }
   };
 
@@ -1958,10 +1986,8 @@
       overlay.marks.push({ x: p.x, y: p.y, system: system.name, agent });
       const name = String(agent + 1);
       const out = share > 1;
-      const digits = out && share < 1.1 ? 1 : 0;
-      const used2 = out ? "outside" : "";
-      const percent = Number.isFinite(share) ? `${(100 * share).toFixed(digits)} %` : used2;
-      for (const text2 of percent ? [percent, ""] : [""]) {
+      const used2 = percent(share);
+      for (const text2 of used2 ? [used2, ""] : [""]) {
         const pill = this.room(system, agent, this.pillBox(p, name, out ? `⚠ ${text2}` : text2), body);
         if (!pill) continue;
         overlay.taken.push(pill);
@@ -2082,6 +2108,7 @@
 
   // src/overlay.js
   var colourOf = ({ bad, limit, chosen, title }) => bad ? "bad" : limit ? "limit" : chosen ? "accent" : title ? "muted" : "text";
+  var RING = 3;
   var MANY2 = 60;
   var meet = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
   var BODY = 24;
@@ -2145,6 +2172,7 @@
       const solid = this.systems.filter(isSolid);
       this.bodies = this.bodiesOf(solid.filter(({ drawn_as: as2 }) => as2 === "fleet"));
       this.links.draw(solid, instant, now);
+      for (const system of this.systems) if (system.shown.faint) this.rings(system);
       if (this.runs.length && solid.length === this.systems.length)
         for (const text2 of headingTexts(solid, this.runs, this.scene.layout)) this.text(text2);
       this.hands?.drawUnder(context);
@@ -2153,6 +2181,27 @@
         else this.labels.draw(system, instant, this.labelled);
       this.distances();
       this.hands?.draw(context);
+    }
+    /**
+     * Rings around robots that lie over those of another run, dashed as their run is in the plots:
+     * where both are nearly at one place, one would not see them.
+     * @param {System} system
+     */
+    rings(system) {
+      const { context } = this;
+      if (system.drawn_as === "bars" || system.agents > MANY2) return;
+      context.strokeStyle = colour("ghost");
+      context.lineWidth = 2;
+      context.setLineDash(dashOf(system.run));
+      for (const agent of system.anchors.keys()) {
+        const box = this.scene.camera.boxOf(system, agent);
+        if (!box) continue;
+        const [w, h] = [box.w / 2 + RING, box.h / 2 + RING];
+        context.beginPath();
+        context.ellipse(box.x + box.w / 2, box.y + box.h / 2, w, h, 0, 0, 2 * Math.PI);
+        context.stroke();
+      }
+      context.setLineDash([]);
     }
     /** Metres along the lane, at the ground's stronger lines. */
     distances() {
@@ -4382,6 +4431,7 @@
   var FONT = "12px system-ui, sans-serif";
   var LABEL = 13;
   var UNIT = 18;
+  var LATE = 0.7;
   var optionsOf = (plot, width, height) => ({
     width,
     height,
@@ -4482,7 +4532,7 @@
     drawInterventions(u, plot.plots.source.interventions);
     for (const system of plot.spec.systems) drawApproach(u, plot, system);
     if (plot.look.log) return context.restore();
-    drawBounds(u, plot.spec);
+    drawBounds(u, plot);
     drawMovingBounds(u, plot.movingBounds);
     context.restore();
   };
@@ -4499,6 +4549,11 @@
       context.stroke();
     }
   };
+  var saysApproach = ({ name, systems }) => name === "constraint" && systems.length === 1;
+  var isLate = ({ spec, plots: { source, window: [from, to2] } }) => spec.systems.flatMap((system) => [
+    source.exits[system.name],
+    saysApproach(spec) ? source.stateOf(system).margin_time : NaN
+  ]).some((time) => typeof time === "number" && time > from + LATE * (to2 - from) && time <= to2);
   var drawApproach = (u, { spec, plots }, system) => {
     if (plots.hiddenRuns.has(system.run)) return;
     const { margin_time: time } = plots.source.stateOf(system);
@@ -4512,10 +4567,10 @@
     context.lineTo(x - 5 * ratio, bbox.top);
     context.lineTo(x + 5 * ratio, bbox.top);
     context.fill();
-    if (spec.name !== "constraint" || spec.systems.length > 1) return;
+    if (!saysApproach(spec)) return;
     context.font = `${12 * ratio}px system-ui, sans-serif`;
     context.textBaseline = "top";
-    const leftward = x > bbox.left + 0.7 * bbox.width;
+    const leftward = x > bbox.left + LATE * bbox.width;
     context.textAlign = leftward ? "right" : "left";
     context.fillText("closest approach", x + (leftward ? -8 : 8) * ratio, bbox.top);
   };
@@ -4527,10 +4582,14 @@
     context.textAlign = "right";
     context.setLineDash([6 * ratio, 4 * ratio]);
   };
-  var drawBounds = (u, { bounds, unit }) => {
+  var drawBounds = (u, plot) => {
     const { ctx: context, bbox } = u;
+    const { bounds, unit } = plot.spec;
     const ratio = Be.pxRatio;
     asBounds(context, ratio);
+    const late = isLate(plot);
+    if (late) context.textAlign = "left";
+    const x = bbox.left + (late ? 4 * ratio : bbox.width - 4 * ratio);
     let last = Infinity;
     for (const { value, note } of bounds) {
       const y = u.valToPos(value, "y", true);
@@ -4541,7 +4600,7 @@
       if (last - y < LABEL * ratio) continue;
       last = y;
       const text2 = `bound ${withUnit(value, unit)}${note}`;
-      context.fillText(text2, bbox.left + bbox.width - 4 * ratio, y - 2 * ratio);
+      context.fillText(text2, x, y - 2 * ratio);
     }
   };
   var drawMovingBounds = (u, bounds) => {
@@ -5033,6 +5092,7 @@
     constructor(root) {
       this.root = root;
       this.x = NaN;
+      this.seen = true;
     }
     /**
      * @param {uPlot} u
@@ -5040,10 +5100,11 @@
      */
     place(u, time) {
       const x = Math.round(u.valToPos(time, "x"));
-      if (this.x === x) return;
+      const seen = x >= 0 && x <= u.bbox.width / Be.pxRatio;
+      if (this.x === x && this.seen === seen) return;
       this.x = x;
+      this.seen = seen;
       this.root.style.transform = `translateX(${x}px)`;
-      const seen = x >= 0 && x <= u.over.clientWidth;
       this.root.style.visibility = seen ? "visible" : "hidden";
     }
   };
@@ -5134,8 +5195,9 @@
      * @param {number} height
      */
     setSize(width, height) {
-      if (this.uplot) return this.uplot.setSize({ width, height });
-      this.make(width, height);
+      if (!this.uplot) return this.make(width, height);
+      this.uplot.setSize({ width, height });
+      this.uplot.setData(this.uplot.data, true);
     }
     /**
      * @param {number} width
@@ -6904,7 +6966,7 @@
   };
 
   // src/scene.js
-  var FAINT2 = 0.3;
+  var FAINT2 = 0.4;
   var BELOW2 = 0.02;
   var AGAIN2 = 500;
   var Scene = class {
@@ -7545,8 +7607,12 @@
         "div",
         { class: "tuning-row", role: "group", "aria-label": system.name },
         element("h3", { text: system.name }),
-        ...controls.map((control) => this.slider(control)),
-        ...pushes.map(() => this.pushes(system))
+        element(
+          "div",
+          { class: "tuning-items" },
+          ...controls.map((control) => this.slider(control)),
+          ...pushes.map(() => this.pushes(system))
+        )
       );
     }
     /** @param {Control} control */
@@ -7989,6 +8055,7 @@
       "=": () => scene.camera.nudge(0, 0.88),
       "-": () => scene.camera.nudge(0, 1.14)
     };
+    placeNotes();
     onKeys(actions);
     byId("fit").onclick = actions.f;
     byId("labels").onclick = actions.l;
