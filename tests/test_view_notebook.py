@@ -33,10 +33,9 @@ def test_twenty_replays_live_when_they_are_scrolled_to(page, recorded, replay):
     has = "Boolean(window.gne && window.gne.alive())"
     assert sum(each.evaluate(has) for each in page.frames[1:]) <= 3
     frame.evaluate("window.gne.seek(0.25)")
-    for width, height in WIDTHS:
-        page.set_viewport_size({"width": width, "height": height})
-        for number in (4, MANY // 2, MANY - 1):
-            assert alive(page, number).evaluate("innerWidth") <= width
+    for width, _ in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 600})
+        assert alive(page, MANY - 1).evaluate("innerWidth") <= width
         assert alive(page, 0).evaluate("window.gne.time()") == pytest.approx(0.25)
         assert frame.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert recorded.errors == []
