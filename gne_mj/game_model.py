@@ -363,8 +363,9 @@ class Game:
 
     def entries(self, quantity: Quantity) -> tuple[int, ...]:
         """Shape of a quantity at one profile: (N,), (p,) or ()."""
-        shapes = {"agent": (self.agents,), "constraint": (self.constraints_count,)}
-        return shapes.get(quantity.each, ())
+        if not quantity.each:
+            return ()
+        return (self.agents if quantity.each == "agent" else self.constraints_count,)
 
     def costs(self, y: ArrayLike) -> NDArray[np.float64]:
         """J_i(y) of each agent; y of shape (..., m), result (..., N)."""

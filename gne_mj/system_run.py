@@ -60,6 +60,7 @@ class SystemRun:
         self._due: int | None = None  # the step at which the next row is recorded; None: at once
         self._pushes: list[tuple[int, float, int]] = []  # output, force, until which step
         self._recorded: list[SystemRecord] = []
+        self._unknown = np.full((1, system.game.actions), np.nan)
 
     def is_there(self, channel: int) -> bool:
         """Whether an output's agent is there: some leave and join."""
@@ -68,7 +69,7 @@ class SystemRun:
     @property
     def inside(self) -> bool:
         """Whether the run has not left its set."""
-        return bool(self.loop.monitor.exit == watch.INSIDE)
+        return bool(self.loop.monitor["exit"] == watch.INSIDE)  # by item: pages ask at every frame
 
     def doubts(self) -> list[str]:
         """See :meth:`gne_mj.simulation.Simulation.doubts`."""
@@ -152,10 +153,9 @@ class SystemRun:
         Inputs, and what else an instant's state does not say, are those of the last sample; before
         the first one they are left out.
         """
-        now = self.loop.present()
-        state, memory, configuration = (part[None] for part in now)
-        none = np.full(state.shape[:2], np.nan)
-        samples = Samples(state, none, memory, none, none, configuration)
+        state, memory, configuration = self.loop.present()
+        none = self._unknown
+        samples = Samples(state[None], none, memory[None], none, none, configuration[None])
         instant = Rows(self.system, np.array([self.loop.time]), samples)
         found = {}
         for variable in self._shown:

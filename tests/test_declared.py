@@ -27,7 +27,7 @@ from gne_mj.solutions import solve_system, summary
 from gne_mj.system import Clock, System
 from gne_mj.system.first_input import law_at_start
 from gne_mj.theory.guarantees import certify
-from gne_mj.viewer.shown_system import shares
+from gne_mj.viewer.shares import shares
 
 
 def cost(i, y, p):

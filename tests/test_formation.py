@@ -20,7 +20,7 @@ from gne_mj.scenario import load_scenario
 from gne_mj.simulation import Simulation
 from gne_mj.system import System
 from gne_mj.theory import certify
-from gne_mj.viewer.shown_system import shares
+from gne_mj.viewer.shares import shares
 
 seeds = st.integers(0, 2**32 - 1)
 

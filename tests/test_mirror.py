@@ -15,7 +15,8 @@ from mirror_scenes import JOINTS, TENDONS, ZOO, data_at, model_of, parts_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gne_mj.plants.fleet import compile_model, compose
-from gne_mj.viewer.mirror import Mirror, rotations, transforms, turn_z_to
+from gne_mj.viewer.mirror import Mirror, rotations, transforms
+from gne_mj.viewer.placing import turn_z_to
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "robot"
 

@@ -27,7 +27,8 @@ from gne_mj.system import Clock
 from gne_mj.viewer import html_page, replay_pack, write_html
 from gne_mj.viewer.html import page_file
 from gne_mj.viewer.pack import MAGIC, pack, packed_small, unpack
-from gne_mj.viewer.shown_system import ShownSystem, shares
+from gne_mj.viewer.shares import shares
+from gne_mj.viewer.shown_system import ShownSystem
 
 BASED = """<mujoco><worldbody>
   <body name="base"><geom size="0.1"/>

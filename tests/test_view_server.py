@@ -212,9 +212,42 @@ def test_publishing_never_waits(live):
         await wait_for(lambda: live.server.browsers)
         for _ in range(2000):  # 128 MB, which no socket's buffer takes
             live.server.publish(frame)
-        (browser,) = live.server.browsers
-        await wait_for(lambda: browser.dropped >= 1990)
+        await wait_for(lambda: live.server.dropped >= 1990)
         await leave(stuck)
+
+    asyncio.run(talk())
+
+
+@pytest.mark.parametrize("length", [0, 125, 126, 65535, 65536])
+def test_messages_of_every_length_arrive(live, length):
+    """Tornado's client reads how long they are said to be."""
+
+    async def talk():
+        one = await connect(live.server)
+        await wait_for(lambda: live.server.browsers)
+        await one.read_message()  # the scene
+        live.server.broadcast(bytes(length))
+        live.server.tell({"kind": "x" * length})
+        assert await asyncio.wait_for(one.read_message(), 5) == bytes(length)
+        assert await asyncio.wait_for(one.read_message(), 5) == f'{{"kind": "{"x" * length}"}}'
+        await leave(one)
+
+    asyncio.run(talk())
+
+
+def test_what_a_socket_does_not_take_at_once_comes_later_and_in_order(live):
+    async def talk():
+        one = await connect(live.server)
+        await wait_for(lambda: live.server.browsers)
+        await one.read_message()  # the scene
+        for number in range(4):
+            live.server.broadcast(bytes([number]) * 6_000_000)  # more than its buffers have room
+            live.server.tell({"number": number})
+        await asyncio.sleep(0.2)
+        for number in range(4):
+            assert await asyncio.wait_for(one.read_message(), 5) == bytes([number]) * 6_000_000
+            assert await asyncio.wait_for(one.read_message(), 5) == f'{{"number": {number}}}'
+        await leave(one)
 
     asyncio.run(talk())
 

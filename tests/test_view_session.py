@@ -102,7 +102,7 @@ def test_a_restart_ends_the_run_and_its_trajectory_is_kept():
         assert session.server.replay is None  # the next one goes on at once
         stop = threading.Event()
         page.ask(do="pause")
-        session._begin(session._next)
+        session._begin(session._next, session._next.simulation_object())
         assert session.simulation.time == 0.0
         stop.set()
         assert session.run(stop).interventions == []

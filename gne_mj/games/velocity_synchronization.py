@@ -9,6 +9,7 @@ Parameters q = [v_0, delta_1, ..., delta_N, v_1^d, ..., v_N^d, w_1, ..., w_N].
 """
 
 import sys
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
@@ -56,7 +57,7 @@ def velocity_game(
         name="gap",
         long_name="velocity gap",
         unit="m/s",
-        values=lambda y: np.diff(y, axis=1, prepend=reference_velocity),
+        values=partial(_gaps, reference_velocity),
         each="agent",
         symbol="y_i - y_{i-1}",
         bound=bounds,
@@ -83,6 +84,14 @@ def velocity_game(
         smooth=True,
         tested=True,
     )
+
+
+def _gaps(reference_velocity: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """To the agent in front, of profiles (samples, N)."""
+    gaps = y.copy()
+    gaps[:, 0] -= reference_velocity
+    gaps[:, 1:] -= y[:, :-1]
+    return gaps
 
 
 def _wishes(

@@ -185,6 +185,15 @@ def run_steps() -> Any:
     return run
 
 
+@compiled
+def _gather(qpos, qvel, at_q, at_v, state):
+    """Fill a state (m, 4); joints are (2, m), main masses' and appendages'."""
+    for r in range(len(state)):
+        position = qpos[at_q[0, r]]
+        state[r, 0], state[r, 3] = position - qpos[at_q[1, r]], position
+        state[r, 1], state[r, 2] = qvel[at_v[0, r]], qvel[at_v[1, r]]
+
+
 class MujocoPlant(FleetPlant):
     """A fleet of flexible robots in the lane, or of planar ones in the plane.
 
@@ -327,10 +336,9 @@ class MujocoPlant(FleetPlant):
     @property
     def state(self) -> NDArray[np.float64]:
         """(m, states), a copy."""
-        qpos, qvel = self.joints
-        position, appendage = self.data.qpos[qpos]
-        rows = (position - appendage, *self.data.qvel[qvel], position)
-        return np.array(rows).T.copy()
+        found = np.empty((self.agents.channels, 4))
+        _gather(self.data.qpos, self.data.qvel, *self.joints, found)
+        return found
 
     def reset(self, state: ArrayLike) -> None:
         """See the base class."""

@@ -22,7 +22,15 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gne_mj.errors import EngineError
-from gne_mj.native import array_at, callback, compiled, kernel, load_word, source_key
+from gne_mj.native import (
+    array_at,
+    callback,
+    compiled,
+    intrinsic_or,
+    kernel,
+    load_word,
+    source_key,
+)
 from gne_mj.numbers import Numbers, names_of, numbers_in
 from gne_mj.plants.c_layout import arrays, block_of, unknown_layout, word_of
 
@@ -217,7 +225,11 @@ def address_of(typingctx: Any, pointer: Any) -> Any:
     return types.int64(types.voidptr), codegen
 
 
-@intrinsic
+def _called(function: int, model: int, data: int) -> None:
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(int(function))(int(model), int(data))
+
+
+@intrinsic_or(_called)
 def call(typingctx: Any, function: Any, model: Any, data: Any) -> Any:
     """Call the C function at an address with two struct addresses."""
 

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gne_mj.viewer.mirror import LENGTH, POSITION
-from gne_mj.viewer.shown_system import ShownSystem, Values, plan_of
+from gne_mj.viewer.placing import LENGTH, POSITION
+from gne_mj.viewer.shares import Values
+from gne_mj.viewer.shown_system import ShownSystem, plan_of
 
 APART = 1.2  # m between systems that are drawn beside each other
 SPREAD = 0.25  # of a fleet's width, that it may spread on both sides where only its start is known
@@ -56,7 +57,7 @@ def _room(shown_system: ShownSystem, axis: int, values: Values | None) -> Floats
         rows = rows[np.linspace(0, len(rows) - 1, min(SAMPLES, len(rows))).astype(int)]
     else:
         rows = fleet.start(system.state)[None]
-    poses = np.array([fleet.mirror.poses(row) for row in rows])
+    poses = fleet.mirror.samples(rows)
     place = np.where(poses[..., LENGTH] != 0.0, poses[..., POSITION][..., axis], np.nan)
     low, high = np.nanmin(place, axis=1), np.nanmax(place, axis=1)
     region = (plan_of(system) or {"region": []})["region"]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.errors import InvalidInput
+from gne_mj.native import compiled
 from gne_mj.plants.agent_type import has_ode, in_mujoco
 from gne_mj.plants.fleet_plant import FleetPlant, build_fleet
 from gne_mj.plants.mjcf_fleet import MjcfPlant
@@ -65,11 +66,9 @@ class Fleet:
                 )
             return recorded
         assert isinstance(self.plant, MujocoPlant)
-        state, (main, appendage) = values["state"], self.plant.joints[0]
-        extension, position = state[:, :, 0], values.get("place", state[:, :, 3])
+        state, place = values["state"], values.get("place")
         found = np.zeros((len(state), self.plant.model.nq))
-        found[:, main] = position
-        found[:, appendage] = position - extension
+        _put_joints(state, state[:, :, 3] if place is None else place, self.plant.joints[0], found)
         return found
 
     @cached_property
@@ -162,6 +161,16 @@ class Fleet:
         if isinstance(self.plant, MujocoPlant):
             return [f"robot_{i + 1}/coil" for i in range(self.agents)]
         return None
+
+
+@compiled
+def _put_joints(state, place, joints, found):
+    """Put main masses at their places (T, m), and appendages where extensions say, into found
+    (T, nq)."""
+    for sample in range(len(found)):
+        for r in range(state.shape[1]):
+            found[sample, joints[0, r]] = place[sample, r]
+            found[sample, joints[1, r]] = place[sample, r] - state[sample, r, 0]
 
 
 def fleet_of(system: SystemData, clock: Clock) -> Fleet | None:

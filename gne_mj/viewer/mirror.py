@@ -1,15 +1,16 @@
 """A MuJoCo model as meshcat draws it: what is drawn once, and where it is at a state."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gne_mj.native import compiled, kernel
+from gne_mj.plants.native_mujoco import step_address
 from gne_mj.viewer.floors import ground, joined
+from gne_mj.viewer.placing import LENGTH, POSITION, QUATERNION, Placing, place
 from gne_mj.viewer.shapes import (
     DrawnPart,
     Group,
@@ -27,12 +28,8 @@ from gne_mj.viewer.shapes import (
 from gne_mj.viewer.surfaces import colours, laid_surface, plane_surface, surface
 
 GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2 unless told otherwise
-APART = 1e-3  # m between joints that a fixed tendon is drawn between
 COIL_RADIUS = 2.5, 0.02  # of a tendon's width, and at least so many m
 NOTHING = 1e-9  # scale of what is hidden; three.js cannot take 0 apart into rotation and scale
-
-# An item's entries in an array of poses
-POSITION, QUATERNION, LENGTH = slice(0, 3), slice(3, 7), 7
 
 
 class Mirror:
@@ -89,15 +86,13 @@ class Mirror:
         first = len(self._bodies) + np.cumsum(segments) - segments
         self._segments, self._first = segments, first
         self._joints, self._joint_rows = self._fixed_tendons()
-        self._spatial = bool(np.any(segments[~self._is_fixed()]))
-
-        self._wraps, self._wrapped = b"", (first[:0], first[:0])
 
         world, *self.items = self._paths(prefix)
         self.world = world
         self._rest = np.zeros((len(self.items), 8))
         self._rest[:, QUATERNION.start] = 1.0
         self._rest[: len(self._bodies), LENGTH] = 1.0
+        self._placing = self._where()
         paths = np.full(model.nbody, world, dtype=object)
         paths[self._bodies] = self.items[: len(self._bodies)]
         parts: dict[str, list[DrawnPart]] = {}
@@ -151,20 +146,30 @@ class Mirror:
             tendons, which begin at their position and go along their z axis; 0 hides one that is
             not needed.
         """
-        model, data = self.model, self._data
-        data.qpos[:] = qpos
-        if model.nmocap:
-            mocap = self._mocap if mocap is None else np.asarray(mocap, dtype=np.float64)
-            data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
-        mujoco.mj_kinematics(model, data)
-        poses = self._rest.copy()
-        _place(poses, self._bodies, data.xpos, data.xquat)
-        if len(self._joints):
-            _stretch(poses, self._joint_rows, data.xanchor, *self._joints.T, APART)
-        if self._spatial:
-            rows, starts = self._spatial_segments()
-            _stretch(poses, rows, data.wrap_xpos.reshape(-1, 3), starts, starts + 1, 0.0)
-        return poses
+        mocap = self._mocap if mocap is None else np.asarray(mocap, dtype=np.float64)
+        data = self._data
+        data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
+        found: NDArray[np.float64] = self.samples(np.asarray(qpos, dtype=np.float64)[None])[0]
+        return found
+
+    def samples(
+        self, qpos: NDArray[np.float64], shift: Sequence[float] = (0.0, 0.0)
+    ) -> NDArray[np.float64]:
+        """Likewise at several samples, mocap bodies where they were last.
+
+        Args:
+            qpos: (T, nq) joint positions.
+            shift: in m along x and y, by which all is moved.
+
+        Returns:
+            (T, K, 8), see :meth:`poses`. What is not a number, as of an agent that is away, is
+            hidden in the place of something that is there.
+        """
+        if qpos.shape[1:] != (self.model.nq,):
+            raise ValueError(f"qpos must be (T, {self.model.nq}), not {qpos.shape}")
+        found = np.empty((len(qpos), *self._rest.shape))
+        place()(self._placing, np.ascontiguousarray(qpos), shift[0], shift[1], found)
+        return found
 
     def draw(self, visualizer: Any, sent: set[str] | None = None) -> None:
         """Draw everything, at the model's reference position, into a ``meshcat.Visualizer``.
@@ -284,21 +289,17 @@ class Mirror:
             rows.append(self._first[tendon] + np.arange(len(places)))
         return np.concatenate(joints), np.concatenate(rows)
 
-    def _spatial_segments(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rows of poses, and the wrap points that the segments of spatial tendons begin at now."""
-        model, data = self.model, self._data
-        mujoco.mj_tendon(model, data)  # its Jacobians, not needed here, would want mj_comPos
-        wraps = data.ten_wrapnum.tobytes() + data.wrap_obj.tobytes()
-        if wraps == self._wraps:  # as ever, but where a tendon meets or leaves a geom
-            return self._wrapped
-        tendon = np.repeat(np.arange(model.ntendon), data.ten_wrapnum)
-        whole = data.wrap_obj.ravel()[: len(tendon)] != -2  # at a pulley
-        whole &= self._segments[tendon] > 0
-        starts = np.flatnonzero(whole[:-1] & whole[1:] & (tendon[:-1] == tendon[1:]))
-        owner = tendon[starts]
-        rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        self._wraps, self._wrapped = wraps, (self._first[owner] + rank, starts)
-        return self._wrapped
+    def _where(self) -> Placing:
+        data, segments = self._data, self._segments
+        spatial = np.where(self._is_fixed(), 0, segments)
+        functions = [step_address("mj_kinematics"), step_address("mj_tendon")]
+        functions[1] *= bool(np.any(spatial))  # its Jacobians, not needed, would want mj_comPos
+        return Placing(
+            np.array([*functions, self.model._address, data._address]),
+            data.qpos, data.xpos, data.xquat, data.xanchor,
+            data.ten_wrapnum, data.wrap_obj, data.wrap_xpos.reshape(-1, 3),
+            self._rest, self._bodies, self._joints, self._joint_rows, self._first, spatial,
+        )  # fmt: skip
 
     def _springs(self) -> set[int]:
         """Spatial tendons with a stiffness, from one site straight to another."""
@@ -324,48 +325,6 @@ def _shown(model: mujoco.MjModel, what: str) -> list[int]:
     """The geoms, sites or tendons that MuJoCo's viewer shows."""
     group, rgba, matid = (getattr(model, f"{what}_{n}") for n in ("group", "rgba", "matid"))
     return np.flatnonzero((group < GROUPS) & (colours(model, rgba, matid)[:, 3] > 0)).tolist()
-
-
-@compiled
-def _place(poses, bodies, xpos, xquat):
-    """Put bodies, the first rows of poses, where MuJoCo has them."""
-    for row in range(len(bodies)):
-        body = bodies[row]
-        for k in range(3):
-            poses[row, k] = xpos[body, k]
-        for k in range(4):
-            poses[row, 3 + k] = xquat[body, k]
-
-
-@compiled
-def _stretch(poses, rows, points, starts, ends, least):
-    """Lay segments from points to points, given by their numbers; hide those shorter than least."""
-    for n in range(len(rows)):
-        row, start, end = rows[n], starts[n], ends[n]
-        x = points[end, 0] - points[start, 0]
-        y = points[end, 1] - points[start, 1]
-        z = points[end, 2] - points[start, 2]
-        length = np.sqrt(x * x + y * y + z * z)
-        for k in range(3):
-            poses[row, k] = points[start, k]
-        if length > 0.0:
-            w, i, j, k = turn_z_to(x / length, y / length, z / length)
-            poses[row, 3], poses[row, 4], poses[row, 5], poses[row, 6] = w, i, j, k
-        poses[row, 7] = length if length >= least else 0.0
-
-
-@kernel
-def turn_z_to(x, y, z):
-    """The quaternion w x y z that takes z the shortest way to a unit vector.
-
-    It depends continuously on the direction but at -z, where no choice would.
-    """
-    across = x * x + y * y
-    w = 1.0 + z if z >= 0.0 else across / (1.0 - z)  # 1 + z would lose all digits near -z
-    size = np.sqrt(w * w + across)
-    if size <= 1e-15:
-        return 0.0, 1.0, 0.0, 0.0
-    return w / size, -y / size, x / size, 0.0
 
 
 def rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ begin with a "G".
 
 import json
 import math
+import sys
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -19,15 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAGIC = b"GNE1"
-_encoded = json.JSONEncoder(allow_nan=False).encode
+LITTLE = sys.byteorder == "little"
+encoded = json.JSONEncoder(allow_nan=False).encode
 _DTYPES = {"f8": "<f8", "f4": "<f4", "i4": "<i4", "u1": "u1"}
 
 
-def pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
+def pack(meta: Mapping[str, Any] | str, arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """One message of the live page.
 
     Args:
-        meta: what JSON can hold; numbers must be finite.
+        meta: what JSON can hold, or its text (:func:`encoded`); numbers must be finite.
         arrays: of float64, float32, int32 or uint8, by name.
     """
     return _pack(meta, arrays, shuffled=False)
@@ -58,40 +60,41 @@ def unpack(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     return header["meta"], arrays
 
 
-def _pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], shuffled: bool) -> bytes:
-    kinds = tuple(
-        (name, f"{array.dtype.kind}{array.dtype.itemsize}", array.shape)
-        for name, array in arrays.items()
-    )
+def _pack(
+    meta: Mapping[str, Any] | str, arrays: Mapping[str, NDArray[Any]], shuffled: bool
+) -> bytes:
+    kinds = tuple([(name, array.dtype, array.shape) for name, array in arrays.items()])
     about, ends = _about(kinds, shuffled)
-    header = f'{{"meta": {_encoded(meta)}, "arrays": {about}}}'.encode()
+    header = f'{{"meta": {meta if isinstance(meta, str) else encoded(meta)}, {about}}}'.encode()
     head = MAGIC + len(header).to_bytes(4, "little") + header
-    parts = [head, bytes(_aligned(len(head)) - len(head))]
-    for (_, code, _), array, end in zip(kinds, arrays.values(), ends, strict=True):
-        piece = array.astype(_DTYPES[code], copy=False).tobytes()
+    parts = [head, bytes(-len(head) % 8)]
+    for array, end in zip(arrays.values(), ends, strict=True):
+        piece = (array if LITTLE else array.astype(array.dtype.newbyteorder("<"))).tobytes()
         if shuffled and array.dtype.itemsize > 1:
             of_entries = np.frombuffer(piece, dtype=np.uint8)
             columns = _columns(array.shape)
             piece = of_entries.reshape(-1, columns, array.dtype.itemsize).T.tobytes()
-        parts += [piece, bytes(end)]
+        parts += (piece, end)
     return b"".join(parts)
 
 
 @lru_cache(maxsize=64)
 def _about(
-    kinds: tuple[tuple[str, str, tuple[int, ...]], ...], shuffled: bool
-) -> tuple[str, list[int]]:
-    """What the header says of arrays, and how many zeros follow each; frames ask for the same."""
-    entries, padding, offset = [], [], 0
-    for name, code, shape in kinds:
-        size = int(code[1:]) * math.prod(shape)
-        mixed = shuffled and code[1:] != "1"
+    kinds: tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...], shuffled: bool
+) -> tuple[str, list[bytes]]:
+    """What the header says of arrays, and the zeros behind each; frames ask for the same."""
+    entries, ends, offset = [], [], 0
+    for name, dtype, shape in kinds:
+        size, code = dtype.itemsize * math.prod(shape), f"{dtype.kind}{dtype.itemsize}"
+        if code not in _DTYPES:
+            raise TypeError(f"{name} is of {dtype}")
+        mixed = shuffled and dtype.itemsize > 1
         entries.append(
             {"name": name, "dtype": code, "shape": shape, "offset": offset, "shuffled": mixed}
         )
-        padding.append(_aligned(size) - size)
-        offset += _aligned(size)
-    return _encoded(entries), padding
+        ends.append(bytes(-size % 8))
+        offset += size + len(ends[-1])
+    return f'"arrays": {encoded(entries)}', ends
 
 
 def _columns(shape: Sequence[int]) -> int:

@@ -16,7 +16,8 @@ from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.joints import MOST
 from gne_mj.viewer.pack import packed_small
 from gne_mj.viewer.scene import Scene
-from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values, is_line
+from gne_mj.viewer.shares import Values
+from gne_mj.viewer.shown_system import Arrays, ShownSystem, is_line
 
 if TYPE_CHECKING:
     import xarray

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from gne_mj.palette import PALETTE
 from gne_mj.viewer.beside import shifts_of
-from gne_mj.viewer.mirror import POSITION, QUATERNION
-from gne_mj.viewer.shown_system import Arrays, ShownSystem, Values
+from gne_mj.viewer.shares import Values
+from gne_mj.viewer.shown_system import Arrays, ShownSystem
 
 ROOT = "meshcat"  # where a meshcat.Visualizer draws everything
 
@@ -38,7 +38,8 @@ class Scene:
     ) -> None:
         self.shown_systems, self.title, self.duration = shown_systems, title, duration
         self._runs = [0] * len(shown_systems) if runs is None else list(runs)
-        self._shifts, self._beside = shifts_of(shown_systems, self._runs, values)
+        shifts, beside = shifts_of(shown_systems, self._runs, values)
+        self._shifts, self._beside = shifts.tolist(), beside.tolist()
 
     def meta(self) -> dict[str, Any]:
         """What JSON tells the page of the scene; see :mod:`gne_mj.viewer`."""
@@ -47,7 +48,7 @@ class Scene:
         for k, shown_system in enumerate(self.shown_systems):
             about = shown_system.meta()
             about["run"] = self._runs[k]
-            about["shift"], about["beside"] = self._shifts[k].tolist(), self._beside[k].tolist()
+            about["shift"], about["beside"] = self._shifts[k], self._beside[k]
             about["items"] = [len(items), 0]
             if shown_system.fleet is not None:
                 about["world"] = f"{ROOT}/{shown_system.fleet.mirror.world}"
@@ -78,11 +79,8 @@ class Scene:
         found = []
         for shown_system, shift in zip(self.shown_systems, self._shifts, strict=True):
             if shown_system.fleet is not None:
-                mirror = shown_system.fleet.mirror
                 rows = shown_system.fleet.qpos(values[shown_system.system.name])
-                poses = np.array([_hidden(mirror.poses(row)) for row in rows])
-                poses[..., :2] += shift
-                found.append(poses)
+                found.append(shown_system.fleet.mirror.samples(rows, shift))
         if not found:
             samples = len(next(iter(values.values()))["action"])
             return np.zeros((samples, 0, 8))
@@ -94,15 +92,3 @@ class Scene:
         for shown_system in self.shown_systems:
             found |= shown_system.arrays(values[shown_system.system.name])
         return found
-
-
-def _hidden(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses (K, 8) of which those that are not numbers, of agents that are away, are hidden, in the
-    place of one that is there."""
-    gone = ~np.all(np.isfinite(poses), axis=1)
-    if np.any(gone):
-        there = poses[~gone, :3]
-        poses[gone] = 0.0
-        poses[gone, QUATERNION.start] = 1.0
-        poses[gone, POSITION] = there[0] if len(there) else 0.0
-    return poses

@@ -11,6 +11,7 @@ import asyncio
 import json
 import secrets
 import socket
+import struct
 import threading
 import warnings
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from typing import Any
 import tornado.web
 import umsgpack
 from tornado.httpserver import HTTPServer
-from tornado.websocket import WebSocketClosedError
+from tornado.iostream import StreamClosedError
 
 from gne_mj.errors import InvalidInput
 from gne_mj.viewer.html import packed_page, page_file, served_page
@@ -56,6 +57,7 @@ class Server:
     Attributes:
         url: the page's address, with its secret.
         port: where it listens, on 127.0.0.1.
+        dropped: frames that browsers were not sent, having some to show yet.
 
     Raises:
         InvalidInput: the port is taken.
@@ -71,7 +73,7 @@ class Server:
     ) -> None:
         self.replay, self.received = replay, received
         self.live = received is not None
-        self.title = title
+        self.title, self.dropped = title, 0
         self.secret = secrets.token_urlsafe(16)
         try:
             self._socket = socket.create_server((HOST, port))
@@ -103,11 +105,6 @@ class Server:
     def browsers(self) -> "list[Browser]":
         """Those that are connected, and have been welcomed."""
         return [each for each in list(self._bridge.websocket_pool) if each.welcomed]
-
-    @property
-    def dropped(self) -> int:
-        """Frames that browsers now connected were not sent, having some to show yet."""
-        return sum(browser.dropped for browser in self.browsers)
 
     def send(self, command: Any) -> None:
         """Draw one of meshcat's commands, now and for browsers to come.
@@ -144,6 +141,16 @@ class Server:
         # The loop is closed only while the process or the server is ending.
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(function, *arguments)
+
+
+def framed(message: bytes | str) -> bytes:
+    """A message as it goes over a WebSocket (RFC 6455), whole and unmasked as servers send it."""
+    data, kind = (message, 0x82) if isinstance(message, bytes) else (message.encode(), 0x81)
+    if len(data) < 126:
+        return struct.pack("!BB", kind, len(data)) + data
+    if len(data) < 1 << 16:
+        return struct.pack("!BBH", kind, 126, len(data)) + data
+    return struct.pack("!BBQ", kind, 127, len(data)) + data
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -212,7 +219,7 @@ class Browser(_Guarded, WebSocketHandler):
     def initialize(self, server: Server) -> None:
         """Tornado's way of making a handler."""
         self.server = server
-        self.welcomed, self._unshown, self.dropped = False, 0, 0
+        self.welcomed, self._unshown = False, 0
 
     def prepare(self) -> None:
         """Only the page itself may connect; Tornado alone looks at the host, not the scheme."""
@@ -237,23 +244,37 @@ class Browser(_Guarded, WebSocketHandler):
     def welcome(self, messages: list[bytes]) -> None:
         """See :meth:`Server.welcome`."""
         for message in messages:
-            self.say(message)
+            self.say(framed(message))
         self.welcomed = True
 
     def offer(self, frame: bytes) -> None:
-        """Send a frame, unless the browser has yet to show some."""
-        if not self.welcomed or self._unshown >= UNSHOWN:
-            self.dropped += 1
+        """Send a frame, unless the browser has yet to show some; as :func:`framed` has it."""
+        if not self.welcomed:
+            return
+        if self._unshown >= UNSHOWN:
+            self.server.dropped += 1
             return
         self._unshown += 1
         self.say(frame)
 
-    def say(self, message: bytes | str) -> None:
-        """Send a message whatever is under way."""
-        with suppress(WebSocketClosedError):  # `on_close` follows
-            sent = self.write_message(message, binary=isinstance(message, bytes))
-            # asyncio complains of what nobody looks at
-            sent.add_done_callback(lambda done: done.cancelled() or done.exception())
+    def say(self, message: bytes) -> None:
+        """Send a message, as :func:`framed` has it, whatever is under way.
+
+        What the socket takes at once goes there without Tornado's futures, which cost more than
+        all else of a frame; what it does not take waits in Tornado's stream.
+        """
+        connection = self.ws_connection
+        if connection is None or connection.is_closing():  # `on_close` follows
+            return
+        stream, sent = connection.stream, 0
+        try:
+            if not stream.writing():
+                sent = stream.socket.send(message)
+        except OSError:  # it is full, or has ended, which the stream finds out too
+            pass
+        if sent < len(message):
+            with suppress(StreamClosedError):
+                stream.write(message[sent:])
 
     def on_message(self, message: str | bytes) -> None:
         """What a browser asks for; what is no JSON object is nothing."""
@@ -342,12 +363,14 @@ class _Bridge(ZMQWebSocketBridge):
         return _Replies(), None, url
 
     def publish(self, frame: bytes) -> None:
+        message = framed(frame)
         for browser in self.websocket_pool:
-            browser.offer(frame)
+            browser.offer(message)
 
     def tell(self, message: bytes | str, browser: Browser | None) -> None:
+        sent = framed(message)
         for each in self.websocket_pool if browser is None else (browser,):
-            each.say(message)
+            each.say(sent)
 
     def forward_to_websockets(self, frames: list[bytes]) -> None:
         self.tell(frames[2], None)

@@ -9,15 +9,16 @@ from typing import Any, Literal
 import numpy as np
 from meshcat import Visualizer
 
-from gne_mj.certificate import status_now
 from gne_mj.errors import GneError, InfeasibleStart, InvalidInput
 from gne_mj.scenario import Scenario, as_done
+from gne_mj.simulation import Simulation
 from gne_mj.system import mode_of
 from gne_mj.trajectory import Trajectory
 from gne_mj.viewer.controls import pushes_of
+from gne_mj.viewer.frames import Frames
 from gne_mj.viewer.pacer import Pacer
 from gne_mj.viewer.pack import pack
-from gne_mj.viewer.replay import cut, mark_outside, outcome, scene_pack
+from gne_mj.viewer.replay import cut, scene_pack
 from gne_mj.viewer.scene import Scene
 from gne_mj.viewer.server import Browser, Server
 from gne_mj.viewer.shown_system import ShownSystem
@@ -68,12 +69,12 @@ class Session:
         self._missed = 0
         self._looked_at: set[str] = set()  # systems whose joints somebody looks at
         self._asked: queue.Queue[tuple[dict[str, Any], Browser]] = queue.Queue()
-        self._begin(scenario)
+        simulation = scenario.simulation_object()
+        clock, systems = simulation.clock, simulation.systems
+        shown_systems = [ShownSystem(system, clock) for system in systems]
+        self._scene = Scene(shown_systems, title, clock.duration)
+        self._begin(scenario, simulation)
         self._waits, self._playing = begin == "viewer", begin == "now"
-        shown_systems = [
-            ShownSystem(run.system, self.simulation.clock) for run in self.simulation.runs.values()
-        ]
-        self._scene = Scene(shown_systems, title, self.simulation.clock.duration)
         self._pushes = pushes_of(shown_systems)
         self.server = Server(title, port=port, received=self._receive)
         self._scene.draw(self.visualizer)
@@ -98,7 +99,7 @@ class Session:
             that a caller can keep the trajectory before anything else.
         """
         if self._next is not None:
-            self._begin(self._next)
+            self._begin(self._next, self._next.simulation_object())
             self.server.broadcast(self._history())
             self._tell_controls()
             self._tell_interventions()
@@ -126,11 +127,11 @@ class Session:
             else:
                 self.show(self.run(stop))
 
-    def _begin(self, scenario: Scenario) -> None:
+    def _begin(self, scenario: Scenario, simulation: Simulation) -> None:
         """A new run, at the scenario's start."""
-        simulation = self.simulation = scenario.simulation_object()
+        self.simulation = simulation
+        self._frames = Frames(self._scene, simulation, self._looked_at)
         self._sliders.begin(scenario)
-        self._messages_from = 0
         self._next = self._ended = None
         self._playing, self._waits = True, False
         self._pacer.restart(simulation.time)
@@ -328,18 +329,6 @@ class Session:
         if name in self.simulation.runs:
             self._looked_at.add(str(name))
 
-    def _joints(self, values: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        """Numbers of the joints that somebody looks at, by the names of arrays."""
-        found = {}
-        for shown_system in self._scene.shown_systems:
-            name, joints = shown_system.system.name, shown_system.joints
-            if joints is None or name not in self._looked_at:
-                continue
-            data = getattr(getattr(self.simulation.runs[name].loop, "plant", None), "data", None)
-            rows = joints.recorded(values[name])[0] if data is None else joints.live(data)
-            found[f"{name}/joints"] = rows.astype(np.float32)
-        return found
-
     def _tell_controls(self, browser: Browser | None = None) -> None:
         self.server.tell({"kind": "controls", "values": self._sliders.values}, browser)
 
@@ -402,39 +391,7 @@ class Session:
 
     def _frame(self) -> bytes:
         """The present instant."""
-        simulation = self.simulation
-        values = {name: run.present() for name, run in simulation.runs.items()}
-        rows = self._scene.arrays(values)
-        states = {name: self._state(name) for name in simulation.runs}
-        time = simulation.time
-        for name, run in simulation.runs.items():
-            if not run.inside:
-                cut(rows, name, np.array([time > run.loop.time + 1e-9]))
-                mark_outside(rows, name, states[name]["exit_agents"], np.array([True]))
-        arrays = {name: row[0] for name, row in rows.items()}
-        arrays["poses"] = self._scene.poses(values)[0]
-        arrays |= self._joints(values) if self._looked_at else {}
-        step = simulation.clock.steps(time)
-        for shown_system in self._scene.shown_systems:
-            own = simulation.runs[shown_system.system.name].loop.time
-            arrays |= shown_system.messages(
-                self._messages_from, max(self._messages_from, simulation.clock.steps(own))
-            )
-        self._messages_from = step
-        meta = {
-            "kind": "frame",
-            "time": time,
-            "playing": self._playing and not simulation.ended,
-            "speed": self._pacer.speed,
-            "pace": self._pacer.measured,
-            "ended": self._ended is not None,
-            "state": states,
-        }
-        return pack(meta, arrays)
-
-    def _state(self, name: str) -> dict[str, Any]:
-        """How a system's run stands or, at its end, how it ended."""
-        if self._ended is not None:
-            return outcome(self._ended.reports[name])
-        run = self.simulation.runs[name]
-        return status_now(run.system, run.loop.monitor)
+        pacer, ended = self._pacer, self._ended
+        playing = self._playing and not self.simulation.ended
+        reports = None if ended is None else ended.reports
+        return self._frames.frame(playing, pacer.speed, pacer.measured, reports)

@@ -1,29 +1,25 @@
 """What a page shows of one system: words about it once, arrays of numbers from what is recorded."""
 
 import json
-import math
-from collections.abc import Mapping
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gne_mj.faults import for_native, triggered
-from gne_mj.game_model import Game
 from gne_mj.loops.faults import count_messages
 from gne_mj.moving_values import bounds_move
 from gne_mj.plants.agent_type import followed_position
-from gne_mj.quantity import Quantity
 from gne_mj.signals import declared
 from gne_mj.system import Clock, mode_of
 from gne_mj.system.data import SystemData
 from gne_mj.variables import Variable
 from gne_mj.viewer.fleet import fleet_of
 from gne_mj.viewer.joints import Joints
+from gne_mj.viewer.shares import Values, margins, shares
 
 Arrays = dict[str, NDArray[Any]]
-Values = Mapping[str, NDArray[np.float64]]
 
 
 class ShownSystem:
@@ -100,31 +96,47 @@ class ShownSystem:
             values: of leading dimension T, of the variables that the page has; without some that
                 an older trajectory, or the present instant, does not know.
         """
-        name, system, game = self.system.name, self.system, self.system.game
+        system = self.system
         found: Arrays = {}
-        for variable in (*self._shown("line"), *self._shown("bound")):
-            if variable.name in values:
-                rows = values[variable.name]
-                found[line_key(name, variable.name)] = rows.reshape(len(rows), -1)
-        margin = -np.fmax.reduce(values["constraint"], axis=1)  # of constraints that there are
-        found[f"{name}/margin"] = margin.astype(np.float32)
-        found[f"{name}/share"] = shares(game, values, system.constraint_room).astype(np.float32)
-        if self._network_changes and "linked" in values:
-            found[f"{name}/linked"] = values["linked"].astype(np.float32)
-        if "there" in values:  # where agents leave and join
-            found[f"{name}/there"] = values["there"].astype(np.float32)
-        for variable in self._shown("estimates"):
-            found[f"{name}/{variable.name}"] = values[variable.name].astype(np.float32)
+        for name, key in self._lines:
+            rows = values.get(name)
+            if rows is not None:
+                found[key] = rows if rows.ndim == 2 else rows.reshape(len(rows), -1)
+        found[f"{system.name}/margin"] = margins(values["constraint"])
+        used = shares(system.game, values, system.constraint_room)
+        found[f"{system.name}/share"] = used.astype(np.float32)
+        for name, key in self._rounded:
+            rows = values.get(name)
+            if rows is not None:
+                found[key] = rows.astype(np.float32)
         return found
+
+    @cached_property
+    def _lines(self) -> list[tuple[str, str]]:
+        """Variables that are lines, or bounds of such, with the names of their arrays."""
+        lines = [*self._shown("line"), *self._shown("bound")]
+        return [(each.name, line_key(self.system.name, each.name)) for each in lines]
+
+    @cached_property
+    def _rounded(self) -> list[tuple[str, str]]:
+        """Likewise what is looked at only: which links there are, who is there, estimates."""
+        names = ["linked"] if self._network_changes else []
+        names += ["there", *(each.name for each in self._shown("estimates"))]
+        return [(name, f"{self.system.name}/{name}") for name in names]
 
     def messages(self, first: int, last: int) -> Arrays:
         """How many messages came and how many were lost, (links, 2), from one step to another."""
-        if self._message_period is None or not self._links:
+        if not self.counts_messages:
             return {}
         out = np.zeros((len(self._links), 2))
         period = self.clock.steps(self.clock.control_period)
         count_messages(self._faults, self.clock.timestep, period, first, last, out)
         return {f"{self.system.name}/messages": out.astype(np.float32)}
+
+    @cached_property
+    def counts_messages(self) -> bool:
+        """Whether it is known how many come over each link."""
+        return self._message_period is not None and bool(self._links)
 
     @cached_property
     def _faults(self) -> Any:
@@ -212,72 +224,6 @@ def _radii(system: SystemData) -> list[float | None]:
             if pair[0] >= 0 and distance > 0.0:
                 found[pair] = np.minimum(found[pair], 0.5 * distance)
     return [float(radius) if np.isfinite(radius) else None for radius in found]
-
-
-def shares(
-    game: Game, values: Values, room: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
-    """(T, N) how much each agent uses of its bounds: 0 none, 1 on one; nan where none is known.
-
-    A quantity's bounds count for the agent or for the owners of the constraint that it is of, and
-    for all agents if it is one number. Those that move are of each sample. An agent of which no
-    quantity says anything has the share of the bounds of its own constraints, 1 + g(y) / room.
-
-    Args:
-        game: whose.
-        values: of the samples.
-        room: (p,) -g(0), what there is to use of each constraint; not a number where it is none.
-    """
-    found = np.full((len(values["action"]), game.agents), np.nan)
-    for index, quantity in enumerate(game.quantities):
-        ways = _range(game, quantity)
-        if bounds_move(game, index):
-            names = quantity.bounds(game.entries(quantity))
-            if not all(name in values for name in names):  # as of an older trajectory
-                continue
-            ways = _ways(quantity, values, ways[0].shape[1:])
-        middle, up, down = ways
-        away = values[quantity.name].reshape(len(found), -1) - middle
-        used = np.fmax(away / up, away / down)
-        if quantity.each != "constraint":
-            found = np.fmax(found, used)  # one column each, or one for all
-            continue
-        for column, owners in enumerate(game.owned_by):
-            agents = list(owners)
-            found[:, agents] = np.fmax(found[:, agents], used[:, column, None])
-    unknown = np.all(np.isnan(found), axis=0)
-    if room is None or not np.any(unknown) or not np.any(np.isfinite(room)):
-        return found
-    used = np.maximum(1.0 + values["constraint"] / room, 0.0)
-    own = np.full_like(found, np.nan)
-    for column, owners in enumerate(game.owned_by):
-        agents = list(owners)
-        own[:, agents] = np.fmax(own[:, agents], used[:, column, None])
-    return np.where(unknown, own, found)
-
-
-@lru_cache
-def _range(game: Game, quantity: Quantity) -> tuple[NDArray[np.float64], ...]:
-    """:func:`_ways` of bounds that stand still, each for the quantity's entries (n,)."""
-    entries = game.entries(quantity)
-    return _ways(quantity, quantity.bounds(entries), (math.prod(entries),))
-
-
-def _ways(
-    quantity: Quantity, bounds: Values, entries: tuple[int, ...]
-) -> tuple[NDArray[np.float64], ...]:
-    """From where it is how far up, and down, to a quantity's bounds, (n,) or (T, n).
-
-    From the middle of two bounds, or from 0 to the one that there is; nan where none says anything.
-    """
-    nothing = np.full(entries, np.nan)
-    high, low = (
-        np.reshape(bounds.get(f"{quantity.name}_{key}", nothing), (-1, *entries))
-        for key in ("bound", "lower_bound")
-    )
-    middle = np.where(np.isnan(high + low), 0.0, 0.5 * (high + low))
-    up, down = high - middle, low - middle
-    return middle, np.where(up > 0, up, np.nan), np.where(down < 0, down, np.nan)
 
 
 def line_key(system: str, variable: str) -> str:
