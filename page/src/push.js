@@ -11,6 +11,7 @@ import { number, withUnit } from "./words.js";
 
 const STILL = 6; // px, up to which a hand is where it was
 const FULL = 50; // px, a drag of which is the force that is set
+const TIP = 12; // px around an arrow's tip that are its own
 const HIGH = 18; // px of the text of a force
 const ROWS = [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6]; // above and below an arrow's tip
 
@@ -203,7 +204,7 @@ export class Pushing {
   // ---- the arrow
 
   /**
-   * The arrow, under labels.
+   * The arrow, under labels, which make way for its tip.
    * @param {CanvasRenderingContext2D} context of the overlay
    */
   drawUnder(context) {
@@ -219,6 +220,7 @@ export class Pushing {
     if (!from || !force) return;
     const tip = this.tip(drag, from, forces);
     arrow(context, from, tip);
+    this.page.overlay.taken.push({ x: tip.x - TIP, y: tip.y - TIP, w: 2 * TIP, h: 2 * TIP });
     const unit = this.unitOf(system, which.agent);
     const text = `${withUnit(force, unit)} for ${number(duration)} s`;
     this.shown = { text, tip, side: tip.x >= from.x ? 1 : -1, box: null };
@@ -254,14 +256,12 @@ export class Pushing {
     const within = (/** @type {number} */ v, /** @type {number} */ most) =>
       Math.max(Math.min(v, most - 2), 2);
     const places = ROWS.flatMap((row) => (row ? [side, -side, 0] : [side, -side]).map((at) => ({
-      x: within(tip.x - w / 2 + at * (12 + w / 2), wide - w),
-      y: within(tip.y - HIGH / 2 + row * (HIGH + 4), high - HIGH),
+      x: within(tip.x - w / 2 + at * (TIP + 2 + w / 2), wide - w),
+      y: within(tip.y - HIGH / 2 + row * (HIGH + 6), high - HIGH),
       w,
       h: HIGH,
     }))); // prettier-ignore
-    const off = (/** @type {Box} */ { x, y }) =>
-      tip.x < x - 6 || tip.x > x + w + 6 || tip.y < y - 6 || tip.y > y + HIGH + 6;
-    return places.find((box) => off(box) && overlay.free(box)) ?? places[0];
+    return places.find((box) => overlay.free(box)) ?? places[0];
   }
 
   /**

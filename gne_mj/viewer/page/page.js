@@ -1013,6 +1013,7 @@
   // src/push.js
   var STILL = 6;
   var FULL = 50;
+  var TIP = 12;
   var HIGH = 18;
   var ROWS = [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6];
   var sizeOf = ({ x, y }) => Math.hypot(x, y);
@@ -1183,7 +1184,7 @@
     }
     // ---- the arrow
     /**
-     * The arrow, under labels.
+     * The arrow, under labels, which make way for its tip.
      * @param {CanvasRenderingContext2D} context of the overlay
      */
     drawUnder(context) {
@@ -1202,6 +1203,7 @@
       if (!from || !force) return;
       const tip = this.tip(drag, from, forces);
       arrow(context, from, tip);
+      this.page.overlay.taken.push({ x: tip.x - TIP, y: tip.y - TIP, w: 2 * TIP, h: 2 * TIP });
       const unit = this.unitOf(system, which.agent);
       const text2 = `${withUnit(force, unit)} for ${number(duration)} s`;
       this.shown = { text: text2, tip, side: tip.x >= from.x ? 1 : -1, box: null };
@@ -1234,13 +1236,12 @@
       const { clientWidth: wide, clientHeight: high } = overlay.canvas;
       const within2 = (v, most) => Math.max(Math.min(v, most - 2), 2);
       const places = ROWS.flatMap((row) => (row ? [side, -side, 0] : [side, -side]).map((at) => ({
-        x: within2(tip.x - w / 2 + at * (12 + w / 2), wide - w),
-        y: within2(tip.y - HIGH / 2 + row * (HIGH + 4), high - HIGH),
+        x: within2(tip.x - w / 2 + at * (TIP + 2 + w / 2), wide - w),
+        y: within2(tip.y - HIGH / 2 + row * (HIGH + 6), high - HIGH),
         w,
         h: HIGH
       })));
-      const off = ({ x, y }) => tip.x < x - 6 || tip.x > x + w + 6 || tip.y < y - 6 || tip.y > y + HIGH + 6;
-      return places.find((box) => off(box) && overlay.free(box)) ?? places[0];
+      return places.find((box) => overlay.free(box)) ?? places[0];
     }
     /**
      * Where the arrow ends: along what acts, as far as was dragged.
