@@ -16,6 +16,8 @@ from gne_mj.plants.mjcf_robot import RobotFile, mjcf_robots
 from gne_mj.scenario import load_scenario, scenario_of
 from gne_mj.simulation import Simulation
 from gne_mj.system import Clock, System
+from gne_mj.viewer.controls import pushes_of
+from gne_mj.viewer.shown_system import ShownSystem
 
 H = 0.004  # s
 
@@ -165,6 +167,19 @@ def test_a_push_at_what_a_sensor_alone_tells_is_refused(tmp_path):
     assert simulation.interventions == []
     simulation.push("vessels", 1, 1.0, 0.1)
     assert simulation.interventions[0]["what"] == "robot 2 pushed by 1 N m for 0.1 s"
+
+
+def test_a_page_knows_in_whose_frame_a_force_is():
+    (cars,), (drones,) = (load_scenario(name).system_objects() for name in ("cars", "drones"))
+    shown = [ShownSystem(each, Clock(1.0, H, H, H)) for each in (cars, drones)]
+    of_cars, of_drones = pushes_of(shown)
+    (way,) = of_cars["ways"][1]
+    assert way["along"] == pytest.approx([1.0, 0.0, 0.0])
+    assert way["item"] == shown[0].fleet.places["anchors"][1]  # its body, which turns
+    ways = of_drones["ways"][5]
+    assert [each["along"] for each in ways] == np.eye(3).tolist()
+    assert [each["item"] for each in ways] == [None] * 3
+    assert (of_cars["force"], of_drones["force"]) == (5.0, 2.0)  # 4.6 kg, 0.38 kg
 
 
 def test_pushed_cars_run_again_to_the_last_bit():

@@ -146,9 +146,8 @@ def test_cars_are_dragged_along_their_own_axis(page, recorded):
     agents = tables["systems"]["cars"]["agents"]
     del agents["spacing"]
     agents["poses"] = [{"position": [0.0, 1.0 * i, 0.0], "yaw": np.pi * (i == 1)} for i in range(4)]
-    with session(tables) as live:
+    with session(tables, begin="paused") as live:
         opened(page, live.server.url)
-        paused(page)
         for agent in (0, 1):
             drag(page, head(page, agent, system="cars"), (0.0, -60.0))  # seen from behind
             live_wait(lambda n=agent: len(live.simulation.interventions) > n, 60.0)
@@ -161,9 +160,8 @@ def test_cars_are_dragged_along_their_own_axis(page, recorded):
 
 @pytest.mark.slow  # a fleet with controllers of its own
 def test_drones_are_dragged_in_space(page, recorded):
-    with session("drones") as live:
+    with session("drones", begin="paused") as live:
         opened(page, live.server.url)
-        paused(page)
         drag(page, head(page, 3, system="drones"), (45.0, -30.0))
         live_wait(lambda: len(live.simulation.interventions) == 2, 60.0)
         page.keyboard.down("Shift")
@@ -295,8 +293,8 @@ def test_what_cannot_be_done_is_told_once(page, recorded):
             page.mouse.click(*head(page, 0, 1))
         said = page.locator(".toast .said").all_inner_texts()
         assert said == [
-            "robots: only robots that MuJoCo moves can be pushed.",
             "robots: dashed lines are measurements, so that there is no link to lose.",
+            "robots: only robots that MuJoCo moves can be pushed.",
         ]
         assert live.simulation.interventions == []
         quiet(recorded, *origins(live.server))
