@@ -90,6 +90,8 @@ def _begin(mode: str, title: str) -> str:
 
 def _script(match: re.Match[str]) -> str:
     text = page_file(match[1]).decode("utf-8")
+    if match[1] != _MESHCAT:  # the page's own can be read in its folder: here it is to be short
+        text = re.sub(r"^ +", "", text, flags=re.MULTILINE)
     # what ends a script, or begins a comment, for HTML's parser
     text = re.sub(r"<(/script|!--)", r"\\x3c\1", text, flags=re.IGNORECASE)
     return f"<script>{text}</script>"
