@@ -71,14 +71,14 @@ class Quantity:
         """Of its outline; without: none."""
         return [] if self.outline is None else np.asarray(self.outline, dtype=float).tolist()
 
+    @np.errstate(over="ignore")  # what is beyond all floats is infinite
     def at(self, profiles: NDArray[np.float64], entries: tuple[int, ...]) -> NDArray[np.float64]:
         """The values at profiles (samples, m), of shape (samples, *entries).
 
         Raises:
             InvalidInput: the values come in another shape.
         """
-        with np.errstate(over="ignore"):  # what is beyond all floats is infinite
-            values = np.asarray(self.values(profiles), dtype=np.float64)
+        values = np.asarray(self.values(profiles), dtype=np.float64)
         if values.shape != (len(profiles), *entries):
             raise InvalidInput(
                 "values",
