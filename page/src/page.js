@@ -256,8 +256,8 @@ export class Page {
     if (seen === this.seen) return;
     this.seen = seen;
     this.before = NaN;
-    if (seen) this.scene.wake();
-    else this.scene.rest();
+    this.plots.setSeen(seen);
+    this.scene[seen ? "wake" : "rest"]();
   }
 
   /** @param {number} now ms */

@@ -35,6 +35,7 @@ export class Plots {
     this.source = /** @type {any} */ (null); // from the first scene on
     this.now = 0;
     this.size = "";
+    this.seen = true; // or out of sight, in a page around
     /** @type {Stretch | null} */
     this.stretch = null; // of time that is shown; null: all
     /** @type {Map<string, Look>} */
@@ -163,8 +164,17 @@ export class Plots {
     return duration && last <= duration ? Math.min(nice, duration) : nice;
   }
 
+  /**
+   * Out of sight no plot follows its window's size: a notebook may have many.
+   * @param {boolean} seen
+   */
+  setSeen(seen) {
+    this.seen = seen;
+    if (seen) this.resize();
+  }
+
   resize() {
-    if (!this.meta || !this.column.clientWidth) return;
+    if (!this.meta || !this.seen || !this.column.clientWidth) return;
     const width = this.column.clientWidth - 24;
     const height = Math.floor(Math.min(Math.max(this.room(), 112), 300));
     const size = `${width} ${height}`;

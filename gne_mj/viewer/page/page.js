@@ -5413,6 +5413,7 @@
       null;
       this.now = 0;
       this.size = "";
+      this.seen = true;
       this.stretch = null;
       this.looks = /* @__PURE__ */ new Map();
       this.hiddenRuns = /* @__PURE__ */ new Set();
@@ -5523,8 +5524,16 @@
       const nice = niceSpan(Math.max(last, 2));
       return duration && last <= duration ? Math.min(nice, duration) : nice;
     }
+    /**
+     * Out of sight no plot follows its window's size: a notebook may have many.
+     * @param {boolean} seen
+     */
+    setSeen(seen) {
+      this.seen = seen;
+      if (seen) this.resize();
+    }
     resize() {
-      if (!this.meta || !this.column.clientWidth) return;
+      if (!this.meta || !this.seen || !this.column.clientWidth) return;
       const width = this.column.clientWidth - 24;
       const height = Math.floor(Math.min(Math.max(this.room(), 112), 300));
       const size = `${width} ${height}`;
@@ -8330,8 +8339,8 @@
       if (seen === this.seen) return;
       this.seen = seen;
       this.before = NaN;
-      if (seen) this.scene.wake();
-      else this.scene.rest();
+      this.plots.setSeen(seen);
+      this.scene[seen ? "wake" : "rest"]();
     }
     /** @param {number} now ms */
     loop(now) {
