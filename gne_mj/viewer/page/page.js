@@ -1970,11 +1970,15 @@
       const first = (agent) => pointed(agent) || share(agent) > 1;
       const order = this.orders.get(system.name) ?? [];
       const urgent = order.filter(first);
-      for (const agent of [...urgent, ...order.filter((each) => !first(each))])
-        if (isThere(instant.systems[system.name], agent) && (labelled || pointed(agent)))
-          this.label(system, agent, share(agent));
+      const seen = [...urgent, ...order.filter((each) => !first(each))].filter(
+        (agent) => isThere(instant.systems[system.name], agent) && (labelled || pointed(agent))
+      );
+      const found = seen.flatMap((agent) => this.label(system, agent, share(agent)) ?? []);
+      for (const { pill, body } of found) this.lead(pill, body);
+      for (const { pill, about } of found) this.pill(pill, about);
     }
     /**
+     * A label that finds room, which is then taken.
      * @param {System} system
      * @param {number} agent
      * @param {number} share
@@ -1994,7 +1998,7 @@
         overlay.taken.push(pill);
         this.drawn.push({ ...pill, system: system.name });
         overlay.marks.push({ x: pill.x + pill.w / 2, y: pill.y + HIGH2 / 2, system: system.name, agent });
-        return this.pill(pill, body, { name, system, agent, out });
+        return { pill, body, about: { name, system, agent, out } };
       }
       this.places.delete(`${system.name} ${agent}`);
     }
@@ -2047,13 +2051,11 @@
     }
     /**
      * @param {Pill} box
-     * @param {Box} body of the robot
      * @param {{name: string, system: System, agent: number, out: boolean}} about
      */
-    pill(box, body, { name, system, agent, out }) {
+    pill(box, { name, system, agent, out }) {
       const { context } = this.overlay;
       const chosen = this.overlay.isHighlighted(system, agent);
-      this.lead(box, body);
       context.beginPath();
       context.roundRect(box.x, box.y, box.w, box.h, 5);
       context.fillStyle = out ? colour("bad-fill") : colour("pill");
