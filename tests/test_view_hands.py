@@ -75,7 +75,9 @@ def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
         for number, (width, height) in enumerate(WIDTHS):
             page.set_viewport_size({"width": width, "height": height})
             page.evaluate("document.getElementById('tuning').open = false")
+            settled(page)  # the view has its new size
             page.keyboard.press("f")
+            settled(page)
             camera = page.evaluate("window.gne.head('robots', 0)")
             drag(page, head(page, 1), (60.0, 0.0))
             live_wait(lambda n=number: len(live.simulation.interventions) > 2 * n, 60.0)
