@@ -264,9 +264,9 @@ def test_joints_that_were_not_recorded_are_told(page, recorded):
 
 @pytest.mark.slow  # a browser at several widths
 def test_links_are_lost_by_a_click_and_kept_in_the_scenario(page, recorded):
-    with session(changes=PARTIAL) as live:
+    # later robots may pass where a link's middle is, and be chosen in its place
+    with session(changes=PARTIAL, begin="paused") as live:
         opened(page, live.server.url)
-        paused(page)
         for number, (width, height) in enumerate(WIDTHS):
             page.set_viewport_size({"width": width, "height": height})
             page.keyboard.press("f")
