@@ -87,6 +87,12 @@ def check_poses(session, poses):
     assert first == len(poses)
 
 
+def test_a_speed_may_be_a_whole_number():
+    with watched(changes=ODE) as (session, _page):
+        session._pacer.speed = 4
+        assert unpack(session._frame())[0]["speed"] == 4.0
+
+
 def test_a_status_is_told_anew_as_soon_as_there_is_another():
     """It is kept while the monitor has seen nothing worse."""
     kept, told = 0, []

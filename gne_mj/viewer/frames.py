@@ -116,4 +116,4 @@ def _text(value: float | bool | None) -> str:
     """JSON's text of what is finite."""
     if value is None:
         return "null"
-    return ("false", "true")[value] if isinstance(value, bool) else float.__repr__(value)
+    return ("false", "true")[value] if isinstance(value, bool) else repr(float(value))
