@@ -31,6 +31,7 @@ LEAVING = {
         ("osnr", {}),
         pytest.param("paper", {}, marks=pytest.mark.slow),
         pytest.param("planar-sync", {}, marks=pytest.mark.slow),
+        pytest.param("platoon", {}, marks=pytest.mark.slow),
         pytest.param("cars", {}, marks=pytest.mark.slow),
     ],
 )
@@ -74,12 +75,7 @@ def check_poses(session, poses):
         if shown_system.fleet is None:
             continue
         mirror, run = shown_system.fleet.mirror, session.simulation.runs[shown_system.system.name]
-        now = run.loop.present()
-        expected = mirror.poses(
-            shown_system.fleet.qpos(
-                {"state": now.state[None], "configuration": now.configuration[None]}
-            )[0]
-        )
+        expected = mirror.poses(shown_system.fleet.qpos(run.present())[0])
         expected[:, :2] += shift
         own = poses[first : first + len(expected)]
         assert np.array_equal(own, expected)
