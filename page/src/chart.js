@@ -198,6 +198,7 @@ const drawApproach = (u, { spec, plots }, system) => {
   const { ctx: context, bbox } = u;
   const ratio = uPlot.pxRatio;
   const x = u.valToPos(time, "x", true);
+  if (x < bbox.left || x > bbox.left + bbox.width) return; // another stretch is shown
   context.fillStyle = colour("limit");
   context.beginPath();
   context.moveTo(x, bbox.top + 8 * ratio);

@@ -4564,6 +4564,7 @@
     const { ctx: context, bbox } = u;
     const ratio = Be.pxRatio;
     const x = u.valToPos(time, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) return;
     context.fillStyle = colour("limit");
     context.beginPath();
     context.moveTo(x, bbox.top + 8 * ratio);
