@@ -60,6 +60,7 @@ def test_others_are_refused_and_nothing_is_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_command_replaces_only_when_asked(formation, tmp_path):
     folder, film = tmp_path / "run", tmp_path / "film.webp"
     folder.mkdir()

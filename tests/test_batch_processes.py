@@ -106,6 +106,7 @@ def test_a_batch_that_is_interrupted_says_how_to_go_on(tmp_path):
     assert "of 120 runs are stored; go on with `gne-mj batch --resume" in printed
 
 
+@pytest.mark.slow
 def test_files_that_cannot_grow_end_a_batch_cleanly(tmp_path):
     """A full disk, as far as one process can have one to itself."""
     # compiled by now, since machine code is kept in files too

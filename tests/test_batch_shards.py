@@ -48,6 +48,7 @@ def test_what_is_no_shard(text):
         parse_shard(text)
 
 
+@pytest.mark.slow
 def test_two_commands_at_once(tmp_path):
     """Both begin the batch, one makes the folder; the last one writes the tables."""
     common = [

@@ -103,6 +103,7 @@ def test_what_is_made_least():
     assert score(np.array([nan] * 3), np.array([nan, 1.0, 2.0]), 1e-2) == (3.0, np.inf, 2.0)
 
 
+@pytest.mark.slow
 def test_a_comparison_and_that_it_goes_on(tmp_path):
     """The same starts for all; what is put together is what the laws' own batches have."""
     out = tmp_path / "found"

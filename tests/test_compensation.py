@@ -35,7 +35,7 @@ def run(wanted, dry=0.0, count=1, duration=0.5, **law):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("observer", [0.0, 0.5])
+@pytest.mark.parametrize("observer", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_outputs_are_implicit_steps_of_the_law_alone(observer):
     """Against a scalar equation with the slope that bare MuJoCo has; drag is not in it."""
     model = mujoco.MjModel.from_xml_string(CART.format(dry=0.0))

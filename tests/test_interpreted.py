@@ -40,6 +40,7 @@ def interpreted(cache, *arguments):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_plain_python_takes_the_same_steps(tmp_path):
     done = interpreted(tmp_path / "cache", "-c", RUN, json.dumps(RUNS))
     assert done.returncode == 0, done.stderr

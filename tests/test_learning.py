@@ -353,6 +353,7 @@ def test_nothing_is_done_before_a_reset_and_closing_loses_nothing():
         assert "0.000 s: y = 1.000 0.000" in str(environment.render())
 
 
+@pytest.mark.slow
 def test_the_recipe_trains_a_policy_that_is_a_law(monkeypatch, tmp_path, capsys):
     folder = Path(__file__).parents[1] / "examples" / "learning"
     monkeypatch.syspath_prepend(folder)

@@ -109,7 +109,11 @@ def stages(robots, place, heading, step):
         mujoco.mj_integratePos(model, data.qpos, velocity, step)
 
 
-MODES = [("rk4", "continuous", 0.002), ("euler", "sampled", 0.02), ("rk4", "implicit", 0.1)]
+MODES = [
+    ("rk4", "continuous", 0.002),
+    ("euler", "sampled", 0.02),
+    pytest.param("rk4", "implicit", 0.1, marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.parametrize(("integrator", "mode", "period"), MODES)

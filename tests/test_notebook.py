@@ -50,5 +50,6 @@ assert formats["text/plain"].startswith("<Trajectory of robots")
 """
 
 
+@pytest.mark.slow
 def test_ipython_is_told_when_the_package_is_imported():
     subprocess.run([sys.executable, "-W", "ignore", "-c", PROGRAM], check=True, timeout=120)

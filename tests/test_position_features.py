@@ -22,6 +22,7 @@ TROUBLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["platoon", "formation"])
 def test_pushed_with_noise_and_late_sensors_within_a_margin(name):
     scenario = load_scenario(name, {**HELD, **TROUBLE})

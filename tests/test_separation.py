@@ -38,6 +38,7 @@ def test_agents_that_are_pushed_too_near_end_the_run():
     assert "separation" in summary(report)
 
 
+@pytest.mark.slow
 def test_a_deadlock_is_told_with_the_pair_that_holds():
     """Two robots head on whose half-planes do not turn."""
     head_on = {

@@ -117,6 +117,7 @@ def test_in_space_mode_implicit_is_the_one_of_plain_python():
     assert loop.monitor.least_distance < REACH
 
 
+@pytest.mark.slow
 def test_in_space_agents_keep_apart_arrive_and_touch_nothing():
     """Through the middle of a cube, where they are in each other's way."""
     scenario = in_the_air()

@@ -159,6 +159,7 @@ def test_leaving_the_set_is_a_status_with_its_sentence():
         assert np.all(np.isnan(data["input"].to_numpy()[-1]))
 
 
+@pytest.mark.slow
 def test_the_printed_spring_diverges():
     """With psi(x) = -x - atan(x), as the paper prints it, the extension grows without bound."""
     numbers = {**EQUAL, "stiffness": [-1.0] * 5, "atan_coefficient": [-1.0] * 5}

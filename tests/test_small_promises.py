@@ -282,6 +282,7 @@ def test_a_law_without_estimates_allows_any_step_whoever_hears_whom():
     assert largest_step(robot_system(robot_state(FIVE), law=law)) == np.inf
 
 
+@pytest.mark.slow
 def test_a_batch_draws_what_goes_wrong_by_the_seed_of_each_run():
     """Two runs that differ in their seeds alone, as each would be alone."""
     noise = {"type": "noise", "amplitude": 0.1}

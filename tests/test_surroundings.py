@@ -28,6 +28,7 @@ def ascii_only(*arguments, **more):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_run_in_a_folder_of_any_name_on_any_terminal(tmp_path):
     """None of these knows a display either."""
     folder = tmp_path / NAME

@@ -379,6 +379,7 @@ def of_integrators(**more):
     }
 
 
+@pytest.mark.slow
 def test_bounds_that_move_kept_estimates_and_counted_messages_are_shown():
     bound = {"type": "ramp", "from": 3.0, "to": 2.0, "rate": 1.0}
     partial = {"information": "partial", "graph": "line"}
