@@ -92,6 +92,7 @@ def test_a_killed_batch_loses_nothing_that_was_stored(tmp_path):
     assert killed_and_resumed(tmp_path, kills=50, seed=1) >= 25
 
 
+@pytest.mark.slow
 def test_a_batch_that_is_interrupted_says_how_to_go_on(tmp_path):
     process = subprocess.Popen(
         command(tmp_path / "a", "--set", "simulation.duration=400"),

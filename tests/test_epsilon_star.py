@@ -315,6 +315,7 @@ def test_the_velocity_games_epsilon_against_scipy():
     assert np.all(np.array([[2.0], [3.0], [2.5]]) - gaps > floor[:, None])
 
 
+@pytest.mark.slow
 def test_a_far_start_has_no_set_and_says_so_at_once():
     bound = EpsilonBound(velocities(1e-3, 1.9, (1.0, 2.0, 3.0)))
     assert bound.star is None

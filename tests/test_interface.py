@@ -463,6 +463,7 @@ def test_the_ten_lines_run(tmp_path, monkeypatch, capsys):
         assert words in printed
 
 
+@pytest.mark.slow
 def test_figures_leave_pyplot_and_its_backend_alone():
     told = printed(
         "import sys, matplotlib; matplotlib.use('svg');"

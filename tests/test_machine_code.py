@@ -59,6 +59,7 @@ def test_it_is_kept_in_a_temporary_folder_and_that_is_said_once(locked, tmp_path
     assert list(folder.rglob("settings.twice-*.nbi"))
 
 
+@pytest.mark.slow
 def test_what_a_version_with_other_modules_left_is_made_anew(locked, tmp_path):
     assert python(locked, COMPILE, NUMBA_CACHE_DIR=str(tmp_path)).stdout == "42\n"
     (index,) = tmp_path.rglob("settings.twice-*.nbi")

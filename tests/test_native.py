@@ -109,6 +109,7 @@ def test_the_key_follows_a_modules_source(tmp_path):
     assert len({one, two, native.source_key(full_information, velocity_synchronization)}) == 3
 
 
+@pytest.mark.slow
 def test_the_key_follows_this_packages_sources(tmp_path):
     """Any kernel of the package may be inlined anywhere: a change in one file concerns all."""
     packages = tmp_path / "gne_mj"

@@ -70,7 +70,7 @@ def draw(seed, curved, agents=None):
 ROBOTS = robots(UNEQUAL)
 
 
-@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("curved", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_the_continuous_laws_are_their_programs(curved):
     """Of robots with y' = (u - spring - damper)/M; J_g is zero where a gap's square is least."""
     mass = np.array(UNEQUAL["main_mass"])

@@ -89,6 +89,7 @@ def test_who_comes_second_keeps_its_results_under_another_name(command, tmp_path
         assert str(tmp_path / "out-2") in done.stdout
 
 
+@pytest.mark.slow
 def test_two_runs_at_once_keep_both_results(tmp_path):
     started = [
         subprocess.Popen(

@@ -343,6 +343,7 @@ def test_a_run_begins_with_its_first_browser(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+@pytest.mark.slow
 def test_two_browsers_see_the_same_and_one_may_go(browser, page, recorded):
     with session() as live:
         opened(page, live.server.url)

@@ -186,6 +186,7 @@ def test_two_runs_in_a_browser(page, recorded, runs):
         server.close()
 
 
+@pytest.mark.slow
 def test_only_what_runs_have_in_common_is_plotted_and_the_rest_is_told(browser, runs, planar):
     fewer = gne_mj.run("velocity-sync", FEWER)
     first = ["action", "gap", "constraint"]

@@ -97,6 +97,7 @@ def test_a_drag_pushes_a_robot_at_every_width(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+@pytest.mark.slow
 def test_a_finger_pushes_and_a_finger_beside_turns_the_view(page, recorded):
     with session() as live:
         opened(page, live.server.url)
@@ -125,6 +126,7 @@ def test_a_finger_pushes_and_a_finger_beside_turns_the_view(page, recorded):
         quiet(recorded, *origins(live.server))
 
 
+@pytest.mark.slow
 def test_a_drag_in_the_plane_pushes_along_both_axes(page, recorded):
     with session("planar-sync") as live:
         opened(page, live.server.url)

@@ -101,6 +101,7 @@ def test_nothing_else_is(static, name):
     assert get(static.url + name).code in (400, 404)
 
 
+@pytest.mark.slow
 def test_connections_are_limited(static):
     idle = [socket.create_connection(("127.0.0.1", static.port)) for _ in range(3 * CONNECTIONS)]
     time.sleep(0.2)

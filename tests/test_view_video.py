@@ -48,6 +48,7 @@ def saved(page):
     return download.value
 
 
+@pytest.mark.slow
 def test_a_stretch_becomes_a_video(page, recorded, run):
     """Its elements are read here by RFC 9559, and a browser's own player plays it."""
     server = serve(run, "a paper: two")
