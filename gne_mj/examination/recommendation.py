@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gne_mj.examination.holding import Held
 from gne_mj.examination.report import Recommendation
-from gne_mj.examination.responses import Slopes
+from gne_mj.examination.responses import Slopes, lag
 from gne_mj.examination.stable_steps import StableSteps
 
 PERIODS = (0.02, 0.01, 0.005, 0.002)  # s, the first that fits
@@ -57,8 +57,8 @@ class Found:
 
     @property
     def lags(self) -> bool:
-        """Whether the relative degree is more than 1, or not known."""
-        return max((each for each in self.degrees if each is not None), default=2) > 1
+        """See :func:`gne_mj.examination.responses.lag`."""
+        return lag(self.degrees)
 
 
 def step_for(steps: StableSteps, integrator: str, longest: float = STEPS[0]) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 
 from gne_mj.examination.holding import Held
 from gne_mj.examination.offers import Offer
-from gne_mj.examination.responses import Slopes
+from gne_mj.examination.responses import Slopes, lag
 from gne_mj.examination.stable_steps import LONGEST, StableSteps
 from gne_mj.plants.acting_forces import told
 from gne_mj.toml_text import toml_text
@@ -120,8 +120,7 @@ class Examination:
             rows.append((f"held at {_numbers(self.wished.wanted)}",
                          _held(self.wished, unit, effort)))  # fmt: skip
         if self.slopes is not None:
-            lags = max((each for each in self.degrees if each is not None), default=2) > 1
-            rows.append(("dy+/du", _slopes(self.slopes, lags)))
+            rows.append(("dy+/du", _slopes(self.slopes, lag(self.degrees))))
         rows.append(("relative degree", _degrees(self.degrees, self.dead_time)))
         free = all(each == float("inf") for each in self.limits)
         rows.append(("limits", "none" if free else f"{_numbers(self.limits)} {effort}"))

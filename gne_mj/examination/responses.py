@@ -81,6 +81,11 @@ def slopes(bench: Bench, states: Sequence[tuple[Array, Array]], change: Array) -
     )  # fmt: skip
 
 
+def lag(degrees: Sequence[int | None]) -> bool:
+    """Whether a relative degree is more than 1, or none is known."""
+    return max((each for each in degrees if each is not None), default=2) > 1
+
+
 def relative_degrees(bench: Bench, state: Array, u: Array, change: Array) -> list[int | None]:
     """Of each channel after how many integrations its input shows; None for never, or too late.
 
