@@ -72,7 +72,7 @@ class Ended:
     @property
     def tail(self) -> NDArray[np.bool_]:
         """(samples,) which are of the last part of the run, the last two at least."""
-        begin = min(self.time[-1] - TAIL * self.duration - 1e-9, self.time[-2])
+        begin = min(self.time[-1] - TAIL * self.duration - 1e-9, self.time[-2:][0])
         late: NDArray[np.bool_] = self.time >= begin
         return late
 

@@ -263,6 +263,14 @@ def test_a_quadrotor_is_to_begin_in_the_air_and_to_be_followed_at_its_centre():
             "It stands on something" in each for each in seen.recommendation.cautions
         )
         assert any(off in each for each in seen.recommendation.cautions)
+    centre = FLYING.replace(
+        '<site name="r1"', '<site name="c" pos=".005 .0025 -.0125"/><site name="r1"'
+    )
+    seen = gm.examine(
+        centre, passivity=False, keyframe="high", input=FLIES["input"],
+        output={"site": "c", "axes": ["x", "y", "z"]},
+    )  # fmt: skip
+    assert not any("centre of mass" in each for each in seen.recommendation.cautions)
     with pytest.raises(InvalidInput, match=r"^keyframe: got 'hgih', .*; did you mean 'high'"):
         gm.examine(FLYING, keyframe="hgih", **FLIES)
 

@@ -82,6 +82,8 @@ def test_one_sample_does_not_show_that_outputs_rest():
     ended = Ended(None, time, action, np.zeros((4, 1)), 6.0 - action[:, 0], 0.3, None)
     assert not ended.rests[0]
     assert Ended(None, time, 0.0 * action, action, 6.0 + 0.0 * time, 0.3, None).rests[0]
+    alone = Ended(None, time[:1], action[:1], action[:1], time[:1], 0.3, None)
+    assert alone.tail.tolist() == [True]
 
 
 @pytest.mark.parametrize(

@@ -111,12 +111,12 @@ class Bench:
         if not isinstance(output, Output) or output.kind not in POINTS or output.angular:
             return 0.0
         self.go(self.start)
-        data = self.plant.data
-        mujoco.mj_kinematics(self.plant.model, data)
-        mujoco.mj_comPos(self.plant.model, data)
-        part = getattr(data, output.kind)(f"robot_1/{output.name}")
-        whole = data.subtree_com[self.plant.model.body_rootid[self.plant.model.nbody - 1]]
-        return float(np.linalg.norm(part.xpos - whole))
+        model, data, name = self.plant.model, self.plant.data, f"robot_1/{output.name}"
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        point = getattr(data, output.kind)(name)
+        body = point.id if output.kind == "body" else getattr(model, output.kind)(name).bodyid[0]
+        return float(np.linalg.norm(point.xpos - data.subtree_com[model.body_rootid[body]]))
 
     def stops(self) -> list[str]:
         """The joints that are at their stops now."""
